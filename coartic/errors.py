@@ -6,7 +6,7 @@ line prints it as it stands and exits with code 2.
 
 
 class CoarticError(Exception):
-    """Something the user can put right."""
+    """An error that the user can put right."""
 
 
 class TaskError(CoarticError):
@@ -18,4 +18,4 @@ class SolutionError(CoarticError):
 
 
 class NotApplicableError(CoarticError):
-    """A method asked to run on a task it does not apply to."""
+    """A method, a condition or a search for hands does not apply to a task."""

@@ -1,11 +1,7 @@
 """Estimates with their intervals: means and differences.
 
-Samples are rewards (or any score) of independent runs; a plain number in the place of a sample is
-taken as known without error. Intervals are of the BCa bootstrap, and the edge cases of that are
-all in :func:`mean_of_means`. Resampling has one seed, :data:`SEED`, which has nothing to do
-with the seeds of the runs.
-
-scipy imports its modules where they are first used: scipy.stats takes longer than a figure.
+Samples are rewards (or any score) of independent runs. Intervals are of the BCa bootstrap, except
+in the cases that :func:`mean_of_means` names. All resampling has the same seed, :data:`SEED`.
 
 Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
@@ -30,24 +26,24 @@ from coartic.robot import Array
 CONFIDENCE = 0.95
 """Nominal coverage of every interval."""
 TAILS = (1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2
-"""The quantiles that such an interval lies between."""
+"""Quantiles at the ends of such an interval."""
 LEVEL = 0.05
 """Level of a test."""
 Resamples = Annotated[int, Field(ge=1, le=10_000_000)]
 """Number of resamples."""
 RESAMPLES = 9_999
-"""With 9 999 resamples the levels 0.05 and 0.01 fall on whole numbers of resamples."""
+"""Number of resamples unless stated otherwise: 0.05 and 0.01 of 9,999 + 1 are whole numbers."""
 SEED = 0
 """Seed of every resampling."""
 FEWEST = 3
-"""Fewer values than this give no bootstrap interval: there is next to nothing to resample."""
+"""Least number of values for a bootstrap interval."""
 FEWER_RESAMPLES = 1_999
 """Number of resamples for intervals of many values and over instances, which take long."""
 LARGE = 500
-"""Beyond so many values an interval is the percentiles of :data:`FEWER_RESAMPLES`: BCa takes time
-in the square of the number of values, and corrects nothing there."""
+"""Beyond so many values an interval is the percentiles of at most :data:`FEWER_RESAMPLES`: BCa
+corrects next to nothing there."""
 HUGE = 50_000
-"""Beyond so many values an interval is that of a normal distribution, which the mean then has."""
+"""Beyond so many values an interval is the interval of a normal distribution."""
 IN_CACHE = 1 << 18
 """Values that are drawn at once: few enough for the processor's cache."""
 NEGLIGIBLE = 1e-9
@@ -56,7 +52,7 @@ NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number and how sure it is. NaN where there is no interval or no test."""
+    """A number with its interval and p-value, NaN where there is none."""
 
     value: float
     """The mean, the difference or another number that is estimated."""
@@ -67,7 +63,7 @@ class Estimate:
     p: float = math.nan
     """P-value of the test of this number."""
     n: tuple[int, ...] = ()
-    """Number of values in each sample; a number taken as known is no sample."""
+    """Number of values in each sample."""
     resamples: int = 0
     """Number of resamples in which p was counted; 0 for an exact test."""
     least_p: float = math.nan
@@ -81,10 +77,7 @@ class Estimate:
 
 def vector(values: ArrayLike) -> Array:
     """Return a sample as a float vector ``(n,)``. Raises ValueError if it is no vector or empty, or
-    holds NaN, masked values, or numbers of a size whose third power is no float.
-
-    Runs without a solution have no reward: the caller decides what becomes of them.
-    """
+    holds NaN, masked values, or numbers that are neither 0 nor from 1e-100 to 1e100 in size."""
     sample = real_array("a sample", values)
     size = np.abs(sample)
     usable = (size <= 1e100) & ((size >= 1e-100) | (size == 0))
@@ -131,11 +124,11 @@ def difference_of_means(
     """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
     and ``(m,)``, with its 95 % BCa bootstrap interval, which needs three values in each. Raises
     ValueError for a sample that is empty or not finite."""
-    return mean_of_means([vector(first), vector(second)], [1.0, -1.0], resamples)
+    return mean_of_means([first, second], [1.0, -1.0], resamples)
 
 
 def mean_of_means(
-    samples: Sequence[Array], weights: Sequence[float], resamples: Resamples = RESAMPLES
+    samples: Sequence[ArrayLike], weights: Sequence[float], resamples: Resamples = RESAMPLES
 ) -> Estimate:
     """Return the weighted sum of the means of independent samples, with its 95 % BCa interval.
 
@@ -152,13 +145,13 @@ def mean_of_means(
     """
     if not samples:
         raise ValueError("needed is a sample at least")
-    samples = [*map(vector, samples)]
-    parts = [*zip(samples, weights, strict=True)]
+    vectors = [*map(vector, samples)]
+    parts = [*zip(vectors, weights, strict=True)]
     value = float(sum(weight * sample.mean() for sample, weight in parts))
-    n = tuple(map(len, samples))
+    n = tuple(map(len, vectors))
     if min(n) < FEWEST:
         return Estimate(value, n=n)
-    if not any(map(varies, samples)):
+    if not any(map(varies, vectors)):
         return Estimate(value, value, value, n=n)
     if max(n) > HUGE:
         variances = (weight**2 * sample.var(ddof=1) / len(sample) for sample, weight in parts)
@@ -201,8 +194,8 @@ def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int6
 
 @lru_cache(maxsize=8)  # most samples have as many values as another
 def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.uint16]]]:
-    """Return all batches of :func:`drawn`, an array of indices for each sample in each batch, in a
-    quarter of the memory. They are cached: do not change them."""
+    """Return a list of all batches of :func:`drawn`, in a quarter of the memory. It is cached: do
+    not change it."""
     return [[places.astype(np.uint16) for places in batch] for batch in drawn(sizes, resamples)]
 
 

@@ -14,11 +14,8 @@ PAPER_RADIUS = 0.1
 
 
 class MotionModel(NamedTuple):
-    """Constants of the paper's model; docs/model.md says where each comes from.
-
-    Another one is made with keyword arguments, ``MotionModel(gain=0.1)``, or from one:
-    ``PAPER._replace(gain=0.1)``.
-    """
+    """Constants of the paper's model, by default the paper's; docs/model.md says where each comes
+    from. ``MotionModel(gain=0.1)`` has another gain, as has ``PAPER._replace(gain=0.1)``."""
 
     step: float = 0.01
     """m: length of one movement step in joint space, in which a length unit of the base counts as
@@ -68,9 +65,8 @@ _BOUNDS = {
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
     """Return the model itself. Raises TypeError if it is no MotionModel, and ValueError if one of
-    its constants is out of bounds or, with ``radius``, the radius of the goals, length unit, if
-    ``correction_tolerance`` is not below it.
-    """
+    its constants is out of bounds or ``correction_tolerance`` is not below ``radius``, if given,
+    the radius of the goals, length unit."""
     if not isinstance(model, MotionModel):
         raise TypeError(f"model is {brief_value(model)}; it must be a MotionModel")
     for name, (least, most) in _BOUNDS.items():

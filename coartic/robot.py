@@ -7,8 +7,8 @@ relative: each joint is measured from the previous link, the first one from +x.
 
 The formulas stand once, in :func:`chain` and :func:`lever`, and are written so
 that one source serves three worlds: NumPy arrays (vectorised over leading axes),
-CasADi symbols, and the compiled kernels. The caller hands in the cosine and sine
-of its world. No other module takes a cosine of a joint angle.
+CasADi symbols, and the compiled kernels. The caller passes the cosine and sine of
+its world.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Points = NDArray[np.float64]
 """Places, shape ``(..., 2)``: x and y, length unit."""
 Hands = NDArray[np.int64]
 """Hands as places in :data:`HANDS`: 0 left, 1 right."""
-LARGEST_FIGURE = 1e4  # of any figure: far beyond use, and exact in all that follows
+LARGEST_FIGURE = 1e4  # of a task or a robot, length unit or rad
 MOST_LINKS = 100  # of an arm
 Finite = Annotated[
     float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_FIGURE, le=LARGEST_FIGURE)
@@ -158,16 +158,13 @@ class Robot:
 
     @cached_property
     def _arms(self) -> dict[str, Arm]:
-        def links(lengths: tuple[float, ...]) -> Array:
-            array = np.array(lengths, dtype=np.float64)
-            array.setflags(write=False)
-            return array
-
-        right_first = BASE_DOF + len(self.left_links)
-        return {
-            "left": Arm(BASE_DOF, links(self.left_links), *map(float, self.left_shoulder)),
-            "right": Arm(right_first, links(self.right_links), *map(float, self.right_shoulder)),
-        }
+        arms, first = dict[str, Arm](), BASE_DOF
+        for hand in HANDS:
+            links = np.array(getattr(self, f"{hand}_links"), dtype=np.float64)
+            links.setflags(write=False)
+            arms[hand] = Arm(first, links, *map(float, getattr(self, f"{hand}_shoulder")))
+            first += len(links)
+        return arms
 
     def arm(self, hand: Hand) -> Arm:
         """Return the :class:`Arm` of a hand: its first joint, its links and its shoulder. Raises
@@ -309,7 +306,7 @@ class Robot:
         ``q`` lists the configuration and its first three time derivatives, CasADi expressions of
         ``dof`` entries.
 
-        Written out, as third derivatives by CasADi make Hessians of twice as many operations.
+        Written out, because CasADi's third derivatives make Hessians of twice as many operations.
         Raises ValueError for an unknown hand.
         """
         import casadi
@@ -341,8 +338,8 @@ class Robot:
 
     @staticmethod
     def _hand(xs: list[Any], ys: list[Any], q: Array) -> Array:
-        """Return the last entries of ``xs`` and ``ys``, the hand, as an array ``(..., 2)``; ``q``,
-        ``(..., dof)``, gives the shape."""
+        """Return the last entries of ``xs`` and ``ys`` as an array ``(..., 2)``, by the shape of
+        ``q``, ``(..., dof)``."""
         position = np.empty((*q.shape[:-1], 2))
         position[..., 0], position[..., 1] = xs[-1], ys[-1]
         return position

@@ -14,6 +14,7 @@ from coartic import (
     SolutionError,
     corrective_trial,
     execute,
+    initial_hands,
     learn,
     load_task,
     movements_of,
@@ -32,6 +33,11 @@ def test_no_way_is_followed_without_end():
     first, second = execute_all(task, [out, back])
     assert first.reward == -192  # on the way
     assert "1800000 steps; at most 1000000 are allowed" in str(second)
+
+
+def test_initial_hands_need_a_model_also_where_the_task_names_them():
+    with pytest.raises(ValueError, match="gain is -1"):
+        initial_hands("ascending", model=PAPER._replace(gain=-1))
 
 
 def planned(*targets, hand="right"):

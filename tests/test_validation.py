@@ -51,7 +51,7 @@ from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import perform, run_suite
-from coartic.internal.text import RENAMED, did_you_mean
+from coartic.internal.text import RENAMED, did_you_mean, plain
 from coartic.method import Information, Session
 from coartic.motion.trial import reach_goals
 from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
@@ -293,6 +293,11 @@ def test_a_renamed_method_is_known_by_its_present_id():
     assert meant == "; its present id is 'posture-qp/goals-ahead'"
     assert did_you_mean("optimum/branch-and-bound", present).endswith("'optimum/search'")
     assert did_you_mean("guesses", ["guessing"]) == "; did you mean 'guessing'?"
+
+
+def test_blanks_before_a_text_do_not_hide_it():
+    assert plain("\n" * 9000 + "text", 80) == "text"
+    assert plain("a" + " " * 9000 + "b", 80).endswith("…")
 
 
 OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML file"

@@ -1,2 +1,2 @@
 """Parts that the packages share and users do not see: limits, sentences, files, processes. They
-know no task, no robot and no method."""
+import no task, robot or method."""

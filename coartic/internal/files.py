@@ -53,18 +53,19 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
-    """Make a folder, if it is missing; raise CoarticError now if :func:`publish` could not write
-    files ``names``, paths below the folder, there later. Returns the paths, below the folder, of
-    files that earlier calls of :func:`publish` wrote there."""
+    """Make a folder, if it is missing, and return the paths, below it, of files that earlier calls
+    of :func:`publish` wrote there. Raises CoarticError if it cannot be written, if another file has
+    a path among ``names``, or if such a path is a link or leads out of the folder by a link."""
     ours, listing = set[str](), folder / LISTING
     with errors_in_words(folder):
         if os.path.lexists(folder) and not folder.is_dir():
             raise CoarticError(f"cannot write {folder}: what is there is no folder")
         if listing.is_file() and not listing.is_symlink():
-            ours = {*listing.read_text(encoding="utf-8", errors="replace").splitlines()}
-            # Names that lead elsewhere are somebody else's, and a folder is no file.
-            ours = {n for n in ours if n and not Path(n).is_absolute() and ".." not in n}
-            ours = {name for name in ours if not (folder / name).is_dir()}
+            # Names that lead elsewhere are not ours, and a folder is no file.
+            for name in listing.read_text(encoding="utf-8", errors="replace").splitlines():
+                leads_elsewhere = Path(name).is_absolute() or ".." in name
+                if not leads_elsewhere and not (folder / name).is_dir():
+                    ours.add(name)
         for name in sorted({*ours, *names}):
             check_inside(folder, folder / name)
         in_the_way = [name for name in names if name not in ours and os.path.lexists(folder / name)]
@@ -93,9 +94,8 @@ def check_inside(folder: Path, path: Path) -> None:
 
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
-    """Write ``data`` as a file, whole or not at all; over a file of that name only with
-    ``replace``. Raises CoarticError if there is such a file without ``replace``, if its folder is
-    missing or not writable, if it is a folder, a link or a device, and if writing fails."""
+    """Write ``data`` as a file, whole or not at all. Raises CoarticError as :func:`check_output`,
+    and if writing fails."""
     check_output(path, replace=replace)
     with errors_in_words(path):
         write_atomically(path, data)

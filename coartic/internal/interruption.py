@@ -47,13 +47,9 @@ def catch_signals() -> None:
 
 
 def _interrupt_again(lost: UnraisableHookArgs) -> None:
-    """Repeat a KeyboardInterrupt that Python could not pass on; report any other lost exception.
-
-    No exception leaves a destructor or the callback of a library, such as the callback by which
-    LLVM loads a kernel. Python hands the exception to this hook and goes on. A signal that comes
-    before the hook has returned is ignored, as its exception would be lost, too; so the signal is
-    sent three times, and ignored once it was raised.
-    """
+    """Repeat a KeyboardInterrupt that Python could not pass on from a destructor or a callback,
+    such as LLVM's; report any other lost exception. A signal that comes before this hook returns
+    would be lost, too, so it is sent three times, and ignored once it was raised."""
     if lost.exc_type is not KeyboardInterrupt or not _heard:
         sys.__unraisablehook__(lost)
         return

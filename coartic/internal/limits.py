@@ -13,19 +13,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MOST_CELLS = 10_000
-"""Most cells of a suite: sixty times the largest one shipped."""
+"""Most cells of a suite."""
 MOST_RUNS = 1_000_000
 """Most runs of a cell."""
 MOST_TRIALS = 10_000_000
-"""Most trials of a run: a thousand times the paper's; their rewards are kept."""
+"""Most trials of a run, whose rewards are kept."""
 MOST_SECONDS = 1_000_000
-"""Most seconds of a run: eleven days; the system's clocks of waiting end at twice that."""
+"""Most seconds of a run: a system can wait for twice that at most."""
 MOST_SEED = 2**63 - 1
 """Largest seed of a suite."""
 MOST_RUN_SEED = 2**128 - 1
 """Largest seed of a run: some are hashes."""
 MOST_BYTES = 10_000_000
-"""Most bytes of a file of tasks, suites or methods: a hundred times the largest one shipped."""
+"""Most bytes of the file of a method."""
 WIDTHS = (1e-9, 100.0)
 """Least and greatest half width of a box of targets, length unit (base) and rad (joints)."""
 

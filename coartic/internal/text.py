@@ -1,9 +1,8 @@
 """Text from elsewhere: what is let in, and how it is shown.
 
 Names, titles and reasons come from files and methods of others, and go to terminals, pages,
-LaTeX and commands to paste. What a person writes in a file is refused where it is not plain
-(:data:`Line`); what a program says is kept, made plain (:func:`plain`). What is shown goes
-through :func:`one_line` wherever it comes from: each language escapes its own marks besides.
+LaTeX and commands to paste. What a person writes in a file is refused if it is not printable
+(:data:`Line`); what a program says is kept as one printable line (:func:`plain`).
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _MOST_FIGURES = 12  # of an array in a repr
 def plain(text: str, most: int = LONGEST_REASON) -> str:
     """Return text as one printable line (:func:`one_line`), without blanks at its ends; a line of
     more than ``most`` characters is cut to that length and ends in ``…``."""
-    line = one_line(text[: 4 * most].strip())  # an escape takes longer than what it shows
+    line = one_line(text.strip()[: 4 * most])  # an escape takes longer than what it shows
     return line if len(line) <= most else line[: most - 1] + "…"
 
 
@@ -42,12 +41,9 @@ def error_line(error: BaseException) -> str:
 
 
 def one_line(text: str) -> str:
-    """Return text as one printable line; a printable line is returned unchanged.
-
-    Otherwise lines are joined by `` | ``, without empty lines and without blanks (tabs, too) at the
-    ends of lines. Other characters that do not print (control characters, escape sequences, marks
-    that turn the direction of writing) become escapes, such as ``\\x1b``.
-    """
+    """Return text as one printable line, itself if it is one. Otherwise lines are joined by
+    `` | ``, without empty lines and without blanks (tabs, too) at the ends of lines; other
+    characters that do not print become escapes, such as ``\\x1b``."""
     if text.isprintable() or all(map(prints, text)):
         return text
     parts = (part.strip() for part in text.splitlines())
@@ -72,10 +68,8 @@ def counted(count: int, thing: str) -> str:
 
 def short_repr(thing: object, /, *texts: str, **facts: Any) -> str:
     """Return ``Class(text, fact=value)`` for an object, in one line, cut to :data:`LONGEST_LINE`
-    characters: ``texts`` unchanged, then the ``repr`` of each of ``facts`` by name.
-
-    An array that is not one row of at most 12 numbers is shown by its shape.
-    """
+    characters: ``texts``, then the ``repr``, cut to 80 characters, of each of ``facts`` by name. An
+    array that is not one row of at most 12 numbers is shown by its shape."""
     parts = list(texts)
     for name, value in facts.items():
         if not hasattr(value, "shape"):
@@ -104,12 +98,9 @@ RENAMED = {
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return ``; did you mean 'a'?`` with the one of ``names`` nearest to ``name``; an empty text
-    if none is near.
-
-    Near are names that begin with ``name``, capitals and punctuation aside, then names that are
-    spelt alike, then names that end in the same word. For the earlier id of a renamed method the
-    text is ``; its present id is 'a'``.
-    """
+    if none is near. Nearest are names that begin with ``name``, capitals and punctuation aside,
+    then names that are spelt alike, then names that end in the same word. For the earlier id of a
+    renamed method among ``names`` the text is ``; its present id is 'a'``."""
     if RENAMED.get(name) in (names := list(names)):
         return f"; its present id is {RENAMED[name]!r}"
     words = {each: re.findall(r"[^\W_]+", each.lower()) for each in (name, *names)}

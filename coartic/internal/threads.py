@@ -28,11 +28,8 @@ ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
 @cache
 def worker_variables() -> dict[str, str]:
     """Return the environment variables of a process in which methods run: one thread, and on x86-64
-    the same instructions for NumPy and its linear algebra, so that all processors round alike.
-
-    OpenBLAS takes its kernels for Nehalem, which need no more than NumPy itself; NumPy leaves out
-    its loops for AVX-512, whose names depend on its version. Both read this when they are loaded.
-    """
+    OpenBLAS's kernels for Nehalem and NumPy's loops without AVX-512, so that all processors round
+    alike. NumPy's names for AVX-512 depend on its version."""
     if platform.machine() not in ("x86_64", "AMD64"):
         return ONE_THREAD
     major, minor = map(int, metadata.version("numpy").split(".")[:2])
@@ -44,8 +41,8 @@ def worker_variables() -> dict[str, str]:
 
 def threads_for(jobs: int) -> int:
     """Return the number of threads or processes that ``jobs`` means: ``jobs`` itself, or for -1 the
-    number of cores. Raises ValueError for anything else that is not from 1 to 10,000.
-    """
+    number of cores that the process may use. Raises ValueError for anything else that is no whole
+    number from 1 to 10,000."""
     if not (isinstance(jobs, Integral) and jobs == -1):
         from coartic.internal.limits import check_limits  # which needs NumPy
 
@@ -57,16 +54,17 @@ def threads_for(jobs: int) -> int:
 
 
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
-    """Call ``work`` with consecutive slices that together cover the indices 0 to ``count`` - 1: the
-    first in this thread, each other in a thread of its own, with at least ``least`` indices each,
-    or once if there are fewer.
-
-    There are at most as many threads as cores, or, if it is set, as ``OMP_NUM_THREADS`` says (one
-    in worker processes). Returns when all calls have ended; raises what ``work`` raises.
-    """
+    """Call ``work`` with consecutive slices that together cover the indices 0 to ``count`` - 1, in
+    parallel: at least ``least`` indices each, unless one slice has all, and at most as many slices
+    as ``OMP_NUM_THREADS`` says, or, if it is not set, as the process may use cores. Returns when
+    all calls have ended; raises what ``work`` raises."""
+    if count < 2 * least:
+        work(slice(0, count))
+        return
     allowed = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
-    threads = min(count // least, int(allowed) if allowed.isdigit() else threads_for(-1))
-    edges = [count * part // max(threads, 1) for part in range(max(threads, 1) + 1)]
+    most = int(allowed) if allowed.isdigit() else threads_for(-1)
+    threads = max(1, min(count // least, most))
+    edges = [count * part // threads for part in range(threads + 1)]
     first, *others = itertools.starmap(slice, itertools.pairwise(edges))
     with ThreadPoolExecutor(max(len(others), 1)) as pool:
         waited_for = [pool.submit(work, part) for part in others]
@@ -78,18 +76,15 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
 @contextlib.contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
     """Set environment variables in the block of this context, for processes that start in it; at
-    the end of the block reset them to their former values, or remove variables that were not
-    set."""
-    before = {name: os.environ.get(name) for name in variables}
+    its end reset them to their former values, or remove variables that were not set."""
+    before = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in variables:
+            del os.environ[name]
+        os.environ.update(before)
 
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:

@@ -14,7 +14,7 @@ from coartic.errors import CoarticError
 from coartic.internal.limits import MOST_BYTES
 from coartic.internal.text import LONGEST_LINE, plain
 
-_MOST_TOML = 1_000_000  # bytes: ten times the largest file shipped
+_MOST_TOML = 1_000_000  # bytes
 _TEXTS = re.compile(
     r'"{3}(?:\\.|[^\\])*?(?:"{3}|\Z)|"(?:\\.|[^"\\\n])*"?'
     r"|'{3}.*?(?:'{3}|\Z)|'[^'\n]*'?|#[^\n]*",

@@ -118,10 +118,8 @@ class FileData(BaseModel):
 
 def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
     """Return lines ``source: sentence``, one for each of the first 20 problems in ``error`` of file
-    ``source``, and, if there are more, a last line with their number.
-
-    ``keys`` are the keys that the file may have in any of its tables.
-    """
+    ``source``, and, if there are more, a last line with their number. ``keys`` are the keys that
+    the file may have in any of its tables."""
     sentences, more = _explain_first(error.errors(include_url=False), list(keys))
     lines = [f"{plain(source)}: {sentence}" for sentence in sentences]
     if more:

@@ -50,8 +50,8 @@ Drift = Annotated[float, Field(ge=0, le=10)]
 
 
 def _one_or_several(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
-    """Return a valid drift, a number, or drifts, a tuple of numbers. Raises a validation error of
-    one sentence for any other value, in place of a sentence for each of these forms."""
+    """Return a valid drift, a number, or drifts, a tuple of numbers. Raises one validation error
+    for any other value, not one for each of these forms."""
     try:
         return validate(value)
     except ValidationError:
@@ -153,7 +153,8 @@ class ExplorationCondition:
         return short_repr(self, brief_value(facts.pop("id")), *positional, **facts)
 
     def why_not(self, task: Task | Outline) -> str | None:
-        """Return a sentence on why the condition does not apply to a task; None if it applies."""
+        """Return a sentence on why the condition does not apply to a task (its hands do not fit);
+        None if it applies."""
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:
             return (
@@ -205,11 +206,8 @@ EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
     """Return the exploration condition with an id such as ``"EC4"`` or ``"dual-process/EC4"``; a
-    condition is returned itself.
-
-    Raises CoarticError for an unknown id, and TypeError for an object that is neither a text nor a
-    condition.
-    """
+    condition is returned itself. Raises CoarticError for an unknown id, and TypeError for an object
+    that is neither a text nor a condition."""
     if isinstance(condition, ExplorationCondition):
         return condition
     if not isinstance(condition, str):

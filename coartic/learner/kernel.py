@@ -149,8 +149,8 @@ class _Workspace(NamedTuple):
 def learner_parameters(
     compiled: CompiledTask, condition: ExplorationCondition, first: Sequence[Movement]
 ) -> LearnerParameters:
-    """Return a task and a condition as arrays for the learner's kernel; ``first`` has the movements
-    of trial 0, one for each goal; a movement without a target stands for **A**."""
+    """Return a task and a condition as arrays for the learner's kernel; ``first`` has the movement
+    of trial 0 for each goal; a movement without a target stands for **A**."""
     task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.full((len(first), width), np.nan)
     for target, movement in zip(first_targets, first, strict=True):
@@ -173,24 +173,22 @@ def learner_parameters(
         follows=follows,
         explored=explored,
         exploration=_EXPLORATION[condition.hand_exploration],
-        epsilon=float(condition.epsilon),
-        noise_sd=float(condition.noise_sd),
-        corrects=bool(condition.corrects),
+        epsilon=condition.epsilon,
+        noise_sd=condition.noise_sd,
+        corrects=condition.corrects,
         by_subtask=condition.credit == "subtask",
-        discount=float(condition.discount),
+        discount=condition.discount,
         counts_earlier=condition.counted == "all",
         drifts=np.array(condition.drifts if condition.is_informed else (0.0,)),
-        pull=float(condition.pull),
+        pull=condition.pull,
         direction=_DIRECTION[condition.direction],
     )
 
 
 def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
-    """Return tables in which nothing is learned, shape ``(runs, G, 3, 2)``.
-
-    By run, goal, previous hand (left, right, none) and hand: a record of ``value``, Q (-inf), and
-    ``target``, q*, ``dof`` entries of NaN and then zeros up to the width of kernel records.
-    """
+    """Return tables in which nothing is learned, shape ``(runs, G, 3, 2)``: by run, goal, previous
+    hand (left, right, none) and hand a record of ``value``, Q (-inf), and ``target``, q*, ``dof``
+    entries of NaN and then zeros up to the width of kernel records."""
     learned = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
     tables = np.zeros((runs, len(task.goals), 3, 2), learned)
     tables["value"], tables["target"][..., : task.robot.dof] = -np.inf, np.nan
@@ -227,9 +225,8 @@ def _nearest_posture(
     n: int, robot: RobotRecord, learner: LearnerParameters, workspace: _Workspace
 ) -> int:
     """Return the hand, 0 left or 1 right, with which the corrective process **A** finds the posture
-    nearest in joint space for the goal of run ``n``; of equal hands the first. A hand with which
-    **A** fails is farthest. Iterations and evaluations are counted; the run does not move.
-    """
+    nearest in joint space for the goal of run ``n``; of equal hands, and if **A** fails with all,
+    the first. Iterations and evaluations are counted; the run does not move."""
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
     for hand in learner.hands:
@@ -262,10 +259,9 @@ def _best_hand(entries: Any, hands: Any) -> int:
 def choose_hand(
     n: int, entries: Any, explore: bool, robot: Any, learner: Any, rng: Any, workspace: Any
 ) -> int:
-    """Return the hand (0 left, 1 right) of run ``n`` of a batch for its present goal: the hand of
-    highest value in ``entries`` (value Q and target posture q* by hand); with ``explore``, with
-    probability ε, the hand that the condition explores (random, closest to the goal, or nearest in
-    posture). ``workspace`` holds the batch and arrays to compute in."""
+    """Return the hand (0 left, 1 right) of run ``n`` for its present goal: the hand of highest
+    value in ``entries`` (value Q and target posture q* by hand); with ``explore``, with probability
+    ε, the hand that the condition explores, if any (random, closest, or nearest in posture)."""
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
         if learner.exploration == _NEAREST_POSTURE:
@@ -284,11 +280,11 @@ def choose_hand(
 
 @inner
 def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) -> None:
-    """Set the preferred posture p of a run, in place, once its hand for goal ``number`` (from 0) is
-    chosen: the present posture q (*stay*), the start of the trial (*start*), or (*next goal*) (q +
-    t') / 2, with the target t' stored for the next goal and the hand of highest value there after
-    this hand; q for joints that the movement to t' would not explore, and if no target is stored.
-    ``table``: Q and q* of the run, shape ``(G, 3, 2)``. Nothing changes if drift and pull are 0."""
+    """Set the preferred posture p of a run, once its hand for goal ``number`` (from 0) is chosen:
+    the present posture q (*stay*), the start of the trial (*start*), or (*next goal*) (q + t') / 2
+    with the target t' stored for the next goal and the hand of highest value there; q for joints
+    that the movement to t' would not explore, and if no target is stored. ``table``: Q and q* of
+    the run, shape ``(G, 3, 2)``. Nothing changes if drift and pull are 0."""
     if run.drift == 0.0 and run.pull == 0.0:
         return
     fill_row(run.preferred, run.q)
@@ -349,9 +345,9 @@ def aim(
     workspace: _Workspace,
 ) -> None:
     """Choose the hand of run ``n`` for goal ``number`` (from 0) after hand ``before`` (0 left, 1
-    right, 2 none); if a target q*(s, a) is stored, set the run's target to q*, where joints that
-    the condition does not modify keep their values, with ``explore`` moved by the drift and with
-    noise η: phase 2, *aim*. ``table``: Q and q* of the run, shape ``(G, 3, 2)``."""
+    right, 2 none); if a target q*(s, a) is stored, set the run's target to q*, with an idle arm
+    that the condition does not modify as it is, and with ``explore`` moved by drift and noise η:
+    phase 2, *aim*. ``table``: Q and q* of the run, shape ``(G, 3, 2)``."""
     run, entries = workspace.batch.runs[n], table[number, before]
     run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
     stored = entries[run.hand]
@@ -381,8 +377,7 @@ def make_trial(
     """Make one trial in each of N runs, up to the first goal missed; fill in ``trial``, the
     accounts of the goals, shape ``(N, G)``, and the counts in ``workspace``. ``first`` makes trial
     0, with hands and targets of ``learner``; without ``explore`` a trial is greedy and has no
-    noise. ``tables``: Q and q* of the runs, ``(N, G, 3, 2)``; ``rngs``: addresses of their
-    generators, ``(N, 3)`` (:func:`addresses`)."""
+    noise. Other arguments as in :func:`learn_kernel`."""
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):
         set_off(batch.runs[n], learner.start)
@@ -421,9 +416,9 @@ def make_trial(
 
 @inlined
 def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
-    """Fill ``returns``, ``(G,)``, in place, with the return of each goal g of a completed trial,
-    ticks below 0: Σ γ^|h − g| r_h over goals h from g on, or, if earlier goals count, over all; r_h
-    is minus the ticks."""
+    """Fill ``returns``, ``(G,)``, in place, with the return of each goal g of a completed trial: Σ
+    γ^|h − g| r_h over goals h from g on, or, if earlier goals count, over all; r_h is minus the
+    ticks of goal h."""
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):
         returns[number] = earlier
@@ -436,9 +431,8 @@ def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
 
 @inlined
 def _copy_accounts(source: Any, destination: Any) -> None:
-    """Copy the accounts of the goals of a trial, ``source``, shape ``(G,)``, over the accounts in
-    ``destination``, in place, word by word: LLVM copies records byte by byte, which takes long to
-    compile."""
+    """Copy the accounts of the goals of a trial, shape ``(G,)``, over those in ``destination``, in
+    place, word by word: LLVM copies records byte by byte, which takes long to compile."""
     words, given = destination.view(np.int64), source.view(np.int64)
     for k in range(len(given)):
         words[k] = given[k]
@@ -448,10 +442,9 @@ def _copy_accounts(source: Any, destination: Any) -> None:
 def _learn_from(
     number: int, learner: LearnerParameters, tables: Any, results: Results, workspace: _Workspace
 ) -> None:
-    """Add trial ``number`` (from 0) of each run to ``results``; in runs that completed it, update Q
-    and q* in ``tables``: each visited state and hand is credited with the reward of the trial, or
-    the return of its goal; a credit above Q replaces Q, and the configuration at the hit replaces
-    q*."""
+    """Add trial ``number`` (from 0) of each run to ``results``; in runs that completed it, credit
+    each visited state and hand with the reward of the trial, or the return of its goal: a credit
+    above Q replaces Q in ``tables``, and the configuration at the hit replaces q*."""
     others = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // others
     for n in range(len(tables)):
@@ -487,9 +480,10 @@ def learn_kernel(
     robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, workspace: Any
 ) -> None:
     """Make all trials of N runs, each with its own generator (``rngs``, :func:`addresses`), and
-    then in each a greedy trial without noise, the replay; fill in ``tables``, Q and q*, shape ``(N,
-    G, 3, 2)``, and ``results`` (:class:`Results`). ``learner`` comes from
-    :func:`learner_parameters`."""
+    then in each a greedy trial without noise, the replay; fill in new :func:`empty_tables` and
+    ``results`` (:class:`Results`: zeros, ``best_trial`` -1). ``robot``, ``learner`` and
+    ``workspace`` come from :func:`robot_parameters`, :func:`learner_parameters` and
+    :func:`workspace_for`."""
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last is the replay, which is not part of the runs
         first, explore, made = number == 0, number < trials, results.last

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,8 +62,8 @@ _MOST_TOGETHER = 4_000_000  # trials of runs whose rewards fit into one answer o
 
 
 def runs_at_once(trials: int) -> int:
-    """Return how many runs of ``trials`` trials a process makes together at most: 72, or fewer if
-    these have more than 4,000,000 trials in all; at least 1."""
+    """Return the largest number of runs of ``trials`` trials that a process makes together: 72, or
+    fewer if these have more than 4,000,000 trials in all; at least 1."""
     return max(1, min(SLOTS, _MOST_TOGETHER // trials))
 
 
@@ -106,12 +106,11 @@ def learn(
     TaskError
         The task cannot be used.
     NotApplicableError
-        The condition does not fit the task or the first solution, or no first trial is found for
-        it.
+        The condition does not fit the task or the first solution, or no first trial is found.
     CoarticError
         The condition is unknown.
     TypeError
-        The task is neither a Task nor a text nor a path, or condition or model has another type.
+        ``task``, ``condition`` or ``model`` has another type.
     SolutionError
         The first solution breaks the task's rules.
     ValueError
@@ -180,8 +179,7 @@ def learn_many(
     """
     task = as_task(task)
     condition = load_condition(condition)
-    reason = condition.why_not(task)
-    if reason is not None:
+    if reason := condition.why_not(task):
         raise NotApplicableError(reason)
     check_limits("trials", trials, 1, MOST_TRIALS)
     if isinstance(seeds, str | bytes) or not isinstance(seeds, Iterable):
@@ -232,13 +230,9 @@ def _learn_together(
     seeds: Sequence[int],
     trials: int,
 ) -> list[LearningRun]:
-    """Run the learner side by side, once for each seed, and after its ``trials`` trials make its
-    replay, a trial without noise; return the runs in the order of seeds.
-
-    Nothing is checked. ``first`` has the movement of trial 0 for each goal; a movement without a
-    target stands for the corrective process. At most 72 seeds. With 0 trials only the replay is
-    made, which compiles the kernels.
-    """
+    """Run the learner side by side, once for each of at most 72 seeds, unchecked; return the runs
+    in the order of seeds. ``first`` has the movement of trial 0 for each goal, without a target for
+    the corrective process. With 0 trials only the replay is made, which compiles the kernels."""
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
     empty = np.zeros_like(empty_accounts(task.robot, runs, len(task.goals)).goals[..., 0])
@@ -302,15 +296,13 @@ def warm_up(task: Task, *parts: Kernels) -> None:
     executions).
     """
     hand, goal = task.hands[0], task.goals[0]
-    hands = letters_of([hand] * len(task.goals))
-    wanted = parts or get_args(Kernels)
-    if "learner" in wanted:
+    if not parts or "learner" in parts:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
-        _learn_together(task, condition, PAPER, corrective_movements(hands), [0], 0)
-    if "trials" in wanted:
-        shape = 0, len(task.goals)
-        targets = np.empty((*shape, 1, task.robot.dof))
-        make_trials(compiled_task(task, PAPER), np.empty(shape, np.int64), targets)
-    if "motion" in wanted:
+        first = corrective_movements(letters_of([hand] * len(task.goals)))
+        _learn_together(task, condition, PAPER, first, [0], 0)
+    if not parts or "trials" in parts:
+        targets = np.empty((0, len(task.goals), 1, task.robot.dof))
+        make_trials(compiled_task(task, PAPER), np.empty(targets.shape[:2], np.int64), targets)
+    if not parts or "motion" in parts:
         move(task.robot, task.q0, task.q0, hand, goal, task.radius)
         correct(task.robot, task.q0, hand, goal, model=PAPER._replace(max_iterations=0))

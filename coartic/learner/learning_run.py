@@ -50,9 +50,9 @@ class LearningRun:
     replay_reward: int | None
     """Total reward of the replay; None if it failed."""
     values: Array
-    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. In ticks, below
-    0: total rewards, or returns of the goal where the condition credits subtasks; -inf
-    where nothing was learned."""
+    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Minus ticks: total
+    rewards, or returns of the goal where the condition credits subtasks; -inf where nothing was
+    learned."""
     targets: Array
     """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is
     -inf."""
@@ -80,15 +80,13 @@ class LearningRun:
     @property
     def completed(self) -> NDArray[np.bool_]:
         """True for the trials that hit every goal, bool, shape ``(trials,)``. Other trials failed,
-        and changed neither ``values`` nor ``targets``.
-        """
+        and changed neither ``values`` nor ``targets``."""
         return ~np.ma.getmaskarray(self.rewards)
 
     @property
     def learned(self) -> tuple[Movement, ...]:
         """Movements of the learned solution: of the best trial, or, if the condition has
-        ``learned="replay"``, of the replay, the noiseless trial after learning; empty if this trial
-        did not hit every goal."""
+        ``learned="replay"``, of the replay; empty if this trial did not hit every goal."""
         if self.condition.learned == "best":
             return self.solution
         return self.replay
@@ -108,8 +106,7 @@ class LearningRun:
     @property
     def reward(self) -> int | None:
         """Total reward of the learned solution: the highest reward of any trial, or, if the
-        condition has ``learned="replay"``, the reward of the replay, the noiseless trial after
-        learning; None without a solution."""
+        condition has ``learned="replay"``, the reward of the replay; None without a solution."""
         if self.condition.learned == "replay":
             return self.replay_reward
         return None if self.best_trial is None else int(self.rewards[self.best_trial])

@@ -79,7 +79,8 @@ class DualProcess(Method):
         return _condition_of(self.condition, self.parameters)
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence on why the condition does not apply to a task; None if it applies."""
+        """Return a sentence on why the learner's exploration condition does not apply to a task
+        (its hands do not fit); None if it applies."""
         return self.rules().why_not(task)
 
     def solve(self, session: Session) -> Result:
@@ -128,8 +129,8 @@ class DualProcess(Method):
 
 def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
     """Return a new subclass of :class:`DualProcess`: the learner under a condition. Parameters are
-    noise and ε; of an informed condition also drift, pull and direction; with credit for subtasks
-    also discount and counted."""
+    trials, noise and ε; of an informed condition also drift, pull and direction; with credit for
+    subtasks also discount and counted."""
     names, citation = ["epsilon", "noise_sd"], DualProcess.citation
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     if condition.is_informed:  # to move in the null space of a hand, where paths are short
@@ -190,9 +191,7 @@ class CustomDualProcess(DualProcess):
 
     def rules(self) -> ExplorationCondition:
         """Return a copy of the paper's condition that parameter ``base`` names, with the values of
-        all other parameters that are not None; its id says that it is changed, such as ``EC4,
-        changed,``.
-        """
+        all other parameters that are not None and an id such as ``EC4, changed,``."""
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
         return _condition_of(base, self.parameters)
 

@@ -1,20 +1,16 @@
 """Many arms side by side: the arrays on which the compiled kernels work.
 
 A *run* is a robot that makes a trial, a record of the batch. A *slot* holds the arm of a run while
-it moves or is corrected. Each quantity of the slots is a row, and the innermost loop of a kernel
-runs over slots, so that the compiler makes vector instructions of it; the number of links belongs
-to the type of the rows, so that the loops over links are unrolled before. No operation mixes slots
-and none is reordered or fused: the result of a slot does not depend on its neighbours, on their
-number or on the width of the vectors.
+it moves or is corrected. The innermost loop of a kernel runs over slots, so that the compiler makes
+vector instructions of it; the number of links belongs to the type of the rows, so that loops over
+links are unrolled. No operation mixes slots and none is reordered or fused: the result of a slot
+does not depend on other slots, on their number or on the width of the vectors.
 
-Robot parameters are a record, too: Numba looks at every field of a tuple and of a NumPy scalar each
-time a kernel is called, and an array of one record is one argument, whatever the record holds.
+Robot parameters are one record: Numba looks at every field of a tuple each time a kernel is called.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
@@ -27,7 +23,7 @@ from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine,
 from coartic.robot import BASE_DOF, HANDS, Arm, Robot
 
 SLOTS = 72
-"""Most slots at once: they and their rows stay in the innermost cache."""
+"""Number of slots of a batch: few enough to stay in the processor's innermost cache."""
 _VECTOR = 8  # slots that vectors hold; SLOTS is a multiple of it
 GOING = 0.0
 """Status of a slot that has not ended."""
@@ -40,9 +36,8 @@ SlotArrays = Any
 
 
 def _links_for(robot: Robot) -> int:
-    """Return the number of links per arm for which the kernels of a robot are compiled: 4 or 8 if
-    no arm has more, else the number of the arm with more links. So most robots share machine code.
-    """
+    """Return the number of links per arm for which the kernels of a robot are compiled, so that
+    most robots share machine code: 4 or 8 if no arm has more, else the links of the longer arm."""
     return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
 
 
@@ -65,9 +60,9 @@ def _parameters_type(links: int) -> np.dtype[np.void]:
         "arms": (record_type(arm | shoulder), len(HANDS)),
         "model": record_type(model),
         "radius": np.float64,  # of the goals, length unit
-        "free_x": np.bool_,  # whether the corrective process moves the base in x
+        "free_x": np.bool_,  # True if the corrective process moves the base in x
         "free_y": np.bool_,
-        "checks": np.bool_,  # whether an arm without a target may be in its goal already
+        "checks": np.bool_,  # True if an arm without a target stays if its hand is in the goal
     }
     return record_type(fields)
 
@@ -84,9 +79,10 @@ def robot_parameters(
     """Return robot, constants and options for kernels as one record, in an array of shape ``(1,)``.
     The array is cached: copy it before you change it.
 
-    ``radius`` is the radius of the goals, length unit; ``locked_base`` has the base coordinates
-    that the corrective process leaves. ``checks`` says whether an arm without a target may be in
-    its goal already. Raises ValueError for a lock other than "x" and "y".
+    ``radius`` is the radius of the goals, length unit. The corrective process does not change base
+    coordinates in ``locked_base``. With ``checks``, an arm without a target stays if its hand is in
+    its goal already; without, the corrective process begins at once. Raises ValueError for a lock
+    other than "x" and "y".
     """
     if not set(locked_base) <= {"x", "y"}:
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
@@ -129,8 +125,8 @@ class Batch(NamedTuple):
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
-    """Return a new batch for kernels: ``count`` records of runs, at most 72 (:data:`SLOTS`), and
-    the arrays of 72 slots; all numbers are 0."""
+    """Return a new batch for kernels, of ``robot``'s width: ``count`` records of runs and the
+    arrays of 72 slots (:data:`SLOTS`), all numbers 0. Kernels need a slot for each run."""
     width = width_of(robot)
     fields = {
         "q": (np.float64, width),  # where the robot is, length unit and rad
@@ -141,11 +137,11 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
         "goal": (np.float64, 2),  # x and y, length unit
         "hand": np.int64,  # that is to hit the goal: 0 left, 1 right
         "action": np.int64,  # next: see coartic.motion.trial
-        "corrects": np.bool_,  # whether the corrective process finishes what it misses
-        "going": np.bool_,  # whether it has missed no goal so far
-        "acting": np.bool_,  # whether the run is among those that are moved or corrected next
-        "hit": np.bool_,  # whether the hand is within the goal's radius
-        "converged": np.bool_,  # whether the corrective process did
+        "corrects": np.bool_,  # True if the corrective process acts where a movement misses
+        "going": np.bool_,  # True if it has missed no goal so far
+        "acting": np.bool_,  # True if the run is among those that are moved or corrected next
+        "hit": np.bool_,  # True if the hand is within the goal's radius
+        "converged": np.bool_,  # True if the corrective process did
         "ticks": np.int64,  # of the movement
         "iterations": np.int64,  # of the corrective process
         "evaluations": np.int64,  # of forward kinematics, since the last account
@@ -159,11 +155,11 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
 @cache
 def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     """Return the NumPy type of :data:`SlotArrays` for arms with ``links`` links, and two slices of
-    its rows (a row has a number for each slot): the rows that a correction needs, and those that a
-    movement needs. Shorter arms end in links of length 0."""
+    its rows (a row has a number for each slot): the rows that a correction needs, and the rows that
+    a movement needs. Shorter arms end in links of length 0."""
     joints = (BASE_DOF + links,)
-    corrected = {"q": joints}  # base x and y, then the joints of the arm
-    common = {
+    shapes = {
+        "q": joints,  # base x and y, then the joints of the arm
         "run": (),  # index of the run in the slot
         "first": (),  # index in a configuration of the first joint of its arm
         "links": (),  # of its arm
@@ -171,31 +167,24 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "shoulder": (2,),
         "goal": (2,),
         "start": joints,
-    }
-    moved = {
         "target": joints,
         "rate": (links,),  # of the absolute link angles, rad a step
         "base_rate": (2,),
         "end": (2,),  # of the hand, where the target would put it
         "distance": (),  # from start to target; its square, before the arm sets off
         **dict.fromkeys(("step", "last", "slowness", "bend", "clearance"), ()),
+        "x": (links + 1,),  # of shoulder, joints and hand
+        "y": (links + 1,),
+        "status": (),
+        "pull": joints,  # what an iteration of a correction adds to q
+        "jacobian": (2, *joints),
     }
-    # Positions of shoulder, joints and hand; what an iteration of a correction adds to q.
-    passing = {"x": (links + 1,), "y": (links + 1,), "status": (), "pull": joints}
-    passing["jacobian"] = (2, *joints)
-    shapes = corrected | common | moved | passing
     kinds = dict.fromkeys(("run", "first", "links"), np.int64)
     record = np.dtype(
         [(name, kinds.get(name, np.float64), (*shape, SLOTS)) for name, shape in shapes.items()]
     )
-    first, last = height(corrected), height(corrected | common)
-    return record, slice(last), slice(first, last + height(moved))
-
-
-def height(shapes: Mapping[str, tuple[int, ...]]) -> int:
-    """Return the number of rows that quantities take together: the sum of the products of
-    ``shapes``, the shape of each quantity in a slot, by its name."""
-    return sum(math.prod(shape) for shape in shapes.values())
+    before = {name: place[1] // (8 * SLOTS) for name, place in (record.fields or {}).items()}
+    return record, slice(before["target"]), slice(before["run"], before["x"])
 
 
 @inlined
@@ -257,8 +246,7 @@ def compact(rows: Any, slot: int, last: int) -> None:
 @inner
 def padded_count(count: int) -> int:
     """Return the number of slots to work on if ``count`` are in use: ``count`` itself for 0 and 1,
-    else ``count`` rounded up to whole vectors of 8 slots, whose last slots may hold no run; so no
-    slots are left over that would be worked on one by one."""
+    else ``count`` rounded up to whole vectors of 8 slots, the last of which may hold no run."""
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
@@ -277,9 +265,8 @@ def winding(q: Any, slot: int) -> float:
 
 @inner
 def are_near(at: SlotArrays, count: int) -> bool:
-    """Return True if all links in the first ``count`` columns of ``at`` are certain to have an
-    absolute angle below 1e5 rad, the range of the fast cosine, as the absolute angles of the arm's
-    joints have a lower sum; False if they may have or not."""
+    """Return True if the angle from +x of every link in the first ``count`` columns of ``at`` is
+    certain to be below 1e5 rad, the range of the fast cosine (:func:`winding`); else False."""
     far = 0
     for i in range(padded_count(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1
@@ -287,9 +274,8 @@ def are_near(at: SlotArrays, count: int) -> bool:
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Return a kernel ``chains(at, count)`` that fills the arrays ``x`` and ``y`` in the first
-    ``count`` columns of ``at`` with the places of shoulder, joints and hand, computed with
-    functions ``cos`` and ``sin``."""
+    """Return a kernel ``chains(at, count)`` that does what :func:`place` does, by functions ``cos``
+    and ``sin``."""
 
     @inner
     def chains(at: SlotArrays, count: int) -> None:

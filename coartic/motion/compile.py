@@ -71,9 +71,8 @@ class _Kernel:
         return self.dispatcher(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the compiled dispatcher that Numba asks for (``_numba_type_``,
-        ``py_func`` or ``targetoptions``), so that kernels can call a kernel. AttributeError for
-        others."""
+        """Return an attribute of the compiled dispatcher that Numba asks for when a kernel calls
+        this one; raise AttributeError for others."""
         if name in ("_numba_type_", "py_func", "targetoptions"):
             return getattr(self.dispatcher, name)
         raise AttributeError(f"a kernel has no attribute {name!r}")
@@ -123,19 +122,18 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
     """Return the addresses with which kernels draw from N NumPy generators (:func:`generator_at`),
     of state and two functions, shape ``(N, 3)``. The generators must outlive the kernel's call."""
-
-    def draws_of(generator: np.random.Generator) -> list[int | None]:
-        c = generator.bit_generator.ctypes
-        return [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
-
-    return np.array([draws_of(generator) for generator in generators], dtype=np.uintp)
+    rows = [
+        [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
+        for c in (generator.bit_generator.ctypes for generator in generators)
+    ]
+    return np.array(rows, dtype=np.uintp)
 
 
 @intrinsic
 def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
     """Build, in a kernel, NumPy's generator whose state and drawing functions are at addresses
-    (:func:`addresses`). As an intrinsic of Numba does, it gets the types of its arguments after the
-    typing context, and returns signature and builder."""
+    (:func:`addresses`): an intrinsic, which gets the types of its arguments and returns signature
+    and builder."""
     from numba.core import cgutils, types
 
     kind = types.NumPyRandomGeneratorType("generator")
@@ -168,15 +166,10 @@ def import_numba() -> Any:
 
 @cache
 def _set_up_numba() -> Any:
-    """Import Numba, set it up, once a process, and return the module: it reads no settings from a
-    file in the current folder, names types of records alike in every process, and lets inlined
-    blocks share variables.
-
-    LLVM gets options on which only the speed of kernels depends. In a program that has compiled
-    something else with Numba before, they come too late: its vectors stay narrow.
-    """
+    """Import Numba, set it up, and return the module. LLVM's options change only the speed of
+    kernels; in a program that has compiled something else with Numba before, they come too late."""
     modules: dict[str, Any] = sys.modules
-    kept = {name: modules[name] for name in ("yaml",) if name in modules}
+    kept = {"yaml": modules["yaml"]} if "yaml" in modules else {}
     modules["yaml"] = None  # no settings are read from a file in the folder where one stands
     try:
         with warnings.catch_warnings():
@@ -224,9 +217,7 @@ def _set_up_numba() -> Any:
 
 def _compile_kernel(function: Callable[..., Any], kind: str) -> Any:
     """Return what Numba makes of a function, with the options of the decorator called ``kind``.
-
-    Raises CoarticError where Numba is set to compile nothing, or by numbers that it refuses.
-    """
+    Raises CoarticError if variables of Numba keep it from compiling."""
     try:
         numba = import_numba()
     except ValueError as error:
@@ -274,8 +265,8 @@ def _keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
 
 
 def _cache_folder() -> Path | None:
-    """Create the folder for machine code of these sources and return it; None if no folder is
-    writable. Remove unused folders of other sources next to it (:func:`_remove_old`)."""
+    """Return the folder for machine code of these sources, which is made if it is missing; None if
+    no folder is writable. Old folders next to it are removed (:func:`_remove_old`)."""
     roots, chosen = [PACKAGE / "__pycache__"], import_numba().config.CACHE_DIR
     if Path(chosen).is_absolute():  # or it would change with where one stands
         roots.insert(0, Path(chosen) / "coartic")
@@ -315,9 +306,8 @@ def _log_once(message: str) -> None:
 class _MachineCode:
     """Machine code of a function on disk, as Numba's dispatchers ask for it.
 
-    Of processes that lack the same code one compiles the code and all others wait. A file that
-    cannot be read, such as a file that a full disk has cut short, is dropped, and code that cannot
-    be kept is compiled again in the next process.
+    Of processes that lack the same code one compiles the code and all others wait. Code that is
+    damaged, such as by a full disk, or cannot be kept is compiled again.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -344,7 +334,8 @@ class _MachineCode:
 
     def load(self, *wanted: Any) -> Any:
         """Return the machine code of a signature (``wanted``, as Numba passes it) from disk; None
-        if it is not there, or cannot be read: all code of the function on disk is then dropped."""
+        if it is not there or its file does not open, or if it is damaged, which empties the index
+        of the function's code."""
         try:
             # Not load_overload, which first lists all that Numba could compile.
             return self.files._load_overload(*wanted)
@@ -360,9 +351,9 @@ class _MachineCode:
         self.unlock()
 
     def wait_for_lock(self) -> bool:
-        """Lock this function's code for this process, whose number the file of the lock gets, and
-        return True; return False if the system has no locks, or another process holds the lock for
-        more than 120 s. A message names that process after 5 s."""
+        """Lock this function's code for this process, whose id the file of the lock gets, and
+        return True; return False if it cannot be locked, or another process holds the lock for more
+        than 120 s. A log message names that process after 5 s."""
         with contextlib.suppress(ImportError, OSError):
             import fcntl
 

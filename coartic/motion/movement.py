@@ -76,7 +76,7 @@ class MoveResult(NamedTuple):
     hit: bool
     """True if the hand is within the goal's radius."""
     evaluations: int
-    """Forward-kinematics evaluations the kernel made."""
+    """Forward-kinematics evaluations made."""
 
     def __repr__(self) -> str:
         return short_repr(self, ticks=self.ticks, hit=self.hit, q=self.q)
@@ -91,7 +91,7 @@ class Correction(NamedTuple):
     converged: bool
     """True if the hand is at the goal, as near as ``MotionModel.correction_tolerance``."""
     iterations: int
-    """Descent steps, each with one Jacobian and one forward-kinematics evaluation."""
+    """Iterations made, each with one Jacobian."""
 
     def __repr__(self) -> str:
         return short_repr(self, converged=self.converged, iterations=self.iterations, q=self.q)
@@ -139,14 +139,9 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 @inner
 def divide_steps(at: SlotArrays, count: int, step: float) -> bool:
-    """Set rates, bounds and number of steps of the movements in the first ``count`` columns of
-    ``at`` (:func:`start`), in place, with steps of length ``step`` in joint space; ``distance``, a
-    square before, becomes its root, and the present step is set to 0.
-
-    Returns True only if all link angles are certain to stay below 1e5 rad, the range of the fast
-    cosine, by a bound: the sum of absolute joint angles. If False, angles may exceed this range or
-    not.
-    """
+    """Set rates, bounds and number of steps of ``step`` in joint space of the movements in the
+    first ``count`` columns of ``at`` (:func:`start`), in place; ``distance`` becomes its root.
+    Return True if all link angles are certain to stay below 1e5 rad (:func:`winding`)."""
     far = 0
     for i in range(padded_count(count)):
         distance = math.sqrt(at.distance[i])
@@ -190,13 +185,13 @@ def _place_between(at: SlotArrays, count: int, step: float) -> None:
 
 @inner
 def check(at: SlotArrays, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -> int:
-    """Evaluate the stopping rule of movements in the first ``count`` slots, columns of ``at``;
-    return how many of them have ended.
+    """Evaluate the stopping rule of movements in the first ``count`` columns of ``at``; set
+    ``status`` and, where a movement goes on, the next ``step`` that can end it; return how many
+    have ended.
 
-    Each slot gets a status, in place; a slot that goes on gets the next step that can end its
-    movement. A movement ends at its last step, with the hand at most ``rims[0]`` from the goal's
-    centre, or, with ``stop_on_arrival``, at most ``rims[1]`` from where the target puts the hand,
-    length unit. ``squares`` are the squares of ``rims``, as rounded by :func:`largest_square`.
+    A movement ends at its last step, with the hand at most ``rims[0]``, length unit, from the
+    goal's centre, or, with ``stop_on_arrival``, at most ``rims[1]`` from where the target puts the
+    hand. ``squares`` are the squares of ``rims`` (:func:`largest_square`).
     """
     ended = 0
     tip = len(at.length)
@@ -232,12 +227,8 @@ def check(at: SlotArrays, count: int, stop_on_arrival: bool, rims: Any, squares:
 @shared
 def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotRecord) -> None:
     """Move the arms in the first ``count`` slots of ``batch``, loaded by :func:`start`, until each
-    movement has ended: with a hit, at its target, or, with ``stop_on_arrival``, as soon as the hand
-    is near the place to which the target brings it. Afterwards the slots are free.
-
-    In the record of each run ``q`` becomes the configuration in which the movement ended, ``hit``
-    and ``ticks`` are set, and ``evaluations`` grows by the forward-kinematics evaluations made.
-    """
+    movement has ended (:func:`check`), which frees its slot. In the record of each run ``q``,
+    ``hit`` and ``ticks`` are set, and ``evaluations`` grows."""
     at, evaluations, step = batch.at[0], 0, robot.model.step
     rims = robot.radius, robot.model.arrival_tolerance
     squares = largest_square(rims[0]), largest_square(rims[1])
@@ -313,8 +304,8 @@ def move(
     radius : float
         Radius of the goal, length unit.
     stop_on_arrival : bool
-        Whether the movement also ends where the hand is near the place to which the target brings
-        it. A corrective movement does not: it ends on hitting the goal, or at its target.
+        True if the movement also ends where the hand is near the place to which the target brings
+        it; False, as in a corrective movement, if it ends only on a hit or at its target.
     model : MotionModel
         The constants; ``step`` and ``arrival_tolerance`` matter.
 
@@ -368,10 +359,9 @@ def _find_statuses(at: SlotArrays, count: int, square: float) -> None:
 def descend(
     at: SlotArrays, count: int, robot: RobotRecord, runs: Any, pull: Any
 ) -> tuple[int, bool]:
-    """Make an iteration of the corrective process **A**, q += α Jᵀ e, in every slot of ``at`` that
-    goes on; with a kernel ``pull`` add what it fills in (:func:`descend_to_goals`; ``runs`` are the
-    batch's records). Return how many of the first ``count`` slots have ended, and whether all link
-    angles are certain to be below 1e5 rad afterwards."""
+    """Make an iteration of the corrective process **A** in each of the first ``count`` columns of
+    ``at`` that goes on, with ``pull`` as in :func:`descend_to_goals`. Return how many of them have
+    ended, and whether all link angles are then certain to be below 1e5 rad."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -397,7 +387,7 @@ def descend(
                 turned += at.pull[BASE_DOF + k, i]
             moved |= turned != before
             at.q[BASE_DOF + k, i] = turned if going else before
-        # Where nothing moves: a stationary point away from the goal, which it will not leave.
+        # A stationary point away from the goal, which the process will not leave.
         stuck = going & (not moved)
         at.status[i] = _STUCK if stuck else at.status[i]
         ended += 0 if (going & moved) | (i >= count) else 1
@@ -412,9 +402,8 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
     The record of each run in ``batch.runs`` gets the last iterate as ``target``, ``converged`` and
     ``iterations``, and its ``evaluations`` grow. Afterwards the slots are free.
 
-    ``pull``: None, or a kernel ``pull(at, count, robot, runs)``, called before each iteration, that
-    fills in ``at.pull``: what the iteration adds to the base and to the joints of the arm besides α
-    Jᵀ e. It has to be 0 for locked coordinates of the base.
+    ``pull``: None, or a kernel ``pull(at, count, robot, runs)`` that sets ``at.pull``, what the
+    next iteration adds to ``at.q`` besides α Jᵀ e: 0 for locked coordinates of the base.
     """
     at, iteration = batch.at[0], 0
     square = largest_square(robot.model.correction_tolerance)
@@ -472,9 +461,9 @@ def project(v: Any, x: Any, y: Any) -> None:
 
 @inner
 def _pull_to_preferred(at: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
-    """Set ``pull`` in each of the first ``count`` columns of ``at``, in place, to β N(q) (p − q):
-    the share β (``pull`` of the run, a record of ``runs``) of the way to its preferred posture p,
-    projected by N onto the null space of the hand's Jacobian."""
+    """Set ``pull`` in each of the first ``count`` columns of ``at`` to β N(q) (p − q), 0 for a
+    locked base: the share β of the way to the preferred posture p (``pull`` and ``preferred`` of
+    the run), projected by N onto the null space of the hand's Jacobian."""
     tip = len(at.length)
     for i in range(count):
         run, v = runs[at.run[i]], at.pull[:, i]
@@ -587,10 +576,10 @@ def explain_failure(
     """Return the end of a sentence, from its colon on, on why the corrective process may have
     failed from ``q``, shape ``(dof,)``; an empty text if there is no cause that users can mend.
 
-    One cause is a hand whose joints all lie on the line to the goal: no joint moves the hand
-    nearer. Other causes are a long and a short arm. Near a goal, errors shrink by ``1 - gain σ²``,
-    with the singular values σ of the Jacobian J. So the descent is stable while gain × |J|² is
-    below 2 for the largest σ, the singular value of the stretched arm, and slow where it is small.
+    One cause is a hand that no free joint or base coordinate moves nearer. Other causes are a long
+    and a short arm: near a goal, errors shrink by the factor ``1 - gain σ²`` an iteration, with the
+    singular values σ of the Jacobian J, so that the descent is stable while gain × |J|² of the
+    stretched arm is below 2, and slow where it is small.
     """
     free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
     arm = robot.joints(hand)
@@ -625,13 +614,10 @@ def follow(
     *,
     model: MotionModel = PAPER,
 ) -> MoveResult:
-    """Move from ``q`` in steps along straight joint-space lines from waypoint to waypoint.
-
-    ``waypoints`` has shape ``(W, dof)``; points of the path lie ``model.step`` apart along these
-    lines (:func:`path_points`). The movement stops at the first point with the hand within
-    ``radius``, length unit, of the goal's centre, or at the last waypoint; k steps take k + 1
-    ticks. Raises ValueError for a wrong shape, a figure that is not finite or beyond 100,000, an
-    unknown hand, or a model out of bounds.
+    """Move from ``q`` in steps along a path through ``waypoints``, shape ``(W, dof)``
+    (:func:`path_points`), to the first point with the hand within ``radius``, length unit, of the
+    goal's centre, or to the last waypoint; k steps take k + 1 ticks. Raises ValueError for a wrong
+    shape, a figure that is not finite or beyond 100,000, an unknown hand, or a model out of bounds.
     """
     check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)
@@ -655,13 +641,10 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
-    """Return the n + 1 configurations at the n steps of a path from ``q`` through ``waypoints``,
-    shape ``(W, dof)``, as an array ``(n + 1, dof)``, length unit and rad.
-
-    Point k, from 0 (``q``), lies at length k times ``model.step`` of the polyline in joint space;
-    the last point is the last waypoint. Raises ValueError for a wrong shape or a figure that is not
-    finite or beyond 100,000.
-    """
+    """Return the points of the n steps of a path from ``q`` straight through ``waypoints``, shape
+    ``(W, dof)``, in joint space, as an array ``(n + 1, dof)``, length unit and rad. Point k lies
+    k times ``model.step`` along the path; the last point is the last waypoint. Raises ValueError
+    for a wrong shape or a figure that is not finite or beyond 100,000."""
     corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
     ends = np.concatenate([[0.0], np.cumsum(lengths)])

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +22,7 @@ from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import short_repr
 from coartic.internal.validation import equal_contents
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import width_of
 from coartic.motion.movement import LARGEST_ENTRY, configuration, correct, follow, move
 from coartic.motion.trial import (
@@ -41,7 +41,7 @@ from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, hands_of, letters_of
 
 Kind = Literal["learned", "corrective", "planned", "path"]
-KINDS: tuple[Kind, ...] = ("learned", "corrective", "planned", "path")
+KINDS: tuple[Kind, ...] = get_args(Kind)
 WHOLE_TURNS = 20.0
 """Angle of a target, rad, beyond which the angle may be meant in degrees."""
 HELD = 1e-6
@@ -63,9 +63,9 @@ class Movement:
     kind: Kind
     """``"learned"``, ``"planned"``, ``"corrective"`` or ``"path"``. Learned and planned movements
     are straight in joint space and end on a hit or on arrival; a path follows its waypoints and
-    ends on a hit or at the last of them; a corrective movement ends only on a hit and is made
-    only if the goal is not hit. The first movement for a goal, unless corrective, is always made;
-    further movements are made only while the goal is not hit."""
+    ends on a hit or at the last of them; a corrective movement is straight and ends on a hit or at
+    its target. The first movement for a goal, unless corrective, is always made; all others are
+    made only while the goal is not hit."""
     target: Array | None = None
     """Target configuration q^t, shape ``(dof,)``, length unit (base) and rad (joints); the last
     waypoint of a path. None in a corrective movement has the corrective process find it when the
@@ -73,8 +73,8 @@ class Movement:
     ticks: int | None = None
     """Control ticks it took; None before it is executed."""
     waypoints: Array | None = None
-    """Configurations that a path passes through, shape ``(k, dof)``, from where the robot stands
-    to ``waypoints[-1]``, length unit (base) and rad (joints); None for the other kinds."""
+    """Configurations that a path passes through in turn from where the robot stands, shape ``(k,
+    dof)``, length unit (base) and rad (joints); None for the other kinds."""
     __eq__ = equal_contents
 
     def __post_init__(self) -> None:
@@ -83,9 +83,7 @@ class Movement:
                 real_array(name, given)
 
     def __repr__(self) -> str:
-        named = ("goal", "hand", "kind", "target", "ticks", "waypoints")
-        facts = {name: getattr(self, name) for name in named}
-        return short_repr(self, **{k: v for k, v in facts.items() if v is not None})
+        return short_repr(self, **{k: v for k, v in vars(self).items() if v is not None})
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +104,7 @@ class Execution:
     evaluations: int = 0
     """Forward-kinematics evaluations made."""
     reason: str = ""
-    """Why the task was not completed; empty where it was."""
+    """Sentence on why the task was not completed; empty if it was."""
     __eq__ = equal_contents
 
     def __repr__(self) -> str:
@@ -128,14 +126,14 @@ class Execution:
 
     @property
     def hands(self) -> str:
-        """Hand used for each goal that was attempted, in the order of goals, such as ``"LRLR"``."""
+        """Hand of each goal that has a movement, in the order of goals, such as ``"LRLR"``."""
         return hands_in(self.movements)
 
     def ticks_by_goal(self) -> tuple[int, ...]:
-        """Return the control ticks spent on each goal that was attempted, in the order of goals."""
-        spent: dict[int, int] = {}
+        """Return the control ticks spent on each goal that has a movement, in goal order."""
+        spent = Counter[int]()
         for movement in self.movements:
-            spent[movement.goal] = spent.get(movement.goal, 0) + (movement.ticks or 0)
+            spent[movement.goal] += movement.ticks or 0
         return tuple(spent[goal] for goal in sorted(spent))
 
 
@@ -160,25 +158,21 @@ def execute(
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     solution : iterable of Movement
         At least one movement for each goal, in the order of the goals.
     model : MotionModel
-        The constants of movement and of the corrective process.
 
     Returns
     -------
     Execution
-        What happened: movements as made, configurations at the hits, control ticks and reward.
-        Where the corrective process does not converge, the execution ends: ``completed`` is False
-        and ``reason`` says so, and why that may be.
+        Movements as made, configurations at the hits, control ticks and reward. Where the
+        corrective process does not converge, the execution ends: ``completed`` is False and
+        ``reason`` says so, and why that may be.
 
     Raises
     ------
-    TaskError
-        The task cannot be used.
-    TypeError
-        The task is neither a Task nor a text nor a path.
+    TaskError, TypeError
+        The task cannot be used, or ``task`` or ``model`` has another type.
     SolutionError
         The solution breaks the task's rules: goals are missing or out of order, the robot does
         not have a hand, a target has the wrong shape or is not finite, a locked base moves by more
@@ -214,22 +208,17 @@ def hint_of(movements: Iterable[Movement]) -> str:
 
 def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
     """Return the numbers, from 1 and in order, of the goals that have corrective movements only."""
-    kinds = defaultdict[int, set[str]](set)
-    for movement in movements:
-        kinds[movement.goal].add(movement.kind)
-    return tuple(goal for goal, made in sorted(kinds.items()) if made == {"corrective"})
+    kinds = {(movement.goal, movement.kind == "corrective") for movement in movements}
+    return tuple(sorted(goal for goal, alone in kinds if alone and (goal, False) not in kinds))
 
 
 def execute_many(
     compiled: CompiledTask, solutions: Iterable[Iterable[Movement]], *, outside: bool = True
 ) -> list[Execution | Refused]:
     """Execute and score solutions of one task: solutions without paths side by side, in a fraction
-    of the time, solutions with a path one by one.
-
-    Returns a list with, for each solution in order, its execution, or, in its place, the error that
-    :func:`execute` would raise for the solution, which is not raised. Trials are counted as made
-    outside the session of a run if ``outside``.
-    """
+    of the time, solutions with a path one by one. Return a list with, for each solution in order,
+    its execution, or, in its place, the error that :func:`execute` would raise for the solution.
+    Trials are counted as made outside the session of a run if ``outside``."""
     executions: list[Execution | Plan | Refused] = []
     for solution in solutions:
         try:
@@ -251,12 +240,8 @@ Plan = list[list[Movement]]
 
 
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
-    """Return what the kernel is asked for at a goal: of its ``movements`` those before the first
-    one without a target, with None before them if the first movement is corrective.
-
-    For None the kernel makes no movement, and only checks whether the hand is in the goal. Where a
-    target is missing, the corrective process acts; movements after it are not made.
-    """
+    """Return the ``movements`` for a goal before the first one without a target, for which the
+    corrective process acts; before them None, a check of the hand, if the first is corrective."""
     given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
         if movement.target is None:
@@ -266,9 +251,8 @@ def _with_targets(movements: list[Movement]) -> list[Movement | None]:
 
 
 def _make_straight(compiled: CompiledTask, plans: Sequence[Plan], outside: bool) -> list[Execution]:
-    """Execute plans side by side, and return the executions in their order. A plan has the
-    movements to each goal, here with targets alone, without paths. With ``outside``, trials count
-    as made outside the session of a run."""
+    """Execute plans without paths side by side, and return the executions in their order;
+    ``outside`` as in :func:`make_trials`."""
     if not plans:
         return []
     given = [[_with_targets(movements) for movements in plan] for plan in plans]
@@ -292,12 +276,9 @@ def movements_in(
     accounts: NDArray[np.void], dof: int, given: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
     """Return a list of the movements made in each of N trials, up to the first goal missed, from
-    the accounts of goals, records of shape ``(N, G, M)``; ``dof`` is the length of a configuration.
-
-    ``given`` has the movements that were to be made, by trial and goal, with None for a check of
-    the hand without a movement (:func:`_with_targets`); the kinds come from these movements. A goal
-    hit without a movement has a corrective movement of 0 ticks.
-    """
+    the accounts of goals, shape ``(N, G, M)``; ``dof`` is the length of a configuration. ``given``
+    has the movements to be made by trial and goal (:func:`_with_targets`), from which the kinds
+    come. A goal hit without a movement has a corrective movement of 0 ticks."""
     names = ("hand", "hit", "ticks", "corrections")
     first = accounts[..., 0]
     columns = [first[name].tolist() for name in names] + [accounts["moved"].tolist()]
@@ -326,8 +307,8 @@ def movements_in(
 
 
 def _make_one_by_one(compiled: CompiledTask, plan: Plan, outside: bool) -> Execution:
-    """Execute a plan (movements by goal) with paths, one movement after the other, and return the
-    execution. The trial is counted as made outside the session of a run if ``outside``."""
+    """Execute a plan with paths, one movement after the other, and return the execution;
+    ``outside`` as in :func:`make_trials`."""
     if outside:
         count_trials(1)
     task, q = compiled.task, compiled.starts[0]
@@ -368,12 +349,8 @@ def _make_one_by_one(compiled: CompiledTask, plan: Plan, outside: bool) -> Execu
 def _execution_of(
     compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
 ) -> Execution:
-    """Return the execution, with its totals and the reason of a failure, of a plan that was made.
-
-    ``plan`` has the movements as given, by goal; ``movements`` has the movements as made, in order,
-    up to the goal that failed; ``goals`` are the accounts of the goals, shape ``(G,)``, records of
-    :func:`~coartic.motion.trial.account_type`.
-    """
+    """Return the execution of a plan, the movements as given, from the ``movements`` as made, up to
+    a goal that failed, and the accounts of the ``goals``, shape ``(G,)``."""
     hits = sum(goals["hit"].tolist())
     # The place of the hand is known before the first movement, and where that leads.
     checked = [2 - (of_goal[0].kind == "corrective") for of_goal in plan[: hits + 1]]
@@ -391,11 +368,8 @@ def _execution_of(
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
     """Return the joint travel of the idle arm, rad, summed over the goals: for each goal the
     Euclidean distance of the joint angles of the arm that does not hit the goal from their values
-    at the hit before (for goal 1, at the start). It is 0 if this arm keeps still, as under EC1 and
-    EC3.
-
-    ``hands`` has the hand for each goal, ``reached`` the configuration at each hit, ``(G, dof)``.
-    """
+    at the hit before (for goal 1, at the start). ``hands`` has the hand for each goal, ``reached``
+    the configuration at each hit, ``(G, dof)``."""
     travel, before = 0.0, task.q0
     for hand, q in zip(hands, reached, strict=True):
         joints = task.robot.joints("right" if hand == "left" else "left")
@@ -443,9 +417,8 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
 
 
 def _check_movement(task: Task, movement: Movement) -> Movement:
-    """Return the movement itself, or a copy with a path's last waypoint as its target or with
-    locked base coordinates as at the start. Raises SolutionError or ValueError for an unknown hand
-    or kind, or if target or waypoints do not fit the kind or the task."""
+    """Return the movement itself, or a copy as in :func:`movements_by_goal`. Raises SolutionError
+    or ValueError for an unknown hand or kind, or if target or waypoints do not fit."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
     if not isinstance(movement.hand, str) or movement.hand not in task.hands:
         known = " and ".join(map(repr, task.hands))
@@ -560,24 +533,20 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     hands : str
         The hand for each goal: ``"LRRR"`` is left, right, right, right.
     model : MotionModel
-        The constants of movement and of the corrective process.
 
     Returns
     -------
     Execution
-        What happened: movements, configurations at the hits, control ticks and reward. Where the
-        corrective process does not converge, ``completed`` is False and ``reason`` says so.
+        Movements, configurations at the hits, control ticks and reward. Where the corrective
+        process does not converge, ``completed`` is False and ``reason`` says so.
 
     Raises
     ------
-    TaskError
-        The task cannot be used.
-    TypeError
-        The task is neither a Task nor a text nor a path.
+    TaskError, TypeError
+        The task cannot be used, or ``task`` or ``model`` has another type.
     ValueError
         The hands do not fit the task, or a constant of the model is out of bounds.
 
@@ -602,7 +571,6 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     hands : iterable of {"left", "right"}, optional
         The hands that may be used; all that the robot has by default.
 
@@ -614,10 +582,8 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
 
     Raises
     ------
-    TaskError
-        The task cannot be used.
-    TypeError
-        The task is neither a Task nor a text nor a path.
+    TaskError, TypeError
+        The task cannot be used, or is neither a Task nor a text nor a path.
     NotApplicableError
         There are more than 4096 sequences.
     ValueError
@@ -639,11 +605,9 @@ def initial_hands(
     Parameters
     ----------
     task : Task, str or pathlib.Path
-        The task, its name or its file.
     hands : tuple of {"left", "right"}, optional
         The hands among which a policy chooses; all that the robot has by default.
     model : MotionModel
-        The constants of movement and of the corrective process.
 
     Returns
     -------
@@ -652,10 +616,8 @@ def initial_hands(
 
     Raises
     ------
-    TaskError
-        The task cannot be used.
-    TypeError
-        The task is neither a Task nor a text nor a path.
+    TaskError, TypeError
+        The task cannot be used, or ``task`` or ``model`` has another type.
     NotApplicableError
         No candidate completes the task, or there are more than 4096.
     ValueError
@@ -667,7 +629,7 @@ def initial_hands(
     Source: paper, section *Experiments*.
     """
     task = as_task(task)
-    return search_initial_hands(task, hands_among(task, hands), model=model)[0]
+    return search_initial_hands(task, hands, model=check_model(model))[0]
 
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError
 from coartic.internal.arguments import Numbers, checked_arguments
-from coartic.internal.limits import brief_value, check_limits, real_array
+from coartic.internal.limits import brief_value, check_limits
 from coartic.internal.text import counted
 from coartic.internal.threads import in_parts
 from coartic.model import PAPER, MotionModel, check_model
@@ -74,12 +74,9 @@ GoalAccount = Any
 
 @cache
 def account_type(width: int) -> np.dtype[np.void]:
-    """Return the NumPy type of the account of a goal: what happened in a trial until the goal was
-    hit or missed; configurations have ``width`` entries.
-
-    If several movements to targets are given for a goal, each has a record with its ``target`` and
-    ``moved``; the first record has all else.
-    """
+    """Return the NumPy type of the account of a goal in a trial; configurations have ``width``
+    entries. Of several movements to targets for a goal each has a record with its ``target`` and
+    ``moved``; the first record has all else."""
     fields = {
         "q": (np.float64, width),  # where the robot is in the end, length unit and rad
         "target": (np.float64, width),  # of the movement; as given where it is not made
@@ -91,7 +88,7 @@ def account_type(width: int) -> np.dtype[np.void]:
         "corrections": np.int64,  # 1 where a corrective movement is made
         "iterations": np.int64,  # of the corrective process
         "evaluations": np.int64,  # of forward kinematics
-        "failed": np.bool_,  # whether the trial ends here, as the goal is missed
+        "failed": np.bool_,  # True if the trial ends here because the goal is missed
     }
     return record_type(fields)
 
@@ -132,13 +129,12 @@ def aim(run: RunRecord, target: Any) -> None:
 @inlined
 def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Move each of the first ``count`` runs of a batch to its target, or check whether its hand is
-    in the goal, as its ``action`` says (``IDLE``, ``CHECK``, ``MOVE`` or ``REPEAT``): phase 3,
-    *move*. A movement ends on a hit, too. ``q``, ``hit``, ``ticks`` and ``acting`` change in place,
-    and ``evaluations`` grows; a run without a movement takes 0 ticks."""
+    in the goal, as its ``action`` says (:data:`IDLE`): phase 3, *move*. ``q``, ``hit``, ``ticks``
+    and ``evaluations`` change in place; a run without a movement takes 0 ticks."""
     for stops in (True, False):
         for i in range(count):
             run, action = batch.runs[i], batch.runs[i].action
-            # A movement to where an arm is tells whether it hits; it needs no other end.
+            # CHECK is a movement to where the arm is.
             run.acting = action == MOVE if stops else action in (CHECK, REPEAT)
         _move_acting(count, stops, robot, batch)
     for i in range(count):
@@ -149,9 +145,8 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 @inlined
 def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Correct missed goals of the first ``count`` runs of a batch, in place: phase 4, *correct*.
-    The corrective process **A** finds configurations that hit, and the runs move there; ``target``
-    and ``ticks`` of a run become the target and the ticks of its corrective movement, 0 ticks if
-    none is made."""
+    ``target`` and ``ticks`` of a run become the target and the ticks of its corrective movement, 0
+    ticks if none is made."""
     find_corrections(count, robot, batch)
     make_corrections(count, robot, batch)
 
@@ -210,9 +205,8 @@ def _move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> N
 @inlined
 def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
     """Have the corrective process **A**, kernel ``descend``, find a ``target`` that hits the goal
-    for each of the first ``count`` runs of ``batch`` that missed it, goes on and may be corrected;
-    no run moves. ``converged`` becomes True for a run for which **A** found a target, False for all
-    others; ``ticks`` become 0, and ``iterations`` the number made, 0 without **A**."""
+    for each of the first ``count`` runs of ``batch`` that missed it, goes on and may be corrected.
+    ``converged`` is True where **A** did, else False; ``ticks`` become 0. No run moves."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -227,18 +221,15 @@ def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None
 
 @shared
 def find_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Have the paper's corrective process **A** find a ``target`` that hits the goal for each of
-    the first ``count`` runs of ``batch`` that missed it; ``converged`` of a run says whether **A**
-    did. No run moves (:func:`_find_by`)."""
+    """Have the paper's corrective process **A** find targets for runs that missed their goals
+    (:func:`_find_by`)."""
     _find_by(count, robot, batch, correct_slots)
 
 
 @shared
 def find_pulled_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Have **A**, pulled to each run's preferred posture, find a ``target`` that hits the goal for
-    each of the first ``count`` runs of ``batch`` that missed it, go on and may be corrected. Their
-    ``target``, the last iterate, and ``converged`` change in place. No run moves
-    (:func:`_find_by`)."""
+    """Have **A**, pulled to each run's preferred posture, find targets for runs that missed their
+    goals (:func:`_find_by`)."""
     _find_by(count, robot, batch, pull_slots)
 
 
@@ -281,12 +272,6 @@ class Accounts(NamedTuple):
 
 
 @inlined
-def row_of(rows: Any, n: int) -> Any:
-    """Return entry ``n`` of ``rows``, or entry 0 if there is only one, which all arms share."""
-    return rows[n if len(rows) > 1 else 0]
-
-
-@inlined
 def _are_within(targets: Any) -> bool:
     """Return whether no entry of the targets ``(G, M, dof)`` of a trial has an absolute value
     beyond 1e5 (:data:`LARGEST_ENTRY`); NaN, a joint that stays, counts as within."""
@@ -307,13 +292,13 @@ def _reach_lot(
     in place. ``arms`` are :class:`Requests`."""
     for i in range(count):
         n, run = first + i, batch.runs[i]
-        set_off(run, row_of(arms.starts, n))
+        set_off(run, arms.starts[min(n, len(arms.starts) - 1)])
         run.going = _are_within(arms.targets[n])
         counts[n, FAILURES] = not run.going
     for g in range(arms.targets.shape[1]):
         for i in range(count):
             n, run = first + i, batch.runs[i]
-            begin(run, row_of(arms.goals, n)[g])
+            begin(run, arms.goals[min(n, len(arms.goals) - 1), g])
             run.hand = arms.hands[n, g]
             if not robot.checks:
                 run.action = IDLE
@@ -347,12 +332,8 @@ def _reach_lot(
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any) -> None:
     """Let every arm reach for its goals, as many arms at a time as a batch has runs; fill
-    ``goals``, ``counts`` and ``rewards``, the entries of :class:`Accounts`, in place. ``robot``
-    comes from :func:`robot_parameters`.
-
-    ``others`` are the entries of :class:`Requests` and then the entries of a batch, one by one: a
-    tuple with names takes Numba half a microsecond.
-    """
+    ``goals``, ``counts`` and ``rewards``, the entries of :class:`Accounts`, in place. ``others``:
+    entries of :class:`Requests`, then of a batch: tuples with names take Numba longer."""
     arms, batch = Requests(*others[:5]), Batch(*others[5:])
     count, room = len(arms.targets), len(batch.runs)
     for first in range(0, count, room):
@@ -362,7 +343,7 @@ def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any
 
 
 SHARE = 14 * SLOTS
-"""Arms for a thread, at least: to begin one takes as long as a hundred trials."""
+"""Least number of arms for a thread: its start takes as long as a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Batches that no thread uses, by :attr:`Robot.most_links`."""
 
@@ -399,10 +380,7 @@ def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Account
         reach_kernel(parameters, *results, *some, *batch)
         idle.append(batch)
 
-    if count >= 2 * SHARE:
-        in_parts(work, count, SHARE)
-    else:
-        work(slice(0, count))
+    in_parts(work, count, SHARE)
     return accounts
 
 
@@ -456,12 +434,11 @@ def reach_goals(
         Targets of the first movements. A joint whose target is NaN keeps its value, and an arm
         whose row is NaN has no target, as all arms by default: the corrective process acts alone.
     checks : bool
-        Whether the hand of an arm without a target may be in its goal already; else the corrective
-        process begins at once.
+        True if an arm without a target stays if its hand is in its goal already; False if the
+        corrective process begins at once.
     locked_base : sequence of {"x", "y"}
         Coordinates of the base that the corrective process leaves as they are.
     model : MotionModel
-        The constants of movement and of the corrective process.
 
     Returns
     -------
@@ -471,8 +448,8 @@ def reach_goals(
     Raises
     ------
     ValueError
-        A shape is wrong, a number is not finite, a hand is neither 0 nor 1, or the model does not
-        fit the radius. An arm with a target beyond 1e5 makes no movement and does not hit.
+        A shape is wrong, a number is not finite, a hand is neither 0 nor 1, or the model is out of
+        bounds or does not fit the radius. An arm with a target beyond 1e5 does not move or hit.
 
     Notes
     -----
@@ -480,9 +457,7 @@ def reach_goals(
     """
     count = len(np.atleast_2d(q))
     starts = finite_array("q", q, (count, robot.dof))
-    if targets is None:
-        targets = np.full(starts.shape, np.nan)
-    given = np.array(real_array("targets", targets), order="C")
+    given = np.full(starts.shape, np.nan) if targets is None else np.array(targets, order="C")
     if given.shape != starts.shape:
         raise ValueError(f"targets has shape {given.shape}; needed is {starts.shape}")
     codes = finite_array("hands", hands, (count,)).astype(np.int64)
@@ -523,10 +498,9 @@ _last_compiled: CompiledTask | None = None
 
 
 def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
-    """Return a task with a model as arrays for the kernels. The last result is kept: do not change
-    its arrays. Raises ValueError for a model out of bounds, and for a task with goals or a start
-    beyond 100,000 or of a wrong shape, as an unchecked copy (``model_copy``) can have; TypeError if
-    the model is no MotionModel."""
+    """Return a task with a model as arrays for the kernels, which are cached: do not change them.
+    Raises ValueError for a model out of bounds, or an unchecked copy of a task (``model_copy``)
+    whose start or goals are wrong; TypeError if the model is no MotionModel."""
     global _last_compiled
     last = _last_compiled  # another thread may replace it
     if last is not None and last.task is task and last.model is model:
@@ -552,11 +526,8 @@ _outside = 0
 
 def count_trials(count: int) -> None:
     """Add ``count`` to the number of trials made outside the sessions of runs
-    (:func:`trials_outside`).
-
-    Functions that make trials call this one, unless their argument ``outside`` is False: then the
-    session of a run makes the trials. Callers of such functions need not count.
-    """
+    (:func:`trials_outside`). Functions that make trials call it, unless their argument ``outside``
+    is False because the session of a run makes the trials."""
     global _outside
     _outside += count
 
@@ -574,11 +545,8 @@ def make_trials(
     *,
     outside: bool = True,
 ) -> Accounts:
-    """Make N trials of a task and return their accounts. ``hands``, 0 left or 1 right, has shape
-    ``(N, G)``, ``targets`` shape ``(N, G, M, dof)``, M movements a goal, length unit and rad, NaN
-    for joints that stay; ``stops``, of shape ``(N, G, M)``, is True for movements that end on
-    arrival, too (by default all). Trials are counted as made outside the session of a run if
-    ``outside``."""
+    """Make N trials of a task and return their accounts; ``hands``, ``targets`` and ``stops`` as in
+    :class:`Requests`. Trials are counted as made outside the session of a run if ``outside``."""
     if outside:
         count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
@@ -612,12 +580,12 @@ class Trials(NamedTuple):
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations the kernel made, shape ``(N,)``."""
+    """Forward-kinematics evaluations made, shape ``(N,)``."""
     targets: Configs
     """Targets as moved to, shape ``(N, G, dof)``, length unit (base) and rad (joints); a row of NaN
     where **A** alone acted, and in the goals after a failure what was given."""
     reached: Configs
-    """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN after a failure."""
+    """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN where it was not hit."""
 
     @property
     def rewards(self) -> Array:
@@ -627,9 +595,9 @@ class Trials(NamedTuple):
 
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
-    """Return the results of trials from what the kernels noted of them, the first ``dof`` joints of
-    each posture. The results share memory with ``accounts``, whose postures ``q`` at goals that are
-    not hit become NaN."""
+    """Return the results of trials from their accounts, with the first ``dof`` entries of each
+    configuration. They share memory with ``accounts``, whose ``q`` becomes NaN where a goal is not
+    hit."""
     goals, counts = accounts.goals[..., 0], accounts.counts
     reached = goals["q"][..., :dof]
     if counts[:, FAILURES].any():
@@ -656,13 +624,11 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
     """
     several = isinstance(hands, Iterable) and not isinstance(hands, str)
     each: list[Any] = list(hands) if several else [hands]
+    codes = dict[str, list[int]]()
     for sequence in each:
-        if not isinstance(sequence, str):
-            check_hands(task, sequence)
-    codes = {
-        sequence: [HANDS.index(hand) for hand in hands_of(check_hands(task, sequence))]
-        for sequence in dict.fromkeys(each)
-    }
+        if not isinstance(sequence, str) or sequence not in codes:
+            chosen = hands_of(check_hands(task, sequence))
+            codes[sequence] = [HANDS.index(hand) for hand in chosen]
     if several and len(each) != count:
         raise ValueError(f"{counted(len(each), 'hand sequence')} for {counted(count, 'trial')}")
     rows = np.empty((count, len(task.goals)), dtype=np.int64)
@@ -678,12 +644,11 @@ MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 def ranked_sequences(
     task: Task, sequences: Collection[str], *, model: MotionModel = PAPER, outside: bool = True
 ) -> list[tuple[str, int | None, str, dict[str, int]]]:
-    """Make a trial by the corrective process alone with each hand sequence; return a list, ordered
-    by reward, the best first and failed trials last. An entry has the sequence, the reward (None if
-    the trial failed), the reason of the failure (or an empty text), and the counts of the trial by
-    name (:data:`COUNTED`). Of equal rewards the sequence with the fewest changes of hand comes
-    first, then the sequence given first. Trials are counted as made outside the session of a run if
-    ``outside``."""
+    """Make a trial by the corrective process alone with each hand sequence; return a list, the
+    highest reward first and failed trials last, of equals the sequence with the fewest changes of
+    hand first, then the sequence given first. An entry has the sequence, the reward (None if the
+    trial failed), the reason of the failure (or an empty text), and the counts of the trial by name
+    (:data:`COUNTED`). ``outside`` as in :func:`make_trials`."""
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets, outside=outside)
@@ -723,7 +688,7 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
     """Return a sentence that a task, called ``task``, has more than 4096 hand sequences, too many
-    to try; None for fewer. ``goals`` and ``hands`` are numbers of goals and of hands."""
+    to try; else None. ``goals`` and ``hands`` are numbers of goals and of hands."""
     count = hands**goals
     if count <= MOST_SEQUENCES:
         return None
@@ -756,9 +721,8 @@ def search_initial_hands(
 
     If the task names a sequence, this is returned, and no counts. If it names a policy, the
     corrective process alone tries sequences of ``hands`` (None: the task's): under
-    ``"best-single-hand"`` sequences of one hand, else all. The sequence with the highest reward is
-    returned; of equals the one with the fewest changes of hand. The trials are counted as made
-    outside the session of a run if ``outside``.
+    ``"best-single-hand"`` sequences of one hand, else all; the first of :func:`ranked_sequences` is
+    returned. ``outside`` as in :func:`make_trials`.
 
     Raises NotApplicableError if no sequence tried completes the task, or more than 4096 would have
     to be tried, and ValueError for no hand or a hand that is not among the task's hands.
@@ -777,11 +741,8 @@ def search_initial_hands(
 def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
-    """Search for the hand sequence of trial 0 by the policy of a task, given as JSON, among
-    sequences of ``hands``; return it and the counts of the search, by counters of
-    :class:`~coartic.method.Meter`. The caller counts the trials. The last 64 results are kept.
-    Raises NotApplicableError if no sequence completes the task, or there are more than 4096.
-    """
+    """Return what :func:`search_initial_hands` returns for a task, given as JSON, with a policy and
+    for ``hands`` in order; the caller counts the trials. The last 64 results are kept."""
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)
     if task.initial_hands == "best-single-hand":
