@@ -18,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from coartic.method import MethodError, Session
+from coartic.method import Information, MethodError, Session
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task
 
+KINEMATICS = frozenset({Information.GOALS, Information.FORWARD_KINEMATICS, Information.JACOBIAN})
+"""Information of a planner about goals and hands."""
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
 """A hand sequence with a configuration per goal to start from, ``(G, dof)``."""

@@ -1,9 +1,9 @@
 """Random search: the paper's learner without its memory; the best trial is kept.
 
 Every trial draws Gaussian noise with the learner's standard deviation around the postures in which
-the corrective process hits the goals; trial 0 is the corrective process alone. No target depends on
-any reward, so that random search cannot coarticulate by learning: its best trial shows the effect
-of selecting one of many noisy trials by the reward of the whole task. It is the control of
+the corrective process hits the goals; trial 0 is the corrective process alone. Targets do not
+depend on rewards, so that random search cannot coarticulate by learning: its best trial shows the
+effect of selecting one of many noisy trials by the reward of the whole task. It is the control of
 signatures of coarticulation (:mod:`coartic.analysis.control`), and differs from the learner in one
 thing: it forgets.
 
@@ -19,6 +19,7 @@ the solution.
 from __future__ import annotations
 
 from contextlib import suppress
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -147,14 +148,13 @@ class RandomSearchHands(Method):
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
-        shares = [trials * n // len(sequences) for n in range(len(sequences) + 1)]
+        ends = [trials * n // len(sequences) for n in range(len(sequences) + 1)]
         completed: list[Attempts] = []
         with session.solving():
-            for n, hands in enumerate(sequences):
-                share = {"trials": shares[n + 1] - shares[n]}
+            for hands, (begin, end) in zip(sequences, pairwise(ends), strict=True):
+                share = parameters.model_copy(update={"trials": end - begin})
                 with suppress(MethodError):
-                    of_share = parameters.model_copy(update=share)
-                    completed.append(draw_trials(session, hands, of_share)[0])
+                    completed.append(draw_trials(session, hands, share)[0])
         if not completed:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
         best = max(completed, key=lambda attempts: attempts.reward)

@@ -28,10 +28,11 @@ parallelise over processes.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from threading import RLock
 from typing import Any, Literal
 
@@ -39,18 +40,12 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from coartic.baselines.posture_graph import KINEMATICS
 from coartic.method import Information
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
 
-MODEL_BASED = frozenset(
-    {
-        Information.GOALS,
-        Information.FORWARD_KINEMATICS,
-        Information.JACOBIAN,
-        Information.KINEMATIC_MODEL,
-    }
-)
+MODEL_BASED = KINEMATICS | {Information.KINEMATIC_MODEL}
 """Information of a planner with a model of the kinematics, besides its cost."""
 
 Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk", "hand-jerk"]
@@ -206,9 +201,7 @@ class TrajectoryProblem:
         variables = {"steps": steps, "lengths": lengths, "durations": durations, "depth": depth,
                      "rates": casadi.veccat(*rates)}  # fmt: skip
         sizes = [variable.numel() for variable in variables.values()]
-        places = (
-            slice(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True)
-        )
+        places = itertools.starmap(slice, pairwise(itertools.accumulate(sizes, initial=0)))
         self._at = dict(zip(variables, places, strict=True))  # in the vector of all variables
         self._solver = casadi.nlpsol(
             "trajectory",

@@ -116,15 +116,8 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
                     why = f"{shown}: cannot be imported: {error_line(error)}"
                     raise CoarticError(why) from None
                 found = dict.fromkeys(methods_in(module))
+                content = [asdict(info) for info in _methods_of_module(module, found, shown, path)]
                 methods = {method.name: method for method in found}
-                if len(methods) < len(found):
-                    names = [method.name for method in found]
-                    twice = next(name for name in names if names.count(name) > 1)
-                    raise CoarticError(
-                        f"{shown}: two classes are called {twice!r}: give one another name"
-                    )
-                infos = _methods_of_module(module, methods.values(), shown, path)
-                content = [asdict(info) for info in infos]
             else:
                 content = answer(methods[name], question, *arguments)
             text = json.dumps([number, "answer", content])
@@ -142,7 +135,7 @@ def _methods_of_module(
 ) -> Iterator[MethodInfo]:
     """Yield the declarations of ``methods``, the classes that ``module`` defines, with their code;
     ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, a wrong
-    declaration of name, title, citation or information, and a file that cannot be read."""
+    declaration, and a file that cannot be read."""
     for method in methods:
         _check_declaration(method, origin)
         try:

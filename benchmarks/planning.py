@@ -162,8 +162,8 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
-    of_suite = _suite_jobs(suite, registered, own, task_named, job)
-    jobs = list(itertools.islice(of_suite, MOST_CELLS + 1))
+    in_blocks = _suite_jobs(suite, registered, own, task_named, job)
+    jobs = list(itertools.islice(in_blocks, MOST_CELLS + 1))
     if len(jobs) > MOST_CELLS:
         raise CoarticError(
             f"suite {suite.name!r} asks for more than {MOST_CELLS:,} combinations "
@@ -173,8 +173,16 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     if not request.methods:
         ids = dict.fromkeys(each.cell.method.name for each in jobs) | ids
     methods = [registered[name] for name in ids]
-    jobs += _extra_jobs(jobs, own, methods, job)
     there = tasks_by_name([*(each.cell.task for each in jobs), *own.values()])
+    of_suite = {each.cell.method.name for each in jobs}
+    planned = {(each.cell.task.name, each.cell.label) for each in jobs}
+    jobs += [
+        job(task, method)
+        for task, method in itertools.product(there.values(), methods)
+        if (task.name in own or method.name not in of_suite)
+        and (task.name, method.name) not in planned
+        and method.why_not(task) is None
+    ]
     if wrong := [name for name in names if name not in there]:
         hint = " Instances are a range, such as long/v1/i000..i009."
         words = (f"{unknown('task', name, there)}{hint * ('/' in name)}" for name in wrong)
@@ -309,26 +317,6 @@ def _suite_jobs(
                             f"suite {suite.name!r}: {reason}; put tasks and methods that fit "
                             "together into a block of their own"
                         )
-
-
-def _extra_jobs(
-    jobs: Sequence[Job],
-    own: Mapping[str, Task],
-    methods: Sequence[MethodInfo],
-    job: Callable[..., Job],
-) -> Iterator[Job]:
-    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: ``methods`` new to the
-    suite on the tasks of the suite, and all ``methods`` on ``own``, the tasks that the request
-    brings, where they apply. ``job`` makes a job of task and method."""
-    of_suite = {each.cell.method.name for each in jobs}
-    there = {(each.cell.task.name, each.cell.label) for each in jobs}
-    new = [method for method in methods if method.name not in of_suite]
-    for task, method in (
-        *itertools.product(tasks_by_name(each.cell.task for each in jobs).values(), new),
-        *itertools.product(own.values(), methods),
-    ):
-        if (task.name, method.name) not in there and method.why_not(task) is None:
-            yield job(task, method)
 
 
 def _job_of(

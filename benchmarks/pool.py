@@ -93,14 +93,7 @@ class Local:
     def perform(
         self, jobs: Sequence[Job], *, in_order: bool = False
     ) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with the outcomes of its runs, in the order in which jobs finish. The jobs
-        of a method are divided among processes; with ``in_order`` one process performs them all in
-        their order. A job whose process ends is repeated once if its method may not be the cause,
-        or else has outcomes ``timeout`` or ``crashed`` (:meth:`Workers.perform`).
-
-        Raises CoarticError if five processes in a row end before their first job, and if answers
-        cannot be written.
-        """
+        """Yield each job with the outcomes of its runs by new workers (:meth:`Workers.perform`)."""
         with closing(Workers(self)) as workers:
             yield from workers.perform(jobs, in_order=in_order)
 
@@ -146,8 +139,9 @@ class Workers:
         try:
             while waiting or workers:
                 while waiting and len(workers) < most:
-                    workers.append(self.worker_for(waiting[0]))
-                    workers[-1].give(waiting.popleft())
+                    part = waiting.popleft()
+                    workers.append(self.worker_for(part[0].cell.method.key))
+                    workers[-1].give(part)
                 sentinels = [w.process.sentinel for w in workers if w.process.pid is not None]
                 connection.wait(sentinels, _POLL_S)
                 for worker in tuple(workers):
@@ -163,7 +157,9 @@ class Workers:
                     worker.end()
                     if not worker.jobs:
                         continue
-                    self.check_room()
+                    room = Path(self.folder.name, "room")  # without it, an answer can be lost
+                    room.write_bytes(bytes(_ROOM))
+                    room.unlink()
                     job = worker.jobs[0]
                     begun = worker.since_s < math.inf or exit_code == _UNKEPT
                     lost = 0 if begun else lost + 1
@@ -194,23 +190,15 @@ class Workers:
             for worker in workers:
                 worker.end()
 
-    def worker_for(self, jobs: Sequence[Job]) -> Worker:
-        """Return a worker for jobs of one method: the worker that waits for jobs if its method is
-        the same; otherwise that worker is ended, and a new worker, not yet started, is returned."""
-        method, waits = jobs[0].cell.method.key, self._idle
-        self._idle = None
-        if waits is not None and waits.method == method:
-            return waits
+    def worker_for(self, method: tuple[str, str, str]) -> Worker:
+        """Return the worker that waits for jobs if it has this method; otherwise end it, and return
+        a new worker, not yet started."""
+        waits, self._idle = self._idle, None
         if waits is not None:
+            if waits.method == method:
+                return waits
             waits.end()
         return Worker(self.folder.name, method, self.local)
-
-    def check_room(self) -> None:
-        """Raise OSError if a file of 1 MiB cannot be written into the folder of answers, whose loss
-        can be the reason why a process ended."""
-        place = Path(self.folder.name, "room")
-        place.write_bytes(bytes(_ROOM))
-        place.unlink()
 
 
 class Worker:
@@ -235,7 +223,7 @@ class Worker:
 
     def give(self, jobs: Sequence[Job]) -> None:
         """Send jobs to the process, start it if it is new, and compile the kernels of the first
-        job's task in this process, too. If the process cannot start, nothing is raised and
+        job's task in this process, too. If the process cannot start, nothing is raised, and
         :attr:`exit_code` is 1."""
         self.jobs.extend(jobs)
         self.since_s = self._since_cpu_s = math.inf
@@ -334,8 +322,8 @@ class Worker:
 
 
 def _read(output: connection.Connection, kept: bytearray) -> None:
-    """Read what a process prints into pipe ``output``, so that it never waits, until no process can
-    write there any more; ``kept`` always holds the last 4000 bytes."""
+    """Read what a process prints into pipe ``output`` until no process can write there any more;
+    ``kept`` always holds the last 4000 bytes."""
     with output:
         while text := os.read(output.fileno(), 2**16):
             kept[:] = (kept + text)[-_PRINTED:]

@@ -241,6 +241,9 @@ def perform(
             watches.clear()
             warnings.warn(f"watch is not called again: {error_line(error)}", stacklevel=3)
 
+    def seconds(run: Run) -> float:
+        return max(run.outcome.times.wall_s or math.inf, LONG_S)
+
     executor = Local() if executor is None else executor
     if not isinstance(executor, Local | Dask):
         known = " or ".join(_EXECUTORS.values())
@@ -270,7 +273,7 @@ def perform(
                     for run in runs:
                         if run.outcome.status == "ok" and not run.cell.method.is_ours:
                             name = run.cell.method.name
-                            chosen[name] = min(chosen.get(name, run), run, key=_seconds)
+                            chosen[name] = min(chosen.get(name, run), run, key=seconds)
                         progress.finish(run)
                         tell(run.cell)
             jobs = alone
@@ -298,11 +301,6 @@ def perform(
             warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
-
-
-def _seconds(run: Run) -> float:
-    """Return the wall time of a run, s, at least 60; infinite if it is not known."""
-    return max(run.outcome.times.wall_s or math.inf, LONG_S)
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
