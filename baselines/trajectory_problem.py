@@ -328,11 +328,9 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
 def _hand_jerks(
     robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
 ) -> Any:
-    """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column.
-    The joints follow quintics between the end states, as for minimum jerk: ``q0`` is the start,
-    ``(dof,)``; ``steps``, ``(dof, G)``, and ``durations``, ``(G,)``, are changes and durations of
-    the segments; ``rates`` are velocities and accelerations at start and goals, ``(dof, G + 1)``.
-    """
+    """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column,
+    along quintics between the end states: start ``q0``, changes ``steps``, ``(dof, G)``, and
+    ``rates``, velocities and accelerations at start and goals, ``(dof, G + 1)`` each."""
     powers = np.arange(6)
     integrals, here = [], q0
     for g in range(steps.shape[1]):

@@ -100,10 +100,9 @@ def check_method(
 def _laws_of_runs(
     info: MethodInfo, runs: Mapping[tuple[str, str], Run], checked_with: str
 ) -> Iterator[Law]:
-    """Yield the laws on the runs of a method, kept or broken: ``solution``, ``determinism``, ``no
-    hidden state``, ``limits``, ``information`` and ``failure``. ``runs`` holds the runs by kind,
-    such as ``first`` or ``other seed``, and name of the task; ``checked_with`` names the parameters
-    in words."""
+    """Yield the laws on the runs of a method: ``solution``, ``determinism``, ``no hidden state``,
+    ``limits``, ``information`` and ``failure``. ``runs`` holds the runs by kind, such as ``first``,
+    and name of the task; ``checked_with`` names the parameters."""
 
     def of_kind(kind: str) -> dict[str, Outcome]:
         return {task: run.outcome for (each, task), run in runs.items() if each == kind}

@@ -158,10 +158,9 @@ def _methods_of_module(
 
 
 def _check_declaration(method: type[Method], origin: str) -> None:
-    """Check that a method declares its name, title, citation and what it was tuned on, texts of
-    one line, and its information; ``origin`` is the name of its file in messages. Raises
-    CoarticError for a missing or wrong declaration. The registry checks the form of ids
-    (:func:`~.registry.check_id`)."""
+    """Raise CoarticError if name, title, citation or ``tuned_on`` of a method is not a text of one
+    line, or its information is no set of Information; ``origin`` is the name of its file in
+    messages. The registry checks the form of ids."""
     where = f"{origin}: {method.__name__}"
     for attribute in ("name", "title", "citation", "tuned_on"):
         text = getattr(method, attribute, None)

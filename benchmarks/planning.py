@@ -244,12 +244,9 @@ def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
 def _asked_tasks(
     suite: Suite, request: Request
 ) -> tuple[dict[str, None], dict[str, Task], TaskNamed]:
-    """Return the names of the tasks that a request asks for, the tasks that it brings by name, and
-    a function that gives a task by its name.
-
-    A request brings the task files, tasks and instances that the suite does not have. Raises
-    CoarticError for a task whose name belongs to another task.
-    """
+    """Return the names of the tasks that a request asks for; the tasks that it brings, which the
+    suite does not have, by name; and a function that gives a task by its name. Raises CoarticError
+    for a task whose name belongs to another task."""
     for path in request.family_files:
         check_kind(str(path), "family")
     of_tasks = [each.rpartition("/")[0] for each in request.tasks if isinstance(each, str)]
@@ -295,13 +292,9 @@ def _suite_jobs(
     task_named: TaskNamed,
     job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs of a suite. ``job`` makes a job of task, method, parameters and number of runs
-    (:func:`_job_of`); ``own`` has the names of the tasks that the request brings; ``task_named``
-    returns a task by name.
-
-    Raises CoarticError for a method that is unknown, or that does not apply to a task of a block
-    without wildcards, and for parameters that a method does not take.
-    """
+    """Yield the jobs of a suite, made by ``job`` (:func:`_job_of`). Raises CoarticError for an
+    unknown method, for a method that does not apply to a task of a block without wildcards, and for
+    parameters that a method does not take."""
     for block in suite.blocks:
         ids = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
         is_open = WILDCARD in "".join((*block.methods, *block.tasks))  # skip what does not apply
@@ -327,13 +320,9 @@ def _job_of(
     parameters: Mapping[str, Any] | None = None,
     runs: int | None = None,
 ) -> Job:
-    """Return the job of a method with parameters on a task: its cell and the numbers of its runs.
-
-    Runs: ``request.runs``, else ``runs`` (the number of the suite's block), else ``suite.runs``.
-    Trials, if the method has this parameter: ``request.trials``, else ``trials`` in ``parameters``,
-    else ``suite.trials``. A method that is not stochastic has run 0 alone, and no run if
-    ``request.runs`` is a range that does not begin at 0.
-    """
+    """Return the job of a method with parameters on a task. Runs and trials come from the request,
+    or else from the block (``runs``, ``parameters``), or else from the suite. A method that is not
+    stochastic has run 0 alone, and no run if ``request.runs`` does not begin at 0."""
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
         parameters.pop("trials", None)
@@ -360,11 +349,8 @@ def _why_nothing_runs(
 
 
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
-    """Return the first job of each cell.
-
-    Raises CoarticError for two numbers of runs of a cell, and for more than 10,000,000 trials a
-    run.
-    """
+    """Return the first job of each cell. Raises CoarticError for two numbers of runs of a cell, and
+    for more than 10,000,000 trials a run."""
     distinct = dict[str, Job]()
     for job in jobs:
         cell, where = job.cell, f"{job.cell.task.name} x {job.cell.label}"

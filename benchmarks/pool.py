@@ -68,7 +68,6 @@ _REPEATED = (None, -9, 255, _UNKEPT)  # exit codes (late, killed, lost server): 
 _IDLE_S = 60.0  # longest wait of a process for jobs
 _SPINS_S = 2.0  # CPU time beyond its limit after which a job is ended from outside
 _END_S = 1.0  # time for a killed process to end
-_OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
 MORE_FILES = "after `ulimit -n 1024`, which allows more open files"
 _BEGUN = "begun"  # file among the answers of a process
 _NEXT_JOB = b"\0next job\0"  # in the output of a process
@@ -256,7 +255,7 @@ class Worker:
     @property
     def spins(self) -> bool:
         """True if the current job has used 2 s of CPU time more than its limit: its method ignores
-        the signals that end the process."""
+        the signal that ends the process."""
         limit_s = (self.jobs and self.jobs[0].time_limit_s) or _LONGEST_S
         return self.cpu_s > self._since_cpu_s + limit_s + _SPINS_S
 
@@ -308,7 +307,7 @@ class Worker:
         if exit_code is None and not spins:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
             return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
-        if exit_code is None or (exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME):
+        if exit_code is None or (exit_code < 0 and signal.Signals(-exit_code).name == "SIGPROF"):
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         if exit_code == _UNKEPT:
             return fail(job, "crashed", "its answer could not be written: its folder was removed")
@@ -330,11 +329,9 @@ def _read(output: connection.Connection, kept: bytearray) -> None:
 
 
 def _perform_jobs(folder: Path, pipe: Any, prints: Any, workers: int, verbose: bool) -> None:
-    """Perform the jobs that come through a pipe, lists of jobs, in this process, one of ``workers``
-    that share the machine, and write an answer to each job into ``folder``, files ``0``, ``1`` and
-    so on. What the process prints goes into pipe ``prints``, if ``verbose`` to the terminal. File
-    ``begun`` appears when the kernels of a list are loaded: then the clock of its first job starts.
-    End when the pipe is closed, or when no job has come for a minute."""
+    """Perform lists of jobs that come through ``pipe``, in one of ``workers`` processes; write an
+    answer to each job into ``folder``, files ``0``, ``1`` and so on, and ``begun`` when the first
+    job of a list begins. Prints go into pipe ``prints``, if ``verbose`` to the terminal."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
     begin_worker(folder.parent, streams=1 if verbose else 3)
     if verbose:
@@ -390,25 +387,17 @@ def _answer_to(job: Job) -> bytes:
 
 
 def _limit_cpu_time(limit_s: float) -> None:
-    """Let the system end this process after ``limit_s`` more seconds of CPU time (not on Windows),
-    by SIGPROF, or by SIGXCPU if a method has turned SIGPROF off; 0: after a day."""
-    if not hasattr(signal, "setitimer"):
-        return
-    import resource
-
-    for number in (signal.SIGPROF, signal.SIGXCPU):  # an earlier method may have changed them
-        signal.signal(number, signal.SIG_DFL)
-    _, most = resource.getrlimit(resource.RLIMIT_CPU)
-    with contextlib.suppress(ValueError):  # a limit from outside is lower
-        whole_s = math.ceil(time.process_time() + (limit_s or _LONGEST_S)) + 1
-        resource.setrlimit(resource.RLIMIT_CPU, (whole_s, most))
-    signal.setitimer(signal.ITIMER_PROF, limit_s)
+    """Let the system end this process by SIGPROF after ``limit_s`` more seconds of CPU time (not on
+    Windows); 0 lifts the limit."""
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGPROF, signal.SIG_DFL)  # an earlier method may have changed it
+        signal.setitimer(signal.ITIMER_PROF, limit_s)
 
 
 def _bound_resources(workers: int) -> None:
     """Limit the memory of this process, one of ``workers`` that share 80 % of the machine's memory
     (at least 1 GiB each), and the size of its files to 256 MiB, so that a method gets an error
-    before the machine swaps or the disk is full; do nothing where the system has no such limits."""
+    before the machine swaps or the disk is full."""
     try:
         import resource
 

@@ -13,6 +13,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -102,8 +103,8 @@ class Progress:
 
     @property
     def unused(self) -> Iterator[str]:
-        """Sentences on stored runs that are not used, as another version of their method made them:
-        a sentence for each method and version."""
+        """Sentences on stored runs that are not used because another version of their method made
+        them: a sentence for each method and version."""
         for (method, old, now), count in self.stale.items():
             changed = f"by version {old}, and here it is {now}"
             if not (VERSION.fullmatch(old) and VERSION.fullmatch(now)):
@@ -294,23 +295,18 @@ def perform(
             if any(AFTER_ANOTHER in doubt for doubt in of_run):
                 details = run.outcome.details | {EARLIER: [run.cell.task.name]}
                 store.write([replace(run, outcome=replace(run.outcome, details=details))])
-        known, progress.marks = progress.marks, store.marks()
-        found = {sentence for of_method in known.values() for sentence in of_method}
-        marks = [each for of_method in progress.marks.values() for each in of_method]
-        for doubt in [*(each for each in marks if each not in found), *doubts]:
+        known, progress.marks = {*chain(*progress.marks.values())}, store.marks()
+        new = [mark for mark in chain(*progress.marks.values()) if mark not in known]
+        for doubt in (*new, *doubts):
             warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the missing runs of the plan, a job for each cell; count the runs of the plan that
-    ``store`` has in ``progress``.
-
-    A run that crashed is performed again, and so is a run that timed out under a lower time limit,
-    unless the code of the method is not here. Raises CoarticError if runs are missing whose method
-    has no code here.
-    """
+    """Return the missing runs of the plan, a job for each cell, with runs that crashed or timed out
+    under a lower limit; count the other runs in ``progress``. Raises CoarticError if runs are
+    missing whose method has no code here."""
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
         job = plan[position]
@@ -336,15 +332,10 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs for workers, and return them in the order in which they begin; results do not
-    depend on the division.
-
-    A run among many takes a fraction of its time alone, so a job is as large as its method allows.
-    With few runs each worker has a part; the last jobs that workers cannot share evenly are divided
-    further. Methods without a number of trials come first, as one run of a planner can take as long
-    as thousands of trials; other methods follow by their trials. So no long job is alone at the
-    end, and the time left does not rise.
-    """
+    """Divide jobs for workers, and return them in the order in which they begin."""
+    # A run among many takes a fraction of its time alone: jobs are as large as methods allow, and
+    # each worker has a part. Long jobs come first, as none may be alone at the end; one run of a
+    # planner, which has no number of trials, can take as long as thousands of trials.
 
     def divide(job: Job, size: int) -> Iterator[Job]:
         for first in range(0, len(job.numbers), size):
