@@ -23,7 +23,6 @@ from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from coartic.baselines.uninformed import Attempts
@@ -33,6 +32,7 @@ from coartic.learner.learning import TRIALS, runs_at_once
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import HANDS
+from coartic.tasks.task import hands_of
 
 _POINTS_AT_ONCE = 500
 
@@ -91,7 +91,11 @@ def draw_trials(
     attempts.by_correction(*(sequences_of(session) if hands is None else [hands])[:trials])
     if not (chosen := attempts.hands):
         raise MethodError("infeasible", "the corrective process completes no hand sequence")
-    explored = attempts.explored & (parameters.idle_arm | _base_and_chosen_arm(session, chosen))
+    explored = attempts.explored.copy()
+    for goal, hand in enumerate(hands_of(chosen)):
+        for other in HANDS:
+            if other != hand and not parameters.idle_arm:
+                explored[goal, session.joints(other)] = False
     centre, alone = attempts.reached[explored], attempts.trials_made
     targets = np.full((_POINTS_AT_ONCE, *explored.shape), np.nan)
     stage, more = 0, True
@@ -108,16 +112,6 @@ def draw_trials(
             targets[: len(part), explored] = centre + part
             attempts.by_targets(chosen, targets[: min(len(part), attempts.left)])
     return attempts, attempts.trials_made - alone
-
-
-def _base_and_chosen_arm(session: Session, hands: str) -> NDArray[np.bool_]:
-    """Return True for the base and for the joints of the arm that is to hit, for each goal of a
-    hand sequence such as ``"RRLR"``, shape ``(G, dof)``."""
-    joints = np.ones((len(hands), session.dof), dtype=np.bool_)
-    for goal, letter in enumerate(hands):
-        for hand in HANDS:
-            joints[goal, session.joints(hand)] = hand[0].upper() == letter
-    return joints
 
 
 class RandomSearchHands(Method):

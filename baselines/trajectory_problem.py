@@ -190,13 +190,10 @@ class TrajectoryProblem:
                     chosen = right if each == "right" else 1 - right
                     jerks = _hand_jerks(robot, each, q0, steps, durations, rates)
                     objective += casadi.dot(chosen, jerks)
-        lower = [-np.inf] * len(limits)
-        upper = [0.0] * len(limits)
+        self._lower = np.array([-np.inf] * len(limits) + [0.0] * bool(order))
+        self._upper = np.zeros(len(self._lower))
         if order:
             limits.append(casadi.sum1(durations) - goals)
-            lower.append(0.0)
-            upper.append(0.0)
-        self._lower, self._upper = np.array(lower), np.array(upper)
         self._evaluations = goals * len(hands)  # forward kinematics in one evaluation of the limits
         variables = {"steps": steps, "lengths": lengths, "durations": durations, "depth": depth,
                      "rates": casadi.veccat(*rates)}  # fmt: skip

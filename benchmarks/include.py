@@ -147,11 +147,9 @@ def _warn_of_gaps(
                 f"{words}, and gives those before the first that is missing", stacklevel=4
             )
         if few:
-            words = (
-                f"{counted(len(jobs[few[0].cell.digest].numbers), 'run')} of {_named(few)}; "
-                f"{most} are asked for here"
-            )
-            warnings.warn(f"{name} has {words}", stacklevel=4)
+            runs = counted(len(jobs[few[0].cell.digest].numbers), "run")
+            words = f"{name} has {runs} of {_named(few)}; {most} are asked for here"
+            warnings.warn(words, stacklevel=4)
 
 
 def _named(jobs: Sequence[Job]) -> str:

@@ -137,7 +137,17 @@ def _methods_of_module(
     ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, a wrong
     declaration, and a file that cannot be read."""
     for method in methods:
-        _check_declaration(method, origin)
+        where = f"{origin}: {method.__name__}"
+        for attribute in ("name", "title", "citation", "tuned_on"):
+            text = getattr(method, attribute, None)
+            if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
+                raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
+        information = getattr(method, "information", None)
+        if not isinstance(information, frozenset | set) or not all(
+            isinstance(each, Information) for each in information
+        ):
+            wrong = f"{where}: information must be a set of Information, not {information!r}"
+            raise CoarticError(wrong)
         try:
             code = code_of(method, file)
         except CoarticError as error:
@@ -154,22 +164,4 @@ def _methods_of_module(
         why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
         raise CoarticError(
             f"{origin}: defines no subclass of coartic.Method or coartic.Optimiser{why}"
-        )
-
-
-def _check_declaration(method: type[Method], origin: str) -> None:
-    """Raise CoarticError if name, title, citation or ``tuned_on`` of a method is not a text of one
-    line, or its information is no set of Information; ``origin`` is the name of its file in
-    messages. The registry checks the form of ids."""
-    where = f"{origin}: {method.__name__}"
-    for attribute in ("name", "title", "citation", "tuned_on"):
-        text = getattr(method, attribute, None)
-        if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
-            raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
-    information = getattr(method, "information", None)
-    if not isinstance(information, frozenset | set) or not all(
-        isinstance(i, Information) for i in information
-    ):
-        raise CoarticError(
-            f"{where}: information must be a set of Information, not {information!r}"
         )

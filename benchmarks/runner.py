@@ -57,7 +57,7 @@ class Progress:
     total: int
     """Runs of the plan."""
     present: int = 0
-    """Runs of the plan that the folder had before."""
+    """Runs of the plan that the folder had before, except runs that are performed again."""
     stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     """Runs that the folder has from another version or code of their method, by the method, that
     version and the present one. They are kept, and no report shows them."""
@@ -73,7 +73,7 @@ class Progress:
     """Runs of earlier commands in the folder that the plan does not ask for, by the seed of their
     suite. They are kept, and no report shows them."""
     wall_s: float = 0.0
-    """Seconds from the call until the last run was written."""
+    """Wall time of the call, s; 0 until it ends."""
     waiting: Counter[str] = field(default_factory=Counter)
     """Runs still to perform, by method."""
     took: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
