@@ -39,10 +39,10 @@ def include_folders(
 ) -> list[Job]:
     """Copy the runs of other folders into ``out``; store there, and return, the plan of all runs.
 
-    ``shipped`` names the shipped results. If the returned plan is performed in ``out``, only runs
-    of ``plan`` are made that no folder has. Runs of cells outside ``plan`` are copied, too; if
-    ``tasks`` are named, only runs on these tasks. A warning names an unfinished folder, and a
-    folder with fewer runs than ``plan`` asks for.
+    ``shipped`` names the shipped results. The returned plan has the cells of ``plan`` and of the
+    folders; if ``tasks`` are named, the folders give only cells on these tasks. Runs of ``plan``
+    that no folder has are missing in ``out``: :func:`.perform` makes them. A warning names an
+    unfinished folder, and a folder with fewer runs than ``plan`` asks for.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
     at 0, if the folders do not go together, if one does not pass the checks of ``coartic verify``,
@@ -88,8 +88,8 @@ def include_folders(
 def _join(
     plan: Sequence[Job], sources: Mapping[str, Store], tasks: Collection[str] | None
 ) -> list[Job]:
-    """Return the plan with the cells of the sources (stores by name), if ``tasks`` are given only
-    cells on these tasks. A cell has the runs that the plan asks for, and the runs that follow in
+    """Return the plan with the cells of the sources (stores by name), with ``tasks`` only cells on
+    these tasks. A cell has the runs that the plan asks for, and the runs that follow in
     the sources without a gap. Raises CoarticError for a contradiction (:func:`_check_together`)."""
     whole = {name: source.plan() for name, source in sources.items()}
     plans = {

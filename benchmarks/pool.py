@@ -92,7 +92,8 @@ class Local:
     def perform(
         self, jobs: Sequence[Job], *, in_order: bool = False
     ) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with the outcomes of its runs by new workers (:meth:`Workers.perform`)."""
+        """Let new workers perform jobs; yield each job with the outcomes of its runs
+        (:meth:`Workers.perform`)."""
         with closing(Workers(self)) as workers:
             yield from workers.perform(jobs, in_order=in_order)
 
@@ -156,7 +157,7 @@ class Workers:
                     worker.end()
                     if not worker.jobs:
                         continue
-                    room = Path(self.folder.name, "room")  # without it, an answer can be lost
+                    room = Path(self.folder.name, "room")  # without room an answer can be lost
                     room.write_bytes(bytes(_ROOM))
                     room.unlink()
                     job = worker.jobs[0]

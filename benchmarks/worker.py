@@ -45,7 +45,7 @@ _ENVIRONMENT = TypeAdapter(dict[Literal["libraries", "imports"], dict[Line, Line
 _LONGEST_DETAILS = 10_000_000
 
 
-def _peak_mb() -> float | None:
+def process_peak_mb() -> float | None:
     """Return the most memory of this process so far, MiB; None if the system does not count it."""
     try:
         import resource
@@ -155,7 +155,7 @@ def perform_job(job: Job) -> list[Outcome]:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     runs = len(sessions)
-    times = Times(wall / runs, cpu / runs, warm, runs, _peak_mb())
+    times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
     pairs = zip(results, sessions, strict=True)
     outcomes = [_outcome_of(cell.method, result, session, times) for result, session in pairs]
     if not cell.method.is_ours:
@@ -186,7 +186,7 @@ def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times)
             return Outcome(result.outcome, str(result), details=details, **spent)
         if isinstance(result, BaseException):
             raise result
-        return Outcome("ok", **spent, **_statement(result, session))
+        return Outcome("ok", **spent, **statement(result, session))
     except SolutionError as error:
         return Outcome("solver-failed", str(error), **spent)
     except NotApplicableError as error:
@@ -208,7 +208,7 @@ def _place_of(error: BaseException, method: MethodInfo) -> str:
     return f"{Path(file).name}, line {lines[-1]}: " if lines else ""
 
 
-def _statement(result: Any, session: Session) -> dict[str, Any]:
+def statement(result: Any, session: Session) -> dict[str, Any]:
     """Return ``parts`` and ``details`` of an :class:`Outcome`, by name, from a method's result.
     Raises SolutionError for a result that cannot be kept, and UndeclaredError for movements without
     a target if the corrective process is not declared."""

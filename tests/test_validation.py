@@ -146,6 +146,7 @@ METHODS = [
     ("x = 1", "defines no subclass of coartic.Method"),
     ("def (", "cannot be imported: SyntaxError"),
     (method("def solve", "def solves"), "that is complete: A has no solve"),
+    (method('    name = "a"\n', ""), "name must be a text"),
     (method("title = ", ""), "title must be a text"),
     (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
     (method("frozenset()", '"goals"'), "information must be a set of Information"),
