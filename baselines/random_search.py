@@ -1,11 +1,11 @@
 """Random search: the paper's learner without its memory; the best trial is kept.
 
 Every trial draws Gaussian noise with the learner's standard deviation around the postures in which
-the corrective process hits the goals; trial 0 is the corrective process alone. Targets do not
-depend on rewards, so that random search cannot coarticulate by learning: its best trial shows the
-effect of selecting one of many noisy trials by the reward of the whole task. It is the control of
-signatures of coarticulation (:mod:`coartic.analysis.control`), and differs from the learner in one
-thing: it forgets.
+the corrective process hits the goals; trial 0 is the corrective process alone. With one stage, the
+default, no noise depends on earlier rewards, so that random search cannot coarticulate by learning:
+its best trial shows the effect of selecting one of many noisy trials by the reward of the whole
+task. It is the control of signatures of coarticulation (:mod:`coartic.analysis.control`), and
+differs from the learner in one thing: it forgets.
 
 Memory comes in doses: with ``stages`` above 1 the trials are equal parts, and after each part the
 centre of the noise moves to the best trial so far, to the postures that this trial reached or to
