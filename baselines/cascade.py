@@ -33,7 +33,7 @@ DAMPING = 0.01
 and changes stay bounded where it is 0."""
 
 LIMIT = 2.0
-"""Largest change of any joint; where it binds, level 1 falls short."""
+"""L, largest change of any joint."""
 
 SLACK = 1e-6
 """ε, length unit: without it level 2 would be left with a single point where limits bind."""
@@ -71,21 +71,18 @@ def _solve_level(
     level: int, hessian: Array, gradient: Array, rows: Array, least: Array
 ) -> tuple[Array, int]:
     """Minimise ½ vᵀ H v + gᵀ v (``hessian`` H, ``gradient`` g) under the limits of ``level``, 1 or
-    2, with A ``rows`` and b ``least``; return the variables v (the changes; for level 1 the slack
-    s, then the changes) and the number of iterations. Raises MethodError if the solver fails."""
+    2; return the variables v (at level 1 first the slack s, then the changes) and the number of
+    iterations. Raises MethodError if the solver fails."""
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))
     matrix[:task, :-joints] = -1.0
     matrix[:task, -joints:] = -rows
-    matrix[task : task + joints, -joints:] = np.eye(joints)
-    matrix[task + joints :, -joints:] = -np.eye(joints)
-    upper = np.full(len(gradient) + len(matrix), LIMIT)
-    upper[: len(gradient)] = np.inf
-    upper[len(gradient) : len(gradient) + task] = -least
+    matrix[task:, -joints:] = np.vstack([np.eye(joints), -np.eye(joints)])
+    free = np.full(len(gradient), np.inf)
+    upper = np.concatenate([free, -least, np.full(2 * joints, LIMIT)])
     equal = np.zeros(len(upper), dtype=np.intc)
-    x, _, flag, info = daqp.solve(
-        hessian, gradient, matrix, upper, np.full(len(upper), -np.inf), equal
-    )
+    lower = np.full(len(upper), -np.inf)
+    x, _, flag, info = daqp.solve(hessian, gradient, matrix, upper, lower, equal)
     if flag != 1:
         raise MethodError("solver-failed", f"level {level}: DAQP ended with exit flag {flag}")
     return np.array(x, dtype=np.float64), info["iterations"]

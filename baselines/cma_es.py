@@ -39,6 +39,7 @@ from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import Array
+from coartic.tasks.task import letters_of
 
 _CITATION = (
     "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. A. Auger, N. "
@@ -51,7 +52,7 @@ class BanditParameters(UninformedParameters):
     """Parameters of the bandit."""
 
     exploration: Annotated[float, Field(ge=0, le=100)] = 0.2
-    """c of UCB1, as a multiple of the range of the first rewards."""
+    """c of UCB1, as a multiple of the range of the first rewards, at least 1."""
 
 
 class Strategy:
@@ -68,29 +69,28 @@ class Strategy:
         self.reward = float(first.rewards[0])
         """Best reward so far; -inf where **A** did not complete the sequence."""
         self._mean: Array = first.reached[0, attempts.explored]
-        self._restarts = -1
-        self._evolution: EvolutionStrategy
+        self._evolution: EvolutionStrategy | None = None
 
     def generation(self) -> None:
-        """Make the trials of one generation of CMA-ES, or as many as are left, and, if none is
-        missing, update mean, step size and covariance from their rewards. Where CMA-ES has ended,
-        it restarts with twice the population. To be called only if the corrective process completes
-        the hand sequence."""
-        if self._restarts < 0 or self._evolution.has_ended():
-            self._restarts += 1
-            size = 4 + int(3 * math.log(len(self._mean)))  # λ, the default of CMA-ES
-            self._evolution = EvolutionStrategy(
-                self._mean, self.sigma, size * 2**self._restarts, self._rng
-            )
-        values = self._evolution.ask()[: self._attempts.left]
+        """Make the trials of one generation of CMA-ES, or as many as are left (at least one must
+        be), and, if the generation is complete, update CMA-ES from their rewards. Where CMA-ES has
+        ended, it restarts with twice the population. To be called only if the corrective process
+        completes the hand sequence."""
+        evolution = self._evolution
+        if evolution is None or evolution.has_ended():
+            default = 4 + int(3 * math.log(len(self._mean)))
+            size = default if evolution is None else 2 * evolution.size
+            evolution = EvolutionStrategy(self._mean, self.sigma, size, self._rng)
+            self._evolution = evolution
+        values = evolution.ask()[: self._attempts.left]
         rewards = self._attempts.around(self.hands, values).rewards
         self.generations += 1
         self.trials += len(values)
         self.reward = max(self.reward, float(rewards.max()))
-        if len(values) == self._evolution.size:
+        if len(values) == evolution.size:
             completed = rewards > -math.inf
             worst = rewards[completed].min() if completed.any() else 0.0
-            self._evolution.tell(values, np.where(completed, -rewards, 1.0 - worst))
+            evolution.tell(values, np.where(completed, -rewards, 1.0 - worst))
 
 
 class CMAES(Method):
@@ -109,13 +109,14 @@ class CMAES(Method):
     Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
-        """Make generations of trials until the trials are used up; return the movements of the best
+        """Make generations of trials until no trial is left; return the movements of the best
         trial. Raises MethodError if no trial hit every goal."""
         attempts = Attempts(session, self.parameters.trials)
         with session.solving():
-            strategies = []
-            for hands in sequences_of(session)[: attempts.left]:
-                strategies.append(Strategy(session, attempts, hands, self.parameters.sigma))
+            strategies = [
+                Strategy(session, attempts, hands, self.parameters.sigma)
+                for hands in sequences_of(session)[: attempts.left]
+            ]
             promising = [s for s in strategies if s.reward > -math.inf]
             first = [strategy.reward for strategy in promising] or [0.0]
             width: float = self.parameters.exploration * max(max(first) - min(first), 1.0)
@@ -151,11 +152,10 @@ class GoalByGoal(Method):
     Parameters = GoalByGoalParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until they are used up, or until all hand sequences were tried and none
-        succeeds; return the movements of the best trial. Raises MethodError if no trial hit every
-        goal."""
+        """Make trials while any are left and a hand sequence may succeed; return the movements of
+        the best trial. Raises MethodError if no trial hit every goal."""
         attempts = Attempts(session, self.parameters.trials)
-        letters = sorted(hand[0].upper() for hand in session.hands)
+        letters = sorted(letters_of(session.hands))
         values: dict[tuple[int, str], float] = defaultdict(lambda: -math.inf)
         strategies: dict[str, Strategy] = {}
         hands = session.find_initial_hands()

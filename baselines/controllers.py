@@ -19,7 +19,7 @@ from pydantic import Field
 
 from coartic import Movement, Task
 from coartic.baselines.cascade import Solution, solve_cascade
-from coartic.baselines.posture_graph import HandSequence
+from coartic.baselines.posture_graph import KINEMATICS, HandSequence
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.movement import follow
 from coartic.motion.trial import changes_of_hand
@@ -29,6 +29,14 @@ from coartic.tasks.task import beyond_reach, letters_of
 _HIT_MARGIN = 1e-9  # the scorer's interpolation along the path rounds
 _STALL_STEPS = 50  # without coming nearer by a tenth of a control step
 _BINDS = 1e-3  # least difference of joint changes by which a level binds, in control steps
+
+
+CITATION_AHEAD = (
+    " With the next goal as lower priority: K. Rohanimanesh, R. Platt, S. Mahadevan, R. Grupen "
+    "(2004), Coarticulation in Markov decision processes, NIPS; B. Thibodeau, S. Hart, D. "
+    "Karuppiah, J. Sweeney, O. Brock (2004), Cascaded filter approach to multi-objective "
+    "control, ICRA."
+)
 
 
 class Aim(NamedTuple):
@@ -95,9 +103,9 @@ class Controller(ABC):
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
         """Simulate control steps until the hand of the first of ``aims`` (hand and goal) is in its
-        goal, from the end of the movement ``before``, or, for None, from the task's start; return
-        them as a movement, with its ticks and counts. Further aims are the goals ahead. Raises
-        _StuckError if the hand comes no nearer to its goal, and MethodError if the solver fails."""
+        goal, from the end of the leg ``before``, or, for None, from the task's start. Further aims
+        are the goals ahead. Raises _StuckError if the hand does not reach its goal, and MethodError
+        if the solver fails."""
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         model, radius = self.session.model, self.task.radius
         _, tolerance = model.tolerances(radius)
@@ -111,7 +119,7 @@ class Controller(ABC):
         waypoints: list[Array] = []
         memory = self.begin(q, aims, None if before is None else before.memory)
         nearest, since, steps = np.inf, 0, np.zeros(3, dtype=np.int64)
-        while (distance := self.distance(q, aims[0])) > radius - _HIT_MARGIN:
+        while (distance := float(np.hypot(*self.error(q, aims[0])))) > radius - _HIT_MARGIN:
             if distance < nearest - 0.1 * self.length:
                 nearest, since = distance, 0
             since += 1
@@ -150,11 +158,6 @@ class Controller(ABC):
             self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
         )
 
-    def distance(self, q: Array, aim: Aim) -> float:
-        """Return the distance of the hand of an aim (hand and goal) in configuration ``q`` from the
-        goal's centre, length unit; the session counts an evaluation."""
-        return float(np.hypot(*self.error(q, aim)))
-
     def add(self, q: Array, change: Array) -> Array:
         """Return a copy of configuration ``q`` with ``change``, shape ``(joints,)``, length unit
         and rad, added to the joints that are not locked."""
@@ -173,14 +176,12 @@ class ControlParameters(Parameters):
 class Control(Method):
     """A controller under every hand sequence; base of the methods that control a hand."""
 
-    information = frozenset(
-        {
-            Information.GOALS,
-            Information.FORWARD_KINEMATICS,
-            Information.JACOBIAN,
-            Information.REWARD_FORMULA,
-        }
+    citation = (
+        "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
+        "robot manipulators. International Journal of Robotics Research; as quadratic programs "
+        "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics."
     )
+    information = KINEMATICS | {Information.REWARD_FORMULA}
     stochastic = False
     Parameters = ControlParameters
     quick: ClassVar[dict[str, Any]] = {"period": 20}
@@ -189,8 +190,7 @@ class Control(Method):
     """Goals after the current one that the controller takes into account."""
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence that a task has more than 4096 hand sequences, too many to simulate;
-        None for fewer."""
+        """Return a sentence that a task has more than 4096 hand sequences; None for fewer."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
@@ -232,7 +232,7 @@ class Control(Method):
                     "level_2_binds": level_2,
                 }
                 return Result(tuple(leg.movement for leg in path), details)
-            aims = tuple(itertools.starmap(Aim, zip(hands, range(len(hands)), strict=True)))
+            aims = tuple(Aim(hand, g) for g, hand in enumerate(hands))
             plan = tuple(aims[g : g + 1 + self.goals_ahead] for g in range(goal + 1))
             if plan not in legs:
                 try:

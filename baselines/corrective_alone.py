@@ -48,26 +48,25 @@ class BestHands(Method):
     stochastic = False
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence that a task has more than 4096 hand sequences, too many to try one by
-        one; None for fewer."""
+        """Return a sentence that a task has more than 4096 hand sequences; None for fewer."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
         """Make one trial for each hand sequence while trials are left; return the movements of the
         best trial, of equal rewards the one with the fewest changes of hand. Raises MethodError if
         every trial misses a goal."""
-        completed: list[tuple[int, int, Execution]] = []
+        completed: list[Execution] = []
         for hands in sequences_with(session.hands, session.goals_count, session.task_name):
             if session.trials_left == 0:
                 break
             with session.solving():
                 execution = session.trial(corrective_movements(hands))
-            if execution.reward is not None:
-                changes = changes_of_hand(execution.hands)
-                completed.append((-execution.reward, changes, execution))
+            if execution.completed:
+                completed.append(execution)
         if not completed:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
-        return Result(min(completed, key=lambda entry: entry[:2])[2].movements)
+        best = min(completed, key=lambda each: (each.ticks, changes_of_hand(each.hands)))
+        return Result(best.movements)
 
 
 METHODS: tuple[type[Method], ...] = (GivenHands, BestHands)

@@ -52,9 +52,6 @@ class EvolutionStrategy:
         selected = 1 / _added([weight**2 for weight in positive])
         c_1 = min(1, size / 6) * 2 / ((dim + 1.3) ** 2 + selected)
 
-        def c_mu(mass: float) -> float:
-            return min(1 - c_1, 2 * mass / ((dim + 2) ** 2 + selected))
-
         def scaled(weights: list[float], to: float) -> list[float]:
             factor = abs(to / (_added(weights) or 1))
             return [weight * factor for weight in weights]
@@ -64,7 +61,7 @@ class EvolutionStrategy:
         negative = [weight / total for weight in raw[self._parents :]]
         negative = [weight / -_added(negative) for weight in negative]
         for mass in (0.25 + selected + 1 / selected - 2, 0.25 + selected - 2 + 1 / selected):
-            rate = c_mu(mass)
+            rate = min(1 - c_1, 2 * mass / ((dim + 2) ** 2 + selected))  # c_μ
             negative = scaled(negative, 1 + c_1 / rate)
             square = _added([weight**2 for weight in negative])
             rejected = _added(negative) ** 2 / (square or 1)

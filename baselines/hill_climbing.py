@@ -37,9 +37,8 @@ class HillClimbing(Method):
     Parameters = UninformedParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until they are used up, or no hand sequence succeeds; return the movements of
-        the best trial. For each trial hands are drawn around the best sequence known, targets
-        around the centre of the drawn sequence. Raises MethodError if no trial hit every goal."""
+        """Make trials until none is left, or no hand sequence succeeds; return the movements of the
+        best trial. Raises MethodError if no trial hit every goal."""
         first, rng, letters = session.find_initial_hands(), session.rng, letters_of(session.hands)
         attempts = Attempts(session, self.parameters.trials)
         most, ahead = len(letters) ** session.goals_count, 1

@@ -27,7 +27,7 @@ from __future__ import annotations
 import numpy as np
 
 from coartic.baselines.cascade import Solution
-from coartic.baselines.controllers import Aim, Control, Controller
+from coartic.baselines.controllers import CITATION_AHEAD, Aim, Control, Controller
 from coartic.method import Information
 from coartic.robot import Array
 
@@ -93,11 +93,6 @@ class LeastMotion(Control):
     version = 2
     tuned_on = "nothing"
     title = "Prioritised null-space QP, least motion"
-    citation = (
-        "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
-        "robot manipulators. International Journal of Robotics Research; as quadratic programs "
-        "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics."
-    )
     secondary = ("least joint changes",)
     controller = HandController
 
@@ -107,12 +102,7 @@ class NextGoalPosture(LeastMotion):
 
     name = "nullspace-qp/next-goal-posture"
     title = "Prioritised null-space QP, posture of the next goal"
-    citation = LeastMotion.citation + (
-        " With the next goal as lower priority: K. Rohanimanesh, R. Platt, S. Mahadevan, R. Grupen "
-        "(2004), Coarticulation in Markov decision processes, NIPS; B. Thibodeau, S. Hart, D. "
-        "Karuppiah, J. Sweeney, O. Brock (2004), Cascaded filter approach to multi-objective "
-        "control, ICRA."
-    )
+    citation = Control.citation + CITATION_AHEAD
     information = LeastMotion.information | {
         Information.SECONDARY_OBJECTIVES,
         Information.CORRECTIVE_PROCESS,

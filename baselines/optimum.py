@@ -1,8 +1,8 @@
 """The search for the optimum: the best reward that a global search finds.
 
 Reward is lost in proportion to the joint-space path, so the shortest path that touches every disc
-is sought over all hand sequences, from the chains of posture graphs (layered dynamic programming).
-Every plan is then rounded to whole control ticks in every way, with and without goals that are hit
+is sought over hand sequences, from the chains of posture graphs (layered dynamic programming).
+Plans that may be best are then rounded to whole control ticks, with and without goals that are hit
 as their turn comes because the other hand is already there. A reference for the gaps of all other
 methods, not a competitor. Bounds on the optima are proven outside the package (``studies/optima``).
 
@@ -41,13 +41,12 @@ class OptimumParameters(Parameters):
     graphs: Count = 3
     """Independent graphs, or more, until there are as many ``chains``."""
     chains: Count = 100
-    """Least number of starts, over all graphs and hand sequences, each also with the idle arm
-    moving in equal steps. With three, the best path known was missed on 9 of 40 random tasks for
-    one arm."""
+    """Least number of chains, over all graphs and hand sequences. With three, the best path known
+    was missed on 9 of 40 random tasks for one arm."""
 
 
 class OptimumSearch(Method):
-    """The shortest path over all hand sequences, in whole ticks."""
+    """The shortest path found over hand sequences, in whole ticks."""
 
     name = "optimum/search"
     version = 2
@@ -63,8 +62,9 @@ class OptimumSearch(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
     def solve(self, session: Session) -> Result:
-        """Search over all hand sequences for the shortest path, round it to whole ticks, and return
-        the movements with the fewest ticks found. Raises MethodError if no path is found."""
+        """Search for the shortest path over hand sequences (at most 64 a graph), round it to whole
+        ticks, and return the movements with the fewest ticks found. Raises MethodError if none are
+        found."""
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
         task = with_locks(session.reveal(*self.information), parameters.base)

@@ -33,8 +33,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from coartic import Movement
-from coartic.baselines.posture_graph import HandSequence, Layers
+from coartic.baselines.posture_graph import KINEMATICS, HandSequence, Layers
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.method.optimisers import explored_joints
 from coartic.motion.compile import chain_by, entry, joint_lever
 from coartic.robot import BASE_DOF, Array, Hand
 
@@ -81,14 +82,7 @@ class PostureBased(Method):
         "motion planning: applications to grasping. Psychological Review 108(4), 709-734, "
         "doi:10.1037/0033-295X.108.4.709."
     )
-    information = frozenset(
-        {
-            Information.GOALS,
-            Information.FORWARD_KINEMATICS,
-            Information.JACOBIAN,
-            Information.REWARD_FORMULA,
-        }
-    )
+    information = KINEMATICS | {Information.REWARD_FORMULA}
     Parameters = PostureBasedParameters
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
 
@@ -133,8 +127,7 @@ class PosturePlanner:
         self.session = session
         self.rounds = parameters.rounds
         self.horizon = horizon
-        task = session.reveal(Information.FORWARD_KINEMATICS, Information.JACOBIAN)
-        self.robot = task.robot
+        self.robot = session.reveal(Information.FORWARD_KINEMATICS, Information.JACOBIAN).robot
         self.goals = session.goals
         # ‖F(q) − x_g‖ of a target at most θ^g − θ^a: the movement hits before it arrives.
         arrival, _ = session.model.tolerances(session.radius)
@@ -142,8 +135,7 @@ class PosturePlanner:
         self.base_and_arm = {hand: np.zeros(session.dof, bool) for hand in session.hands}
         for hand, mask in self.base_and_arm.items():
             mask[:BASE_DOF] = mask[session.joints(hand)] = True
-        self.movable: Mask = np.logical_or.reduce(list(self.base_and_arm.values()))
-        self.movable[:BASE_DOF] = [c not in session.locked_base for c in ("x", "y")]
+        self.movable: Mask = explored_joints(session)
         self.free = {hand: self.movable & mask for hand, mask in self.base_and_arm.items()}
         """Joints that may move towards a posture for each hand."""
         # SDs from zero up: dense near the start, sparse far from it.
@@ -305,14 +297,9 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Keep at the beginning of ``far`` (indices of postures), in place, the postures whose hand is
-    farther than ``tolerance``, length unit, from (x, y), and return their number.
-
-    For each of these, in order, fill a row of ``wanted``, ``(n, 2, 1)``, with the step that the
-    hand is to make towards (x, y), at most 0.5 length units, and of ``jacobian``, ``(n, 2, dof)``,
-    with the columns of the arm's joints. ``xs`` and ``ys``, an entry for each joint and the hand,
-    are work space.
-    """
+    """Move indices of postures whose hand is farther than ``tolerance`` from (x, y) to the
+    beginning of ``far``, and return their number. For each fill a row of ``wanted``, the hand's
+    step towards (x, y), and of ``jacobian``, the columns of the arm's joints."""
     tip = len(arm.links)
     left = 0
     for row in far:  # with the C library's cosine and sine, as in the robot's own kinematics

@@ -18,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from coartic.method import MethodError, Session
+from coartic.method import Information, MethodError, Session
 from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task
 
+KINEMATICS = frozenset({Information.GOALS, Information.FORWARD_KINEMATICS, Information.JACOBIAN})
+"""Information of a planner about goals and hands."""
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
 """A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
@@ -42,14 +44,9 @@ _NEAR = 2.0  # length unit: from farther away the base carries the hand there fi
 def _sample_postures(
     task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
-    """Sample configurations, at most one for each of ``starts``, with ``hand`` in the disc of goal
-    ``goal`` (from 0); return them, shape ``(n, dof)``.
-
-    A Gaussian sample around each start, shape ``(count, dof)``, with an SD drawn log-uniformly, is
-    brought to a random point of the disc, from far away by the base and then by Gauss-Newton steps
-    of least norm; samples that do not get there are left out. The other arm stays as in its start.
-    Evaluations are added to ``spent``, in place.
-    """
+    """Bring a sample around each of ``starts``, ``(count, dof)``, with ``hand`` to a random point
+    of the disc of goal ``goal`` (from 0); return the samples that get into the disc, ``(n, dof)``.
+    The other arm stays as in its start. Evaluations are added to ``spent``, in place."""
     robot, count = task.robot, len(starts)
     moving = np.zeros(robot.dof, dtype=np.bool_)
     moving[robot.joints(hand)] = True
@@ -97,8 +94,8 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
     for each goal and hand; return them by ``(goal, hand)``, goals from 0, and the
     ``forward_kinematics`` and ``jacobians`` counted.
 
-    Half of the nodes are sampled around the nodes of the goal before, by whichever hand: of 40
-    one-armed random tasks the best path known was then found more often on 23, less often on 11.
+    Half of the samples begin at nodes of the goal before, by whichever hand: of 40 one-armed random
+    tasks the best path known was then found more often on 23, less often on 11.
     """
     spent: Counter[str] = Counter()
     layers: Layers = {}

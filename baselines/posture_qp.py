@@ -56,7 +56,7 @@ from __future__ import annotations
 import numpy as np
 
 from coartic.baselines.cascade import Solution
-from coartic.baselines.controllers import Aim, Control, Controller
+from coartic.baselines.controllers import CITATION_AHEAD, Aim, Control, Controller
 from coartic.method import Information
 from coartic.robot import Array, directions
 
@@ -177,11 +177,6 @@ class CurrentGoal(Control):
     version = 2
     tuned_on = "30 development instances: some 60 settings"
     title = "Posture QP, current goal"
-    citation = (
-        "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
-        "robot manipulators. International Journal of Robotics Research; as quadratic programs "
-        "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics. "
-    )
     controller = PostureController
 
 
@@ -190,11 +185,7 @@ class GoalsAhead(CurrentGoal):
 
     name = "posture-qp/goals-ahead"
     title = "Posture QP, goals ahead"
-    citation = CurrentGoal.citation + (
-        "K. Rohanimanesh, R. Platt, S. Mahadevan, R. Grupen (2004), Coarticulation in Markov "
-        "decision processes, NIPS; B. Thibodeau, S. Hart, D. Karuppiah, J. Sweeney, O. Brock "
-        "(2004), Cascaded filter approach to multi-objective control, ICRA."
-    )
+    citation = Control.citation + CITATION_AHEAD
     information = CurrentGoal.information | {Information.SECONDARY_OBJECTIVES}
     secondary = ("coarticulation: posture at the next goal",)
     goals_ahead = 2

@@ -1,11 +1,11 @@
 """Random search: the paper's learner without its memory; the best trial is kept.
 
 Every trial draws Gaussian noise with the learner's standard deviation around the postures in which
-the corrective process hits the goals; trial 0 is the corrective process alone. No target depends on
-any reward, so that random search cannot coarticulate by learning: its best trial shows the effect
-of selecting one of many noisy trials by the reward of the whole task. It is the control of
-signatures of coarticulation (:mod:`coartic.analysis.control`), and differs from the learner in one
-thing: it forgets.
+the corrective process hits the goals; trial 0 is the corrective process alone. With one stage, the
+default, no noise depends on earlier rewards, so that random search cannot coarticulate by learning:
+its best trial shows the effect of selecting one of many noisy trials by the reward of the whole
+task. It is the control of signatures of coarticulation (:mod:`coartic.analysis.control`), and
+differs from the learner in one thing: it forgets.
 
 Memory comes in doses: with ``stages`` above 1 the trials are equal parts, and after each part the
 centre of the noise moves to the best trial so far, to the postures that this trial reached or to
@@ -19,10 +19,10 @@ the solution.
 from __future__ import annotations
 
 from contextlib import suppress
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from coartic.baselines.uninformed import Attempts
@@ -32,6 +32,7 @@ from coartic.learner.learning import TRIALS, runs_at_once
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import HANDS
+from coartic.tasks.task import hands_of
 
 _POINTS_AT_ONCE = 500
 
@@ -90,7 +91,11 @@ def draw_trials(
     attempts.by_correction(*(sequences_of(session) if hands is None else [hands])[:trials])
     if not (chosen := attempts.hands):
         raise MethodError("infeasible", "the corrective process completes no hand sequence")
-    explored = attempts.explored & (parameters.idle_arm | _base_and_chosen_arm(session, chosen))
+    explored = attempts.explored.copy()
+    for goal, hand in enumerate(hands_of(chosen)):
+        for other in HANDS:
+            if other != hand and not parameters.idle_arm:
+                explored[goal, session.joints(other)] = False
     centre, alone = attempts.reached[explored], attempts.trials_made
     targets = np.full((_POINTS_AT_ONCE, *explored.shape), np.nan)
     stage, more = 0, True
@@ -107,16 +112,6 @@ def draw_trials(
             targets[: len(part), explored] = centre + part
             attempts.by_targets(chosen, targets[: min(len(part), attempts.left)])
     return attempts, attempts.trials_made - alone
-
-
-def _base_and_chosen_arm(session: Session, hands: str) -> NDArray[np.bool_]:
-    """Return True for the base and for the joints of the arm that is to hit, for each goal of a
-    hand sequence such as ``"RRLR"``, shape ``(G, dof)``."""
-    joints = np.ones((len(hands), session.dof), dtype=np.bool_)
-    for goal, letter in enumerate(hands):
-        for hand in HANDS:
-            joints[goal, session.joints(hand)] = hand[0].upper() == letter
-    return joints
 
 
 class RandomSearchHands(Method):
@@ -147,14 +142,13 @@ class RandomSearchHands(Method):
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
-        shares = [trials * n // len(sequences) for n in range(len(sequences) + 1)]
+        ends = [trials * n // len(sequences) for n in range(len(sequences) + 1)]
         completed: list[Attempts] = []
         with session.solving():
-            for n, hands in enumerate(sequences):
-                share = {"trials": shares[n + 1] - shares[n]}
+            for hands, (begin, end) in zip(sequences, pairwise(ends), strict=True):
+                share = parameters.model_copy(update={"trials": end - begin})
                 with suppress(MethodError):
-                    of_share = parameters.model_copy(update=share)
-                    completed.append(draw_trials(session, hands, of_share)[0])
+                    completed.append(draw_trials(session, hands, share)[0])
         if not completed:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
         best = max(completed, key=lambda attempts: attempts.reward)

@@ -1,7 +1,7 @@
 """A planner that looks a fixed number of goals ahead.
 
-From where the robot stands it finds the shortest movements through the next goals, ``horizon``
-beyond the one to be hit, over all hand sequences. It makes the first of them, stands where that
+From where the robot stands it seeks the shortest movements through the next goals, ``horizon``
+beyond the one to be hit, over hand sequences. It makes the first of them, stands where that
 one ended, and plans again (model predictive control: Garcia, Prett & Morari 1989; Mayne, Rawlings,
 Rao & Scokaert 2000). With ``horizon`` 0 it goes to each goal the shortest way. A window that
 reaches the last goal is followed to its end, since planning again would find the rest of it. With
@@ -49,7 +49,7 @@ class RecedingHorizonParameters(Parameters):
     graphs: Count = 3
     """Independent graphs for each window, or more, until there are as many ``chains``."""
     chains: Count = 24
-    """Chains of each window, over all graphs and hand sequences."""
+    """Least number of chains of each window, over all graphs and hand sequences."""
     starts: Count = 24
     """Number of starts of each window that are polished, the shortest: all chains, each also with
     the idle arm moving in equal steps, are ranked by length."""

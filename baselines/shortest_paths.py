@@ -1,9 +1,9 @@
-"""The shortest path over all hand sequences, in whole control ticks.
+"""The shortest path over hand sequences, in whole control ticks.
 
-Shared by the searches for the optimum and the planner with a receding horizon: each start is
-polished by IPOPT, the shortest plan of each hand sequence is kept, and every plan that may be
-the best one is rounded to whole ticks in every way, with and without goals that are hit as their
-turn comes because the other hand is already there.
+Shared by the search for the optimum and the planner with a receding horizon: each start is
+polished by IPOPT, the shortest plan of each hand sequence is kept, and plans that may be best are
+rounded to whole ticks, with and without goals that are hit as their turn comes because the other
+hand is already there.
 """
 
 from __future__ import annotations
@@ -79,11 +79,10 @@ def shortest_plans(
 def fewest_ticks(
     session: Session, task: Task, problem: TrajectoryProblem, plans: ShortestPlans
 ) -> PlanInTicks:
-    """Round the plans of a task to whole ticks in every way that may be best, with and without
-    goals that are hit without a movement; return the rounding with the fewest ticks when executed.
-    Plans are tried by length; of equal ones that were executed the first with the fewest
-    corrections is kept. The session counts the effort. Raises MethodError if no rounding is solved.
-    """
+    """Round plans of a task to whole ticks, as far as they may be best (of a plan at most the
+    nearest 64 roundings, :meth:`.Rounding.every`), with and without goals that are hit without a
+    movement; return the rounding with the fewest ticks when executed. The session counts the
+    effort. Raises MethodError if no rounding is solved and hits every goal."""
     fewest: PlanInTicks | None = None
     least: tuple[float, float] = math.inf, math.inf
 

@@ -28,10 +28,11 @@ parallelise over processes.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from threading import RLock
 from typing import Any, Literal
 
@@ -39,18 +40,12 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from coartic.baselines.posture_graph import KINEMATICS
 from coartic.method import Information
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
 
-MODEL_BASED = frozenset(
-    {
-        Information.GOALS,
-        Information.FORWARD_KINEMATICS,
-        Information.JACOBIAN,
-        Information.KINEMATIC_MODEL,
-    }
-)
+MODEL_BASED = KINEMATICS | {Information.KINEMATIC_MODEL}
 """Information of a planner with a model of the kinematics, besides its cost."""
 
 Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk", "hand-jerk"]
@@ -195,20 +190,15 @@ class TrajectoryProblem:
                     chosen = right if each == "right" else 1 - right
                     jerks = _hand_jerks(robot, each, q0, steps, durations, rates)
                     objective += casadi.dot(chosen, jerks)
-        lower = [-np.inf] * len(limits)
-        upper = [0.0] * len(limits)
+        self._lower = np.array([-np.inf] * len(limits) + [0.0] * bool(order))
+        self._upper = np.zeros(len(self._lower))
         if order:
             limits.append(casadi.sum1(durations) - goals)
-            lower.append(0.0)
-            upper.append(0.0)
-        self._lower, self._upper = np.array(lower), np.array(upper)
         self._evaluations = goals * len(hands)  # forward kinematics in one evaluation of the limits
         variables = {"steps": steps, "lengths": lengths, "durations": durations, "depth": depth,
                      "rates": casadi.veccat(*rates)}  # fmt: skip
         sizes = [variable.numel() for variable in variables.values()]
-        places = (
-            slice(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True)
-        )
+        places = itertools.starmap(slice, pairwise(itertools.accumulate(sizes, initial=0)))
         self._at = dict(zip(variables, places, strict=True))  # in the vector of all variables
         self._solver = casadi.nlpsol(
             "trajectory",
@@ -335,11 +325,9 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
 def _hand_jerks(
     robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
 ) -> Any:
-    """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column.
-    The joints follow quintics between the end states, as for minimum jerk: ``q0`` is the start,
-    ``(dof,)``; ``steps``, ``(dof, G)``, and ``durations``, ``(G,)``, are changes and durations of
-    the segments; ``rates`` are velocities and accelerations at start and goals, ``(dof, G + 1)``.
-    """
+    """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column,
+    along quintics between the end states: start ``q0``, changes ``steps``, ``(dof, G)``, and
+    ``rates``, velocities and accelerations at start and goals, ``(dof, G + 1)`` each."""
     powers = np.arange(6)
     integrals, here = [], q0
     for g in range(steps.shape[1]):

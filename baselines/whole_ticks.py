@@ -21,7 +21,7 @@ from coartic import Movement, Task
 from coartic.baselines.trajectory_problem import Instance, PathPlan, TrajectoryProblem
 from coartic.method import Session
 from coartic.motion.movement import move
-from coartic.robot import Array, Hand
+from coartic.robot import Array
 
 MOST_ROUNDINGS = 64  # of a plan that are tried: all with up to seven goals
 _SLACK = 1e-6  # of a step: lengths are known to the solver's tolerance
@@ -94,8 +94,17 @@ class Rounding:
         plan pays if its path grows by fewer steps than the ticks that it saves. ``worth`` is asked
         whether a number of ticks is of interest; plans that cannot have such a number are not
         sought."""
-        goals = len(self._instance.hands)
-        able = _mergeable(task, self._instance.hands)
+        hands, goals = self._instance.hands, len(self._instance.hands)
+        # The hand can be there before: at the start, since another hand hits the goal before, or
+        # since the discs of both goals overlap.
+        start = task.robot.forward_kinematics(task.q0, hands[0])
+        able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
+        able += [
+            g
+            for g in range(1, goals)
+            if hands[g] != hands[g - 1]
+            or math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
+        ]
         waiting: deque[tuple[tuple[int, ...], PathPlan]] = deque([((), plan)])
         while waiting:
             merged, shortest = waiting.popleft()
@@ -154,21 +163,6 @@ class Rounding:
         plan = self._problem.solve(instance, start, lengths=lengths, deep=deep)
         self._session.spend(**plan.spent)
         return plan
-
-
-def _mergeable(task: Task, hands: Sequence[Hand]) -> tuple[int, ...]:
-    """Return the goals (from 0) of a hand sequence that may be hit without a movement, as the hand
-    of the goal can be there before: at the start, or since another hand hits the goal before, or
-    since the discs of both goals overlap."""
-    start = task.robot.forward_kinematics(task.q0, hands[0])
-    able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
-    able += [
-        g
-        for g in range(1, len(hands))
-        if hands[g] != hands[g - 1]
-        or math.dist(task.goals[g], task.goals[g - 1]) <= 2 * task.radius
-    ]
-    return tuple(able)
 
 
 def movements(

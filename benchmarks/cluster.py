@@ -27,8 +27,8 @@ _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
 class Dask:
-    """Executor that performs jobs on the workers of a Dask scheduler, which have this version of
-    coartic.
+    """Executor that performs jobs on the workers of a Dask scheduler, which must have this version
+    of coartic.
 
     Parameters
     ----------
@@ -117,9 +117,9 @@ _kept = threading.local()
 
 
 def _remote(job: Job) -> list[Outcome]:
-    """Perform a job on the machine of a Dask worker, in a process that ends at its time limit, and
-    return the outcomes of its runs with the environment of this machine. Raises CoarticError if the
-    method has another version or code on this machine."""
+    """Perform a job on the machine of a Dask worker, in another process, and return the outcomes of
+    its runs with the environment of this machine. Raises CoarticError if the method has another
+    version or code on this machine, and if no process can work."""
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method = job.cell.method
     here = current_code(method)

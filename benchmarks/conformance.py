@@ -54,8 +54,7 @@ class Law(NamedTuple):
 
 
 def _law(name: str, problems: Iterable[str], finding: str) -> Law:
-    """Return a law that holds if there are no problems; the finding of a broken law is its first
-    problem."""
+    """Return a law that is broken if there is a problem; then the first problem is its finding."""
     problem = next(iter(problems), None)
     return Law(name, problem is None, problem or finding)
 
@@ -101,10 +100,9 @@ def check_method(
 def _laws_of_runs(
     info: MethodInfo, runs: Mapping[tuple[str, str], Run], checked_with: str
 ) -> Iterator[Law]:
-    """Yield the laws on the runs of a method, kept or broken: ``solution``, ``determinism``, ``no
-    hidden state``, ``limits``, ``information`` and ``failure``. ``runs`` holds the runs by kind,
-    such as ``first`` or ``other seed``, and name of the task; ``checked_with`` names the parameters
-    in words."""
+    """Yield the laws on the runs of a method: ``solution``, ``determinism``, ``no hidden state``,
+    ``limits``, ``information`` and ``failure``. ``runs`` holds the runs by kind, such as ``first``,
+    and name of the task; ``checked_with`` names the parameters."""
 
     def of_kind(kind: str) -> dict[str, Outcome]:
         return {task: run.outcome for (each, task), run in runs.items() if each == kind}
@@ -137,8 +135,7 @@ def _laws_of_runs(
         ),
         f"executed and scored on {rewards}{checked_with}{asked}",
     )  # fmt: skip
-    by_seed = changes("other seed", "declared not to be stochastic, but another seed on {}")
-    differs = next(changes("other seed", "{}"), None)
+    by_seed = [*changes("other seed", "declared not to be stochastic, but another seed on {}")]
     yield _law(
         "determinism",
         chain(
@@ -147,7 +144,7 @@ def _laws_of_runs(
             () if info.stochastic else by_seed,
         ),
         f"the same result under {'the same' if info.stochastic else 'any'} seed, in one process "
-        "and in another" + ("" if differs or not info.stochastic else _NO_SEED),
+        "and in another" + ("" if by_seed or not info.stochastic else _NO_SEED),
     )
     yield _law(
         "no hidden state",
@@ -190,8 +187,8 @@ def _laws_of_runs(
 
 
 def _laws_of_declaration(info: MethodInfo) -> list[Law]:
-    """Return laws ``declaration`` (title and citation are there) and ``parameters`` (parameters
-    survive JSON, are validated and cannot be changed) of a method."""
+    """Return laws ``declaration`` (title and citation are there) and ``parameters`` (defaults
+    survive JSON, unknown names are refused, and values cannot be changed) of a method."""
     parameters, config = info.complete({}), info.rules()["config"]
     again, problems = info.complete(parameters), []
     if again != parameters:

@@ -39,10 +39,10 @@ def include_folders(
 ) -> list[Job]:
     """Copy the runs of other folders into ``out``; store there, and return, the plan of all runs.
 
-    ``shipped`` names the shipped results. To perform the returned plan in ``out`` makes only those
-    runs of ``plan`` that no folder has; cells outside ``plan`` keep the runs that their folder has,
-    those on ``tasks`` alone if tasks are named.
-    A warning names an unfinished folder, and a folder with fewer runs than ``plan`` asks for.
+    ``shipped`` names the shipped results. The returned plan has the cells of ``plan`` and of the
+    folders; if ``tasks`` are named, the folders give only cells on these tasks. Runs of ``plan``
+    that no folder has are missing in ``out``: :func:`.perform` makes them. A warning names an
+    unfinished folder, and a folder with fewer runs than ``plan`` asks for.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
     at 0, if the folders do not go together, if one does not pass the checks of ``coartic verify``,
@@ -88,13 +88,9 @@ def include_folders(
 def _join(
     plan: Sequence[Job], sources: Mapping[str, Store], tasks: Collection[str] | None
 ) -> list[Job]:
-    """Return the plan with the cells of the sources (stores by name), its own cells first; of the
-    sources only cells on ``tasks``, unless None. A cell has the runs that the plan asks for, and
-    the runs that follow in the sources without a gap.
-
-    Raises CoarticError if sources contradict each other, or contradict the plan on a cell with runs
-    that no source has.
-    """
+    """Return the plan with the cells of the sources (stores by name), with ``tasks`` only cells on
+    these tasks. A cell has the runs that the plan asks for, and the runs that follow in
+    the sources without a gap. Raises CoarticError for a contradiction (:func:`_check_together`)."""
     whole = {name: source.plan() for name, source in sources.items()}
     plans = {
         name: [job for job in jobs if tasks is None or job.cell.task.name in tasks]
@@ -132,10 +128,9 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of a source whose plan has runs that the joined plan lacks, and of a source with a cell
-    of a stochastic method that this command does not ask for, and of which it has fewer runs than
-    the command asks for of some cell. ``asked``: numbers of runs that the command asks for, by
-    digest of the cell; ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
+    """Warn of a source whose plan has runs that the joined plan lacks, and of a source with fewer
+    runs of a cell than the command asks for of other cells. ``asked``: numbers of runs by digest of
+    the cell; ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
@@ -152,11 +147,9 @@ def _warn_of_gaps(
                 f"{words}, and gives those before the first that is missing", stacklevel=4
             )
         if few:
-            words = (
-                f"{counted(len(jobs[few[0].cell.digest].numbers), 'run')} of {_named(few)}; "
-                f"{most} are asked for here"
-            )
-            warnings.warn(f"{name} has {words}", stacklevel=4)
+            runs = counted(len(jobs[few[0].cell.digest].numbers), "run")
+            words = f"{name} has {runs} of {_named(few)}; {most} are asked for here"
+            warnings.warn(words, stacklevel=4)
 
 
 def _named(jobs: Sequence[Job]) -> str:
@@ -167,12 +160,9 @@ def _named(jobs: Sequence[Job]) -> str:
 
 
 def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
-    """Check that jobs agree, within a part of a plan and between parts. ``parts`` holds the jobs of
-    each part by its origin, such as a folder; ``first`` stands for a part without jobs.
-
-    Raises CoarticError if two jobs differ in suite, seed or trial budget, in the definition of a
-    task of one name, in the version or code of a method, or in a parameter of a cell.
-    """
+    """Raise CoarticError if two jobs differ in suite, seed or trial budget, in the definition of a
+    task of one name, in the version or code of a method, or in a parameter of a cell. ``parts``
+    holds jobs by their origin, such as a folder; ``first`` stands for a part without jobs."""
     first_said: dict[str, tuple[str, object]] = {}
 
     def agree(where: str, what: str, value: object, hint: str = "") -> None:
@@ -198,11 +188,9 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 
 def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, str], str]) -> None:
-    """Copy the runs of a source's plan that the target lacks. ``origin`` has the folder of each run
-    of the target, by :func:`.run_identity` of its id; the copied runs are added.
-
-    Raises CoarticError if the target has another result of a run.
-    """
+    """Copy the runs of a source's plan that the target lacks; add them to ``origin``, the folder of
+    each run by :func:`.run_identity` of its id. Raises CoarticError if the target has another
+    result of a run."""
     there = {run_identity(run_id): (run_id, result) for run_id, result in target.results()}
     results = source.results()
     for first in range(0, len(results), _WRITTEN_AT_ONCE):

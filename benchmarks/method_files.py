@@ -116,15 +116,8 @@ def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
                     why = f"{shown}: cannot be imported: {error_line(error)}"
                     raise CoarticError(why) from None
                 found = dict.fromkeys(methods_in(module))
+                content = [asdict(info) for info in _methods_of_module(module, found, shown, path)]
                 methods = {method.name: method for method in found}
-                if len(methods) < len(found):
-                    names = [method.name for method in found]
-                    twice = next(name for name in names if names.count(name) > 1)
-                    raise CoarticError(
-                        f"{shown}: two classes are called {twice!r}: give one another name"
-                    )
-                infos = _methods_of_module(module, methods.values(), shown, path)
-                content = [asdict(info) for info in infos]
             else:
                 content = answer(methods[name], question, *arguments)
             text = json.dumps([number, "answer", content])
@@ -142,9 +135,19 @@ def _methods_of_module(
 ) -> Iterator[MethodInfo]:
     """Yield the declarations of ``methods``, the classes that ``module`` defines, with their code;
     ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, a wrong
-    declaration of name, title, citation or information, and a file that cannot be read."""
+    declaration, and a file that cannot be read."""
     for method in methods:
-        _check_declaration(method, origin)
+        where = f"{origin}: {method.__name__}"
+        for attribute in ("name", "title", "citation", "tuned_on"):
+            text = getattr(method, attribute, None)
+            if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
+                raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
+        information = getattr(method, "information", None)
+        if not isinstance(information, frozenset | set) or not all(
+            isinstance(each, Information) for each in information
+        ):
+            wrong = f"{where}: information must be a set of Information, not {information!r}"
+            raise CoarticError(wrong)
         try:
             code = code_of(method, file)
         except CoarticError as error:
@@ -161,23 +164,4 @@ def _methods_of_module(
         why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
         raise CoarticError(
             f"{origin}: defines no subclass of coartic.Method or coartic.Optimiser{why}"
-        )
-
-
-def _check_declaration(method: type[Method], origin: str) -> None:
-    """Check that a method declares its name, title, citation and what it was tuned on, texts of
-    one line, and its information; ``origin`` is the name of its file in messages. Raises
-    CoarticError for a missing or wrong declaration. The registry checks the form of ids
-    (:func:`~.registry.check_id`)."""
-    where = f"{origin}: {method.__name__}"
-    for attribute in ("name", "title", "citation", "tuned_on"):
-        text = getattr(method, attribute, None)
-        if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
-            raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
-    information = getattr(method, "information", None)
-    if not isinstance(information, frozenset | set) or not all(
-        isinstance(i, Information) for i in information
-    ):
-        raise CoarticError(
-            f"{where}: information must be a set of Information, not {information!r}"
         )

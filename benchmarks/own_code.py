@@ -120,16 +120,10 @@ def _loaded() -> dict[str, str]:
         for name, module in [*sys.modules.items()]
         if isinstance(path := getattr(module, "__file__", None), str)
     }
-    inside = tuple(f"{folder}{os.sep}" for folder in _ours())
+    folders = [PACKAGE, *(PACKAGE / name for name in OUR_PACKAGES)]  # within it, or linked there
+    ours = (each(folder) for folder in folders for each in (os.path.abspath, os.path.realpath))
+    inside = tuple(f"{folder}{os.sep}" for folder in ours)
     return {name: path for name, path in files.items() if not path.startswith(inside)}
-
-
-@cache
-def _ours() -> tuple[str, ...]:
-    """Return the absolute paths of the folders of this project's packages, as they are imported and
-    with links followed."""
-    folders = [str(PACKAGE), *(str(PACKAGE / name) for name in OUR_PACKAGES - {"coartic"})]
-    return tuple({*map(os.path.abspath, folders), *map(os.path.realpath, folders)})
 
 
 @cache
@@ -146,7 +140,7 @@ def _is_installed(path: str) -> bool:
 @cache
 def _distributions() -> dict[str, list[str]]:
     """Return, for each name that can be imported, such as ``yaml``, a list of the names of the
-    installed packages that have it, such as ``["PyYAML"]``; always the same dictionary."""
+    installed packages that have it, such as ``["PyYAML"]``."""
     return dict(metadata.packages_distributions())
 
 

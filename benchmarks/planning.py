@@ -162,8 +162,8 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
-    of_suite = _suite_jobs(suite, registered, own, task_named, job)
-    jobs = list(itertools.islice(of_suite, MOST_CELLS + 1))
+    in_blocks = _suite_jobs(suite, registered, own, task_named, job)
+    jobs = list(itertools.islice(in_blocks, MOST_CELLS + 1))
     if len(jobs) > MOST_CELLS:
         raise CoarticError(
             f"suite {suite.name!r} asks for more than {MOST_CELLS:,} combinations "
@@ -173,8 +173,16 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     if not request.methods:
         ids = dict.fromkeys(each.cell.method.name for each in jobs) | ids
     methods = [registered[name] for name in ids]
-    jobs += _extra_jobs(jobs, own, methods, job)
     there = tasks_by_name([*(each.cell.task for each in jobs), *own.values()])
+    of_suite = {each.cell.method.name for each in jobs}
+    planned = {(each.cell.task.name, each.cell.label) for each in jobs}
+    jobs += [
+        job(task, method)
+        for task, method in itertools.product(there.values(), methods)
+        if (task.name in own or method.name not in of_suite)
+        and (task.name, method.name) not in planned
+        and method.why_not(task) is None
+    ]
     if wrong := [name for name in names if name not in there]:
         hint = " Instances are a range, such as long/v1/i000..i009."
         words = (f"{unknown('task', name, there)}{hint * ('/' in name)}" for name in wrong)
@@ -236,12 +244,9 @@ def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
 def _asked_tasks(
     suite: Suite, request: Request
 ) -> tuple[dict[str, None], dict[str, Task], TaskNamed]:
-    """Return the names of the tasks that a request asks for, the tasks that it brings by name, and
-    a function that gives a task by its name.
-
-    A request brings the task files, tasks and instances that the suite does not have. Raises
-    CoarticError for a task whose name belongs to another task.
-    """
+    """Return the names of the tasks that a request asks for; the tasks that it brings, which the
+    suite does not have, by name; and a function that gives a task by its name. Raises CoarticError
+    for a task whose name belongs to another task."""
     for path in request.family_files:
         check_kind(str(path), "family")
     of_tasks = [each.rpartition("/")[0] for each in request.tasks if isinstance(each, str)]
@@ -287,13 +292,9 @@ def _suite_jobs(
     task_named: TaskNamed,
     job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs of a suite. ``job`` makes a job of task, method, parameters and number of runs
-    (:func:`_job_of`); ``own`` has the names of the tasks that the request brings; ``task_named``
-    returns a task by name.
-
-    Raises CoarticError for a method that is unknown, or that does not apply to a task of a block
-    without wildcards, and for parameters that a method does not take.
-    """
+    """Yield the jobs of a suite, made by ``job`` (:func:`_job_of`). Raises CoarticError for an
+    unknown method, for a method that does not apply to a task of a block without wildcards, and for
+    parameters that a method does not take."""
     for block in suite.blocks:
         ids = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
         is_open = WILDCARD in "".join((*block.methods, *block.tasks))  # skip what does not apply
@@ -311,26 +312,6 @@ def _suite_jobs(
                         )
 
 
-def _extra_jobs(
-    jobs: Sequence[Job],
-    own: Mapping[str, Task],
-    methods: Sequence[MethodInfo],
-    job: Callable[..., Job],
-) -> Iterator[Job]:
-    """Yield the jobs that a request adds to ``jobs``, the jobs of the suite: ``methods`` new to the
-    suite on the tasks of the suite, and all ``methods`` on ``own``, the tasks that the request
-    brings, where they apply. ``job`` makes a job of task and method."""
-    of_suite = {each.cell.method.name for each in jobs}
-    there = {(each.cell.task.name, each.cell.label) for each in jobs}
-    new = [method for method in methods if method.name not in of_suite]
-    for task, method in (
-        *itertools.product(tasks_by_name(each.cell.task for each in jobs).values(), new),
-        *itertools.product(own.values(), methods),
-    ):
-        if (task.name, method.name) not in there and method.why_not(task) is None:
-            yield job(task, method)
-
-
 def _job_of(
     suite: Suite,
     request: Request,
@@ -339,13 +320,9 @@ def _job_of(
     parameters: Mapping[str, Any] | None = None,
     runs: int | None = None,
 ) -> Job:
-    """Return the job of a method with parameters on a task: its cell and the numbers of its runs.
-
-    Runs: ``request.runs``, else ``runs`` (the number of the suite's block), else ``suite.runs``.
-    Trials, if the method has this parameter: ``request.trials``, else ``trials`` in ``parameters``,
-    else ``suite.trials``. A method that is not stochastic has run 0 alone, and no run if
-    ``request.runs`` is a range that does not begin at 0.
-    """
+    """Return the job of a method with parameters on a task. Runs and trials come from the request,
+    or else from the block (``runs``, ``parameters``), or else from the suite. A method that is not
+    stochastic has run 0 alone, and no run if ``request.runs`` does not begin at 0."""
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
         parameters.pop("trials", None)
@@ -372,11 +349,8 @@ def _why_nothing_runs(
 
 
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
-    """Return the first job of each cell.
-
-    Raises CoarticError for two numbers of runs of a cell, and for more than 10,000,000 trials a
-    run.
-    """
+    """Return the first job of each cell. Raises CoarticError for two numbers of runs of a cell, and
+    for more than 10,000,000 trials a run."""
     distinct = dict[str, Job]()
     for job in jobs:
         cell, where = job.cell, f"{job.cell.task.name} x {job.cell.label}"

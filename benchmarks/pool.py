@@ -68,7 +68,6 @@ _REPEATED = (None, -9, 255, _UNKEPT)  # exit codes (late, killed, lost server): 
 _IDLE_S = 60.0  # longest wait of a process for jobs
 _SPINS_S = 2.0  # CPU time beyond its limit after which a job is ended from outside
 _END_S = 1.0  # time for a killed process to end
-_OUT_OF_TIME = ("SIGPROF", "SIGXCPU")
 MORE_FILES = "after `ulimit -n 1024`, which allows more open files"
 _BEGUN = "begun"  # file among the answers of a process
 _NEXT_JOB = b"\0next job\0"  # in the output of a process
@@ -93,14 +92,8 @@ class Local:
     def perform(
         self, jobs: Sequence[Job], *, in_order: bool = False
     ) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with the outcomes of its runs, in the order in which jobs finish. The jobs
-        of a method are divided among processes; with ``in_order`` one process performs them all in
-        their order. A job whose process ends is repeated once if its method may not be the cause,
-        or else has outcomes ``timeout`` or ``crashed`` (:meth:`Workers.perform`).
-
-        Raises CoarticError if five processes in a row end before their first job, and if answers
-        cannot be written.
-        """
+        """Let new workers perform jobs; yield each job with the outcomes of its runs
+        (:meth:`Workers.perform`)."""
         with closing(Workers(self)) as workers:
             yield from workers.perform(jobs, in_order=in_order)
 
@@ -146,8 +139,9 @@ class Workers:
         try:
             while waiting or workers:
                 while waiting and len(workers) < most:
-                    workers.append(self.worker_for(waiting[0]))
-                    workers[-1].give(waiting.popleft())
+                    part = waiting.popleft()
+                    workers.append(self.worker_for(part[0].cell.method.key))
+                    workers[-1].give(part)
                 sentinels = [w.process.sentinel for w in workers if w.process.pid is not None]
                 connection.wait(sentinels, _POLL_S)
                 for worker in tuple(workers):
@@ -163,7 +157,9 @@ class Workers:
                     worker.end()
                     if not worker.jobs:
                         continue
-                    self.check_room()
+                    room = Path(self.folder.name, "room")  # without room an answer can be lost
+                    room.write_bytes(bytes(_ROOM))
+                    room.unlink()
                     job = worker.jobs[0]
                     begun = worker.since_s < math.inf or exit_code == _UNKEPT
                     lost = 0 if begun else lost + 1
@@ -194,23 +190,15 @@ class Workers:
             for worker in workers:
                 worker.end()
 
-    def worker_for(self, jobs: Sequence[Job]) -> Worker:
-        """Return a worker for jobs of one method: the worker that waits for jobs if its method is
-        the same; otherwise that worker is ended, and a new worker, not yet started, is returned."""
-        method, waits = jobs[0].cell.method.key, self._idle
-        self._idle = None
-        if waits is not None and waits.method == method:
-            return waits
+    def worker_for(self, method: tuple[str, str, str]) -> Worker:
+        """Return the worker that waits for jobs if it has this method; otherwise end it, and return
+        a new worker, not yet started."""
+        waits, self._idle = self._idle, None
         if waits is not None:
+            if waits.method == method:
+                return waits
             waits.end()
         return Worker(self.folder.name, method, self.local)
-
-    def check_room(self) -> None:
-        """Raise OSError if a file of 1 MiB cannot be written into the folder of answers, whose loss
-        can be the reason why a process ended."""
-        place = Path(self.folder.name, "room")
-        place.write_bytes(bytes(_ROOM))
-        place.unlink()
 
 
 class Worker:
@@ -235,7 +223,7 @@ class Worker:
 
     def give(self, jobs: Sequence[Job]) -> None:
         """Send jobs to the process, start it if it is new, and compile the kernels of the first
-        job's task in this process, too. If the process cannot start, nothing is raised and
+        job's task in this process, too. If the process cannot start, nothing is raised, and
         :attr:`exit_code` is 1."""
         self.jobs.extend(jobs)
         self.since_s = self._since_cpu_s = math.inf
@@ -268,7 +256,7 @@ class Worker:
     @property
     def spins(self) -> bool:
         """True if the current job has used 2 s of CPU time more than its limit: its method ignores
-        the signals that end the process."""
+        the signal that ends the process."""
         limit_s = (self.jobs and self.jobs[0].time_limit_s) or _LONGEST_S
         return self.cpu_s > self._since_cpu_s + limit_s + _SPINS_S
 
@@ -320,7 +308,7 @@ class Worker:
         if exit_code is None and not spins:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
             return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
-        if exit_code is None or (exit_code < 0 and signal.Signals(-exit_code).name in _OUT_OF_TIME):
+        if exit_code is None or (exit_code < 0 and signal.Signals(-exit_code).name == "SIGPROF"):
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         if exit_code == _UNKEPT:
             why = "a method removes its folder or limits the size of files"
@@ -335,19 +323,17 @@ class Worker:
 
 
 def _read(output: connection.Connection, kept: bytearray) -> None:
-    """Read what a process prints into pipe ``output``, so that it never waits, until no process can
-    write there any more; ``kept`` always holds the last 4000 bytes."""
+    """Read what a process prints into pipe ``output`` until no process can write there any more;
+    ``kept`` always holds the last 4000 bytes."""
     with output:
         while text := os.read(output.fileno(), 2**16):
             kept[:] = (kept + text)[-_PRINTED:]
 
 
 def _perform_jobs(folder: Path, pipe: Any, prints: Any, workers: int, verbose: bool) -> None:
-    """Perform the jobs that come through a pipe, lists of jobs, in this process, one of ``workers``
-    that share the machine, and write an answer to each job into ``folder``, files ``0``, ``1`` and
-    so on. What the process prints goes into pipe ``prints``, if ``verbose`` to the terminal. File
-    ``begun`` appears when the kernels of a list are loaded: then the clock of its first job starts.
-    End when the pipe is closed, or when no job has come for a minute."""
+    """Perform lists of jobs that come through ``pipe``, in one of ``workers`` processes; write an
+    answer to each job into ``folder``, files ``0``, ``1`` and so on, and ``begun`` when the first
+    job of a list begins. Prints go into pipe ``prints``, if ``verbose`` to the terminal."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
     begin_worker(folder.parent, streams=1 if verbose else 3)
     if verbose:
@@ -403,25 +389,17 @@ def _answer_to(job: Job) -> bytes:
 
 
 def _limit_cpu_time(limit_s: float) -> None:
-    """Let the system end this process after ``limit_s`` more seconds of CPU time (not on Windows),
-    by SIGPROF, or by SIGXCPU if a method has turned SIGPROF off; 0: after a day."""
-    if not hasattr(signal, "setitimer"):
-        return
-    import resource
-
-    for number in (signal.SIGPROF, signal.SIGXCPU):  # an earlier method may have changed them
-        signal.signal(number, signal.SIG_DFL)
-    _, most = resource.getrlimit(resource.RLIMIT_CPU)
-    with contextlib.suppress(ValueError):  # a limit from outside is lower
-        whole_s = math.ceil(time.process_time() + (limit_s or _LONGEST_S)) + 1
-        resource.setrlimit(resource.RLIMIT_CPU, (whole_s, most))
-    signal.setitimer(signal.ITIMER_PROF, limit_s)
+    """Let the system end this process by SIGPROF after ``limit_s`` more seconds of CPU time (not on
+    Windows); 0 lifts the limit."""
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGPROF, signal.SIG_DFL)  # an earlier method may have changed it
+        signal.setitimer(signal.ITIMER_PROF, limit_s)
 
 
 def _bound_resources(workers: int) -> None:
     """Limit the memory of this process, one of ``workers`` that share 80 % of the machine's memory
     (at least 1 GiB each), and the size of its files to 256 MiB, so that a method gets an error
-    before the machine swaps or the disk is full; do nothing where the system has no such limits."""
+    before the machine swaps or the disk is full."""
     try:
         import resource
 

@@ -30,8 +30,8 @@ AFTER_ANOTHER = "with the same seed after another run"
 def find_run(prefix: str, folder: Path) -> Run:
     """Find the run of a results folder whose id begins with ``prefix``.
 
-    Raises CoarticError if there is no such run, or more than one, and for a folder that cannot be
-    read.
+    Raises CoarticError if there is no such run, or more than one, for a prefix that no id can have,
+    and for a folder that cannot be read.
     """
     if not prefix or not set(prefix) <= set("0123456789abcdef-."):
         raise CoarticError(
@@ -74,9 +74,7 @@ def perform_in_order(
             yield from score(job, outcomes)
 
 
-def perform_runs_again(
-    runs: Sequence[Run], registered: Registry, executor: Local | None = None
-) -> Iterator[tuple[Run, Run]]:
+def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tuple[Run, Run]]:
     """Perform stored runs again, by the methods that are here, and yield each with the new run,
     which is not stored, in the order in which they finish. ``registered`` must have the methods.
 
@@ -96,7 +94,7 @@ def perform_runs_again(
             ) from None
         jobs.append(replace(run.job, cell=replace(run.cell, method=method)))
         of_job[id(jobs[-1])] = run
-    with closing((executor or Local()).perform(jobs)) as answers:
+    with closing(Local().perform(jobs)) as answers:
         for job, outcomes in answers:
             (again,) = score(job, outcomes)
             yield of_job[id(job)], again

@@ -13,6 +13,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ class Progress:
     total: int
     """Runs of the plan."""
     present: int = 0
-    """Runs of the plan that the folder had before."""
+    """Runs of the plan that the folder had before, except runs that are performed again."""
     stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     """Runs that the folder has from another version or code of their method, by the method, that
     version and the present one. They are kept, and no report shows them."""
@@ -72,7 +73,7 @@ class Progress:
     """Runs of earlier commands in the folder that the plan does not ask for, by the seed of their
     suite. They are kept, and no report shows them."""
     wall_s: float = 0.0
-    """Seconds from the call until the last run was written."""
+    """Wall time of the call, s; 0 until it ends."""
     waiting: Counter[str] = field(default_factory=Counter)
     """Runs still to perform, by method."""
     took: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -102,8 +103,8 @@ class Progress:
 
     @property
     def unused(self) -> Iterator[str]:
-        """Sentences on stored runs that are not used, as another version of their method made them:
-        a sentence for each method and version."""
+        """Sentences on stored runs that are not used because another version of their method made
+        them: a sentence for each method and version."""
         for (method, old, now), count in self.stale.items():
             changed = f"by version {old}, and here it is {now}"
             if not (VERSION.fullmatch(old) and VERSION.fullmatch(now)):
@@ -241,6 +242,9 @@ def perform(
             watches.clear()
             warnings.warn(f"watch is not called again: {error_line(error)}", stacklevel=3)
 
+    def seconds(run: Run) -> float:
+        return max(run.outcome.times.wall_s or math.inf, LONG_S)
+
     executor = Local() if executor is None else executor
     if not isinstance(executor, Local | Dask):
         known = " or ".join(_EXECUTORS.values())
@@ -272,7 +276,7 @@ def perform(
                     for run in runs:
                         if run.outcome.status == "ok" and not run.cell.method.is_ours:
                             name = run.cell.method.name
-                            chosen[name] = min(chosen.get(name, run), run, key=_seconds)
+                            chosen[name] = min(chosen.get(name, run), run, key=seconds)
                         progress.finish(run)
                         tell(run.cell)
             jobs = alone
@@ -293,28 +297,18 @@ def perform(
             if any(AFTER_ANOTHER in doubt for doubt in of_run):
                 details = run.outcome.details | {EARLIER: [run.cell.task.name]}
                 store.write([replace(run, outcome=replace(run.outcome, details=details))])
-        known, progress.marks = progress.marks, store.marks()
-        found = {sentence for of_method in known.values() for sentence in of_method}
-        marks = [each for of_method in progress.marks.values() for each in of_method]
-        for doubt in [*(each for each in marks if each not in found), *doubts]:
+        known, progress.marks = {*chain(*progress.marks.values())}, store.marks()
+        new = [mark for mark in chain(*progress.marks.values()) if mark not in known]
+        for doubt in (*new, *doubts):
             warnings.warn(doubt, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
 
 
-def _seconds(run: Run) -> float:
-    """Return the wall time of a run, s, at least 60; infinite if it is not known."""
-    return max(run.outcome.times.wall_s or math.inf, LONG_S)
-
-
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the missing runs of the plan, a job for each cell; count the runs of the plan that
-    ``store`` has in ``progress``.
-
-    A run that crashed is performed again, and so is a run that timed out under a lower time limit,
-    unless the code of the method is not here. Raises CoarticError if runs are missing whose method
-    has no code here.
-    """
+    """Return the missing runs of the plan, a job for each cell, with runs that crashed or timed out
+    under a lower limit; count the other runs in ``progress``. Raises CoarticError if runs are
+    missing whose method has no code here."""
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
         job = plan[position]
@@ -340,15 +334,10 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs for workers, and return them in the order in which they begin; results do not
-    depend on the division.
-
-    A run among many takes a fraction of its time alone, so a job is as large as its method allows.
-    With few runs each worker has a part; the last jobs that workers cannot share evenly are divided
-    further. Methods without a number of trials come first, as one run of a planner can take as long
-    as thousands of trials; other methods follow by their trials. So no long job is alone at the
-    end, and the time left does not rise.
-    """
+    """Divide jobs for workers, and return them in the order in which they begin."""
+    # A run among many takes a fraction of its time alone: jobs are as large as methods allow, and
+    # each worker has a part. Long jobs come first, as none may be alone at the end; one run of a
+    # planner, which has no number of trials, can take as long as thousands of trials.
 
     def divide(job: Job, size: int) -> Iterator[Job]:
         for first in range(0, len(job.numbers), size):

@@ -47,9 +47,9 @@ def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
 
 
 def _final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
-    """Return status and reason of a run from its outcome and the executions of its ``parts``:
-    ``infeasible`` if a part misses a goal, ``solver-failed`` if a part cannot be executed or an
-    outcome that is ok has no solution, else status and reason of the outcome."""
+    """Return status and reason of a run: ``infeasible`` if a part misses a goal, ``solver-failed``
+    if a part cannot be executed or an outcome that is ok has no solution, else status and reason of
+    the outcome."""
     for execution in parts.values():
         if isinstance(execution, Exception):
             return "solver-failed", f"the solution cannot be executed: {execution}"

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import itertools
-import math
 import os
+import sys
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from shlex import quote
@@ -32,10 +32,12 @@ TaskNamed = Callable[[str], Task]
 
 
 def _plain_value(value: Any) -> _Plain:
-    """Return the value of a parameter: a bool, finite number or text as it is, a list of numbers as
-    a tuple of floats. Raises PydanticCustomError for any other value."""
+    """Return the value of a parameter: a bool, finite number or text as it is, a list of finite
+    numbers, not empty, as a tuple of floats. Raises PydanticCustomError for any other value, such
+    as an integer beyond the range of floats."""
     numbers = value if isinstance(value, list | tuple) else [value]
-    if all(isinstance(each, int | float) and math.isfinite(each) for each in numbers) and numbers:
+    most = sys.float_info.max
+    if numbers and all(isinstance(each, int | float) and abs(each) <= most for each in numbers):
         return value if value is numbers[0] else tuple(map(float, numbers))
     if isinstance(value, str):
         return value
@@ -177,10 +179,8 @@ def load_suite(name: str) -> Suite:
 
 def _read_suite(path: Path) -> Suite:
     """Return the suite of a file. Raises CoarticError with a line for each of its first 20
-    problems, or with one line if it cannot be read or has tables ``[[cells]]``."""
+    problems, or with one line if it cannot be read."""
     content = read_toml(path)
-    if "cells" in content:
-        raise CoarticError(f"{path}: tables [[cells]] are called [[blocks]]")
     try:
         return Suite.model_validate({"name": path.stem, **content})
     except ValidationError as error:

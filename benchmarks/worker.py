@@ -209,10 +209,9 @@ def _place_of(error: BaseException, method: MethodInfo) -> str:
 
 
 def statement(result: Any, session: Session) -> dict[str, Any]:
-    """Check a method's result, and return two fields of :class:`Outcome` by name: ``parts``, lists
-    of movements, and ``details``. Raises SolutionError for a result that is no Result or cannot be
-    stored, and UndeclaredError for movements without a target if the corrective process is not
-    declared."""
+    """Return ``parts`` and ``details`` of an :class:`Outcome`, by name, from a method's result.
+    Raises SolutionError for a result that cannot be kept, and UndeclaredError for movements without
+    a target if the corrective process is not declared."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
     try:

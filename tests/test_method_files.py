@@ -105,7 +105,7 @@ AT_IMPORT = {
     "import json; json.dumps = lambda _: '[0, \"answer\", [0]]'": "cannot be read: ValidationError",
     "import json; json.dumps = lambda _: 7": "its process ended with exit code 1",
     f"{TEXT}\nclass Data(NearestHand): name, files = 'data', ['/dev/zero']": "it is a pipe or a",
-    f"{TEXT}\nclass Twice(NearestHand): pass": "two classes are called 'nearest-hand'",
+    f"{TEXT}\nclass Twice(NearestHand): pass": "'nearest-hand' is already taken",
 }
 
 

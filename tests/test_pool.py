@@ -61,9 +61,6 @@ HANDLED = {
     "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 0.5 s exceeded"),
     "shuts_its_ears": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
                        "        while True: pass", "timeout", "CPU time limit of 0.5 s exceeded"),
-    "is_deaf": ("signal.signal(signal.SIGPROF, signal.SIG_IGN)\n"
-                "        signal.signal(signal.SIGXCPU, signal.SIG_IGN)\n"
-                "        while True: pass", "timeout", "CPU time limit of 0.5 s exceeded"),
     "exits": ("print('last', 'words', file=sys.stderr, flush=True); os._exit(7)",
               "crashed", "exit code 7): last words"),
     "forks": ("os.fork() or signal.pause(); return Result(corrected(session))", "ok", ""),

@@ -137,7 +137,7 @@ SUITES = [
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5; it should be a whole number"),
     (suite('["ascending"]', "3"), "blocks[0].tasks is 3; it should be a list"),
     (SUITE + "run = 3", "blocks[0].run is an unknown key; did you mean 'runs'?"),
-    (SUITE.replace("[[blocks]]", "[[cells]]"), "tables [[cells]] are called [[blocks]]"),
+    (SUITE + f"parameters = {{noise_sd = {10**400}}}", "a finite number, a text or a list"),
     (SUITE + "move = {goal = 4, by = [[0, 1]]}", "has no goal 4 to move"),
     (SUITE + "move = {goal = 2, by = [[0, 1e9]]}", "it should be at most 10000"),
 ]
@@ -146,6 +146,7 @@ METHODS = [
     ("x = 1", "defines no subclass of coartic.Method"),
     ("def (", "cannot be imported: SyntaxError"),
     (method("def solve", "def solves"), "that is complete: A has no solve"),
+    (method('    name = "a"\n', ""), "name must be a text"),
     (method("title = ", ""), "title must be a text"),
     (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
     (method("frozenset()", '"goals"'), "information must be a set of Information"),
