@@ -253,7 +253,7 @@ figures.means(figures.PALETTE)
 
 
 FRESH = """
-import sys
+import importlib.util, sys
 import coartic
 def absent(*names):
     there = set(names) & set(sys.modules)
@@ -267,6 +267,9 @@ try:
 except SystemExit as stop:
     assert not stop.code
 absent("numba", "numpy", "pandas", "matplotlib", "coartic.baselines", "coartic.analysis")
+if importlib.util.find_spec("gymnasium"):
+    import coartic.gym
+absent("numba", "matplotlib", "torch")
 from coartic.runs.method_info import load_method
 import coartic.benchmarks.pool
 assert load_method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"

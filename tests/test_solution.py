@@ -124,21 +124,6 @@ def test_a_goal_is_hit_by_one_hand():
         execute(tiny_task(), both)
 
 
-@pytest.mark.parametrize(
-    ("field", "sentence"),
-    [
-        ("goal", "goal of a movement is .*; it must be a whole number"),
-        ("hand", "goal 1: the robot has no .* hand; it has 'right'"),
-        ("kind", "goal 1: unknown kind .*; known: "),
-    ],
-)
-@pytest.mark.parametrize("value", [np.zeros(10), None, [1]])
-def test_what_is_no_field_of_a_movement_is_named(field, sentence, value):
-    movements = corrective_trial("ascending", "RRR").movements
-    with pytest.raises(CoarticError, match=sentence):
-        execute("ascending", [replace(movements[0], **{field: value}), *movements[1:]])
-
-
 def test_equal_contents_are_equal_before_and_after_use():
     """Whatever an object has computed and kept; arrays by their entries."""
     made = [
