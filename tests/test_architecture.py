@@ -267,13 +267,13 @@ try:
 except SystemExit as stop:
     assert not stop.code
 absent("numba", "numpy", "pandas", "matplotlib", "coartic.baselines", "coartic.analysis")
-if importlib.util.find_spec("gymnasium"):
-    import coartic.gym
-absent("numba", "matplotlib", "torch")
 from coartic.runs.method_info import load_method
 import coartic.benchmarks.pool
 assert load_method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
 absent("casadi", "pandas", "coartic.benchmarks.runner")
+if importlib.util.find_spec("gymnasium"):
+    import coartic.gym
+absent("numba", "matplotlib", "torch")
 import coartic.analysis.report.build
 absent("scipy.stats")  # before an interval is asked for
 from coartic import *

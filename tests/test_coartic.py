@@ -24,7 +24,7 @@ def test_a_wrong_hand_sequence_is_refused_with_the_choices(call):
     for wrong in ("rrr", "LLL", "RR", 3):
         with pytest.raises(ValueError, match="do not fit task 'ascending': .* R for each of 3"):
             call(load_task("ascending"), wrong)
-    for wrong in ("left", ()):
+    for wrong in ("left", (), ["L"]):
         with pytest.raises(ValueError, match="'left' and 'right'"):
             coartic.hand_sequences(TASK, wrong)
 

@@ -188,19 +188,22 @@ def test_a_task_that_a_method_lacks_is_not_reached():
 
 
 def test_one_more_task_of_one_method_changes_no_other_gap():
-    """Three methods share two tasks; one of them ran on a third."""
+    """Three methods share two tasks; one of them ran on a third. A fourth failed on a task, and a
+    fifth lacks it: they have no gap."""
     rewards = {"a": [-110, -120, -100], "b": [-105, -130], "c": [-101, -102]}
+    rewards |= {"d": [-100, np.nan], "e": [-100]}
     frame = pd.DataFrame(
         {"method": method, "task": task, "reward": reward, "best_known": -100}
         for method, of_method in rewards.items()
         for task, reward in zip("xyz", of_method, strict=False)
     )
     ranked = frames.ranking(frame)
-    assert ranked.gap.to_dict() == pytest.approx({"c": 0.015, "a": 0.15, "b": 0.175})
-    assert ranked.index.tolist() == ["c", "a", "b"]
-    assert (ranked.tasks == 2).all()
-    assert (ranked.missing == 0).all()
-    assert ranked.runs.to_dict() == {"a": 3, "b": 2, "c": 2}
+    assert ranked.gap.dropna().to_dict() == pytest.approx({"c": 0.015, "a": 0.15, "b": 0.175})
+    assert ranked.index.tolist() == ["c", "a", "b", "d", "e"]
+    assert ranked.tasks.tolist() == [2, 2, 2, 1, 1]
+    assert ranked.missing.tolist() == [0, 0, 0, 1, 1]
+    assert ranked.runs.to_dict() == {"a": 3, "b": 2, "c": 2, "d": 2, "e": 1}
+    assert ranked.failed["d"] == 1
 
 
 CARRIED = [-3, -2, -1, 0, 1, 1, 2, 2, 3, 4, 5, 9]

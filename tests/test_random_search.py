@@ -1,5 +1,7 @@
 """Random search in stages against a loop over single trials, and its runs of version 4.0.0."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -35,23 +37,30 @@ def one_by_one(name, seed, trials, ends, keep="postures", idle_arm=True):
     return [trial.rewards[0] for trial in made]
 
 
-@pytest.mark.parametrize("task", HANDS)
-@pytest.mark.parametrize("keep", ["postures", "targets"])
-@pytest.mark.parametrize("idle_arm", [True, False])
+ENDS = {
+    (40, 1): [],
+    (40, 4): [10, 20, 30],
+    (40, 7): [5, 11, 17, 22, 28, 34],  # 40 k / 7, rounded down
+    (13, 13): range(1, 13),  # a hill climber: the centre is the best trial so far
+    (1_030, 2): [515],
+}
+
+
 @pytest.mark.parametrize(
-    ("trials", "stages", "ends"),
+    ("task", "keep", "idle_arm", "trials", "stages"),
     [
-        (40, 1, []),
-        (40, 4, [10, 20, 30]),
-        (40, 7, [5, 11, 17, 22, 28, 34]),  # 40 k / 7, rounded down
-        (13, 13, range(1, 13)),  # a hill climber: the centre is the best trial so far
-        (1_030, 2, [515]),
+        *(
+            (*each, 40, 4)
+            for each in itertools.product(HANDS, ["postures", "targets"], [True, False])
+        ),
+        *(("two-armed-1", "postures", True, *each) for each in ENDS),
+        *(("descending", "targets", True, *each) for each in ENDS),
     ],
 )
-def test_trials_in_stages_are_those_made_one_by_one(task, keep, idle_arm, trials, stages, ends):
+def test_trials_in_stages_are_those_made_one_by_one(task, keep, idle_arm, trials, stages):
     options = {"hands": HANDS[task], "stages": stages, "keep": keep, "idle_arm": idle_arm}
     result, execution, session = solve(RandomSearch, task, trials=trials, **options)
-    rewards = one_by_one(task, 0, trials, ends, keep, idle_arm)
+    rewards = one_by_one(task, 0, trials, ENDS[trials, stages], keep, idle_arm)
     assert session.rewards == rewards
     assert execution.reward == max(rewards)
     assert result.details == {"evaluations": trials - 1}

@@ -68,6 +68,10 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
         ),
         (planned(posture(1.0), posture(2.0), hand="left"), "the robot has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
+        *(
+            ([Movement(goal, "right", "planned", WAY[0])], "it must be a whole number")
+            for goal in (None, [1], WAY)
+        ),
         ([Movement(1, "right", "jump", np.zeros(10))], "unknown kind 'jump'"),
         ([Movement(1, "right", "path", waypoints=[])], "a path needs waypoints"),
         ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),

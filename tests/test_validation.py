@@ -219,7 +219,7 @@ def test_an_argument(wrong, words, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("read", [load_task, lambda path: registry([path])])
-@pytest.mark.parametrize("kind", ["absent", "pipe", "device", "folder", "large", "long"])
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "large"])
 def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
     path = tmp_path / "mine.v1.toml"
     if kind == "pipe":
@@ -228,13 +228,10 @@ def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
         path.symlink_to("/dev/zero")
     elif kind == "folder":
         path.mkdir()
-    elif kind == "large":
+    else:
         with path.open("wb") as file:
             file.truncate(3_000_000_000)
-    elif kind == "long":
-        path = tmp_path / f"{'a' * 5000}.v1.toml"
-    words = r"(?i)mine.v1.toml.*no such file" if kind == "absent" else r"cannot be read|at most"
-    with pytest.raises(CoarticError, match=words) as caught:
+    with pytest.raises(CoarticError, match="cannot be read|at most") as caught:
         read(path)
     (line,) = str(caught.value).splitlines()
     assert len(line) < 700
@@ -311,10 +308,6 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["check", "two-armed/v1/i003"], "coartic draw"),
         (["run", "paper", "--runs", "two"], "--runs is 'two'; it must be a whole number from 1"),
         (["run", "paper", "--jobs", "0"], "--jobs is 0; it must be a whole number from 1"),
-        (
-            ["run", "paper", "--time-limit", "0"],
-            "--time-limit is 0; it should be at least 0.001",
-        ),
         (["list", "--method-file", NO_METHOD], "the name of a method file ends in .py"),
         (
             ["draw", ".", "--run", "0", "--width", "1.5"],
@@ -354,7 +347,7 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
 Trials = coartic.Optimiser.Parameters
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
 UNMASKED = "it should have no masked entries"
-SPAN = np.timedelta64(3)  # NumPy counts it among whole numbers
+SPAN = np.timedelta64(3, "s")  # NumPy counts it among whole numbers
 ODD = (
     *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
     *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
@@ -568,7 +561,6 @@ def test_only_findings_are_joined(wrong):
         (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),
         (lambda: movements_of("RX", np.zeros((2, 10))), "hands is 'RX'"),
         (lambda: movements_of("RR", "x"), "targets"),
-        (lambda: coartic.hand_sequences("two-armed-1", ["L"]), "list of .* 'left' and 'right'"),
         (lambda: Robot(links=(1, 1)), "Robot: links is an unknown key; did you mean 'left_l"),
         (
             lambda: ExplorationCondition("x", ("right",), True, True, "all"),
