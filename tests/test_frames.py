@@ -259,10 +259,6 @@ def test_runs_are_tidy(traced):
         values = traced.signature(name, replay=True)[runs.index]
         np.testing.assert_array_equal(values[of_learner], signature.each(replays))
         assert values[~runs.method.str.startswith("dual-process")].isna().all()
-    with pytest.raises(CoarticError, match="did you mean 'two-armed-1'"):
-        traced.executed("two-armed", "EC3")
-    with pytest.raises(CoarticError, match="did you mean 'first'"):
-        traced.signature("frist")
 
 
 def planted_scores():

@@ -162,6 +162,9 @@ def test_what_counts_of_a_python_file(tmp_path):
 
     assert {content(text) for text in SAME} == {content(SOURCE)}
     assert len({content(text) for text in [SOURCE, *OTHER]}) == 1 + len(OTHER)
+    compiled = tmp_path / "a.so"  # counts byte by byte
+    compiled.write_bytes(b"x = 1  # one")
+    assert own_code.content_of(str(compiled)) == b"x = 1  # one"
 
 
 ONLY_CONTENT = """
