@@ -253,7 +253,7 @@ figures.means(figures.PALETTE)
 
 
 FRESH = """
-import sys
+import importlib.util, sys
 import coartic
 def absent(*names):
     there = set(names) & set(sys.modules)
@@ -271,6 +271,9 @@ from coartic.runs.method_info import load_method
 import coartic.benchmarks.pool
 assert load_method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
 absent("casadi", "pandas", "coartic.benchmarks.runner")
+if importlib.util.find_spec("gymnasium"):
+    import coartic.gym
+absent("numba", "matplotlib", "torch")
 import coartic.analysis.report.build
 absent("scipy.stats")  # before an interval is asked for
 from coartic import *

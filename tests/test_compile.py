@@ -10,8 +10,6 @@ import numba
 import numpy as np
 import pytest
 
-from coartic import CoarticError
-from coartic.motion.compile import entry
 from tests.support.processes import ROOT, apart, forget, python
 
 pytestmark = pytest.mark.process
@@ -58,12 +56,6 @@ def test_settings_of_numba_in_a_folder_are_not_read(tmp_path):
         print(config.CACHE_DIR, config.DISABLE_JIT)"""
     done = python("-W", "error", "-c", code, cwd=tmp_path, NUMBA_CACHE_DIR="/ours")
     assert done.stdout.split() == ["/ours", "0"]
-
-
-def test_kernels_that_may_not_be_compiled_get_a_sentence(monkeypatch):
-    monkeypatch.setattr(numba.config, "DISABLE_JIT", True)
-    with pytest.raises(CoarticError, match="NUMBA_DISABLE_JIT is set: unset it"):
-        entry(abs)(1.0)
 
 
 def test_variables_that_numba_refuses_get_a_sentence(tmp_path):

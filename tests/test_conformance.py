@@ -181,13 +181,6 @@ def test_shipped_tasks_keep_every_law(methods, path):
         (GOOD.replace('"mine"', '"ascending"'), "name", "belongs to a different, shipped task"),
         (GOOD.replace("[5.0, 2.0]", "[5.0, 1.05]"), "distinct goals", "goals 1 and 2 lie within"),
         (
-            'locked_base = ["x", "y"]\nhands = ["right"]'
-            + GOOD.replace("[[5.0, 1.0], [5.0, 2.0]]", "[[2.5, 0.1], [3.0, 1.0]]"),
-            "solvable",
-            "goal 1: the corrective process did not converge with the right hand in 1 iteration: "
-            "the arm is straight and points at the goal; bend it",
-        ),
-        (
             'goals = [[20, 20]]\nlocked_base = ["x", "y"]\nhands = ["right"]\n'
             "[robot]\nright_links = [20, 20]\nleft_links = [1]\n"
             "[start]\nright = [0.5, 0.5]\nleft = [0]\n",

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coartic import TaskError, corrective_trial, load_task, problems
-from coartic.analysis.study import load
 from coartic.benchmarks.runner import run_suite
 from coartic.internal.limits import MOST_CELLS
 from coartic.tasks.families import (
@@ -23,11 +22,9 @@ from coartic.tasks.families import (
     instance_of,
     load_family,
     named_by,
-    read_family,
     shipped_families,
 )
 from coartic.tasks.task import Address, address_of, task_text
-from tests.support.suites import ROOT
 
 # Hashes of the released families, each with a task of each split that it draws. A family is never
 # changed: what makes these fail makes results under these names incomparable, and needs a new
@@ -48,27 +45,12 @@ addresses = st.builds(
 )
 
 
-def test_the_family_of_the_page_is_one(tmp_path):
-    page = (ROOT / "docs" / "reference" / "files.md").read_text(encoding="utf-8")
-    path = tmp_path / "mine.v1.toml"
-    path.write_text(page.partition("## Family")[2].split("```")[1].removeprefix("toml"))
-    task = instance_of(read_family(path), address_of("mine/v1/i000"))
-    assert 3 <= len(task.goals) <= 5
-
-
 @pytest.mark.parametrize("name", RELEASED)
 def test_a_released_family_and_its_instances_are_not_changed(name):
     family = json.dumps(shipped_families()[name].model_dump(mode="json"), sort_keys=True)
     drawn = [task_text(instance(f"{name}/{number}")) for number in ("i017", "d003", "2027-041")]
     text = "".join([family, *drawn])
     assert hashlib.sha256(text.encode()).hexdigest()[:16] == RELEASED[name]
-
-
-def test_an_instance_depends_on_its_name_alone():
-    names = named_by("two-armed/v1/i000..i011")
-    forwards = {name: task_text(instance(name)) for name in names}
-    instance.cache_clear()
-    assert {name: task_text(instance(name)) for name in reversed(names)} == forwards
 
 
 @given(addresses)
@@ -202,28 +184,6 @@ def test_a_family_that_cannot_be_met_ends():
         first_good(of_family(apart=99_000), address_of("two-armed/v1/i000"), most=20)
 
 
-def test_command_draws_and_writes_instances(coartic, tmp_path):
-    code, _, error = coartic("draw", "long/v1/i000..i001", "--out", tmp_path)
-    assert (code, error) == (0, "")
-    for name in named_by("long/v1/i000..i001"):
-        assert load_task(tmp_path / f"{name}.toml") == instance(name)
-    assert (tmp_path / "tasks.svg").read_text().startswith("<?xml")
-
-
-def test_a_family_of_ones_own_is_run_by_its_file(tmp_path, in_this_process):
-    shipped = FAMILY_FOLDER / "one-armed.v1.toml"
-    path = tmp_path / "mine.v1.toml"
-    path.write_text(shipped.read_text(encoding="utf-8"), encoding="utf-8")
-    select = {"tasks": ["mine/v1/i000"], "methods": ["corrective-alone/given"]}
-    report = run_suite("quick", tmp_path / "results", family_files=[path], **select)
-    (task,) = load(report.folder).tasks.values()
-    family = read_family(path)
-    assert task == instance_of(family, address_of("mine/v1/i000"))
-    assert task.goals != load_task("one-armed/v1/i000").goals  # numbers come from its name
-    with pytest.raises(TaskError, match="rename the file"):
-        run_suite("quick", tmp_path, family_files=[shipped])
-
-
 def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic, in_this_process):
     """Where a family is named; an instance of it where a task is named."""
     (tmp_path / "sub").mkdir()
@@ -233,6 +193,9 @@ def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic,
     task = load_task(f"{path}/i001")
     address = address_of("mine/v1/i001")
     assert task == instance_of(load_family(path), address)
+    assert task.goals != load_task("two-armed/v1/i001").goals  # numbers come from its name
+    with pytest.raises(TaskError, match="rename the file"):
+        run_suite("quick", "out", family_files=[FAMILY_FOLDER / "one-armed.v1.toml"])
     assert [cost.task for cost in problems(path, count=2)][1] == task
     gymnasium = pytest.importorskip("gymnasium")
     importlib.import_module("coartic.gym")
@@ -247,6 +210,7 @@ def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic,
     assert coartic("list", f"{path}/i001")[1].startswith("Task")
     assert coartic("draw", f"{path}/i000..i001", "--out", "drawn")[0] == 0
     assert load_task("drawn/mine/v1/i001.toml") == task
+    assert Path("drawn/tasks.svg").read_text().startswith("<?xml")
     for name in (f"{path}/i000..i001", "drawn/mine/v1/i001.toml"):
         code, text, _ = coartic("run", "paper", "--tasks", name, "--methods", "EC4", "--runs", 1,
                                 "--trials", 5, "--out", "out")  # fmt: skip

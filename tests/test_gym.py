@@ -28,7 +28,7 @@ from coartic.motion.solution import movements_of
 from coartic.tasks import families
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import address_of
-from tests.support.processes import ROOT, python
+from tests.support.processes import ROOT
 from tests.support.strategies import tiny_task
 
 gymnasium = pytest.importorskip("gymnasium")
@@ -199,6 +199,7 @@ def test_where_the_corrective_process_fails_the_posture_takes_its_place():
         ({"task": "two-armed/v9"}, coartic.TaskError, "two-armed/v9"),
         ({"task": "ascending", "count": 3}, ValueError, "are for families, not 'ascending'"),
         ({"task": {"goals": 3}}, coartic.TaskError, "goals is 3; it should be a list of points"),
+        ({"render_mode": "human"}, ValueError, "it must be 'rgb_array'"),
     ],
 )
 def test_a_wrong_option_is_refused_with_a_sentence(options, error, words):
@@ -223,7 +224,6 @@ def test_what_else_is_refused():
          lambda: single.reset(seed=-1)),
         (ValueError, "3 seeds for 2 environments", lambda: vector.reset(seed=[1, 2, 3])),
         (ValueError, "num_envs is 0; it must be a whole", lambda: TaskVectorEnv(0, "ascending")),
-        (ValueError, "it must be 'rgb_array'", lambda: TaskEnv("ascending", render_mode="human")),
         (ValueError, "the action of robot 1 is not finite", lambda: vector.step(missing)),
         (ValueError, "the action is not finite", lambda: single.step(missing[1])),
         (ValueError, "actions is .*no masked entries",
@@ -233,8 +233,6 @@ def test_what_else_is_refused():
         (TypeError, "must be an environment of coartic or its id", lambda: score(no_environment)),
         *((TypeError, "task is missing: give task=", partial(make, "coartic/Task-v2"))
           for make in (gymnasium.make, gymnasium.make_vec, score)),
-        (ValueError, "it must be 'rgb_array'",
-         lambda: TaskVectorEnv(2, "ascending", render_mode="human")),
         (TypeError, "policy is 0; it must be a function of observations", lambda: score(TWO, 0)),
         (TypeError, "returned a tuple of 2; needed are the actions alone",
          lambda: score(TWO, lambda seen: (seen, None))),
@@ -277,12 +275,6 @@ def test_a_specification_is_kept_as_json(number, tmp_path):
         assert (robots.num_envs, robots.model) == (number or 1, MotionModel(gain=0.04))
         assert robots.task_at(0) == task
         assert robots.single_observation_space == TaskEnv(**options).observation_space
-
-
-@pytest.mark.process
-def test_importing_the_environments_compiles_nothing():
-    code = "import sys, coartic.gym; assert not {'numba', 'matplotlib', 'torch'} & set(sys.modules)"
-    python("-c", code)
 
 
 def names_of_program(title):

@@ -147,12 +147,7 @@ OF_EC1 = "(SELECT results.id FROM results JOIN cells ON cells.id = cell"
 OF_EC1 += f" WHERE method = '{EC1}' AND run = 0)"
 CHEATS = {
     "reward is -": "UPDATE results SET reward = reward + 1",
-    "hands is RRR, not RRL": "UPDATE results SET hands = 'RRL'",
-    "initial_reward is -": f"UPDATE results SET initial_reward = -9 WHERE id = {OF_EC1}",
-    "movement 0 takes": f"UPDATE movements SET ticks = ticks + 1 WHERE result_id = {OF_EC1}",
     "a joint or a trial": f"UPDATE movements SET path = {moved('$[2]', 1e-12)}",
-    "travel": "UPDATE results SET other_arm_travel = other_arm_travel + 1",
-    "its seed": "UPDATE results SET seed = seed + 1",
 }
 
 
@@ -186,15 +181,11 @@ def test_two_results_of_one_run(parts, tmp_path):
 
 def test_what_does_not_go_together(parts, tmp_path):
     moved = load_task("descending").model_copy(update={"name": "ascending"})
-    new = replace(KNOWN[EC1], code="0123456789ab")
     wrong = {
         "the seed is 0 in .*left and 5 in this command": {"seed": 5},
         "the trial budget is None in .* and 30 in": {"trial_budget": 30},
         f"trials of {EC1} on ascending is 40 in .*left and 41 in this": {"trials": 41},
         "task 'ascending' is definition": {"cells": [cell_on(moved, KNOWN[EC1])]},
-        f"method '{EC1}' is version 1.1 .* and version 0123456789ab in .*: leave it out": {
-            "cells": [cell_on(load_task("descending"), new)]
-        },
     }
     for said, change in wrong.items():
         with pytest.raises(CoarticError, match=said):
@@ -209,13 +200,6 @@ def test_what_does_not_go_together(parts, tmp_path):
         with pytest.raises(CoarticError, match=said):
             include_folders(asked, [folder], out)
     assert not out.exists()
-
-
-def test_what_a_folder_has_may_be_of_other_code(parts, tmp_path):
-    new = replace(KNOWN[EC1], code="0123456789ab")
-    ours = [replace(cell, method=new if cell.method.name == EC1 else cell.method) for cell in LEFT]
-    assert joined(parts[:1], tmp_path / "whole", ours).done == 0
-    assert set(load(tmp_path / "whole").runs.result) == set(load(parts[0]).runs.result)
 
 
 def test_shipped_results(monkeypatch, tmp_path):

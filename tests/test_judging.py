@@ -22,8 +22,10 @@ def test_other_braces_are_text():
 
 
 def test_joined_findings_have_the_opposites_of_all():
-    own, other = found(False, 0.7, against=[0.01]), found(False, 0.99, against=[0.2, 0.3])
-    assert all_of(own, other).against == own.against + other.against
+    own, other = found(False, 0.7, against=[0.01]), found(True, 0.99, against=[0.2, 0.3])
+    joined = all_of(own, other)
+    assert (joined.against, joined.tests) == (own.against + other.against, own.tests + other.tests)
+    assert [joined.holds, all_of(other, other).holds] == [False, True]
 
 
 def test_a_finding_prints_as_a_sentence():
@@ -84,7 +86,7 @@ def test_each_bound_of_a_verdict_on_both_sides():
     below = np.nextafter(0.05, 0)
     assert [seen.verdict(p, NAN) for p in (below, 0.05)] == ["supported", "undecided"]
     assert [unseen.verdict(NAN, p) for p in (below, 0.05)] == ["not supported", "undecided"]
-    assert [mean_beyond("{}", [4.0] * n).holds for n in (2, 3)] == [None, True]
+    assert [mean_beyond("{}", [4.0, 4.0, more]).holds for more in (NAN, 4.0)] == [None, True]
     assert [mean_beyond("{}", [1.0, 2.0, 3.0], bound).holds for bound in (1.99, 2.0, 2.01)] == [
         True, False, False,
     ]  # fmt: skip

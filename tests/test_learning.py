@@ -365,13 +365,6 @@ def test_a_copy_that_is_no_task_is_refused(update, message):
 def test_methods_of_the_learner():
     information = {method.name for method in METHODS if Information.GOALS in method.information}
     assert information == {"dual-process/EC2", "dual-process/custom"}
-    method, parameters = METHODS[0], METHODS[0].Parameters
-    for budget, trials in ((50, 20), (10, 10)):
-        session = Session(
-            load_task("ascending"), 0, method.information, trial_budget=budget, trusted=True
-        )
-        method(parameters(trials=20)).solve(session)
-        assert session.meter.trials == trials
 
 
 def test_a_goal_where_the_hand_is_already_takes_no_tick():
@@ -467,9 +460,6 @@ def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
 def test_a_grid_counts_in_what_applies(tmp_path):
     suite = own_suite(tmp_path, 'tasks = ["ascending"]\ngrid = { base = ["EC1"], drift = [0, 1] }')
     assert [job.cell.parameters["drift"] for job in plan_suite(suite)] == [0.0, 1.0]
-    suite = own_suite(tmp_path, 'tasks = ["ascending"]\ngrid = { base = ["EC1", "EC4"] }')
-    with pytest.raises(CoarticError, match="no left hand; put tasks and methods"):
-        plan_suite(suite)
 
 
 def test_a_first_solution_in_degrees_is_hinted_at():

@@ -56,7 +56,7 @@ FILES = {
     "mine_helper.py": "STEP = 1",
     "mine_parts/more.py": "def more(x):\n    return x + 1",
     "mine_parts/__init__.py": "RATE = 1",
-    "w": "weights",
+    "w": "x = 1  # one",  # no Python: byte by byte
 }
 
 
@@ -76,7 +76,7 @@ def test_what_counts_as_the_code_of_a_method(tmp_path):
         {"mine_helper.py": "STEP = 2"},
         {"mine_parts/more.py": "def more(x):\n    return x + 2"},
         {"mine_parts/__init__.py": "RATE = 2"},
-        {"w": "other weights"},
+        {"w": "x = 1  # two"},
         {"mine.py": FILES["mine.py"].replace("ge=0", "ge=1")},
     )
     codes = [code_with(tmp_path, **change) for change in changes]

@@ -1,12 +1,10 @@
 """The search for the optimum: what is shipped is found again."""
 
-import numpy as np
 import pytest
 
 from coartic import load_task
 from coartic.baselines.optimum import OptimumSearch, with_locks
 from coartic.baselines.trajectory_optimisation import PathLength
-from coartic.baselines.whole_ticks import TickPlan
 from coartic.method import MethodError
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
@@ -44,8 +42,6 @@ def test_the_base_is_locked_beside_the_task():
     with pytest.raises(MethodError, match="out of reach") as caught:
         with_locks(load_task("ascending"), "xy")
     assert caught.value.outcome == "infeasible"
-
-    assert TickPlan((3, 0, 2), np.empty((3, 10))).ticks == 4 + 0 + 3
 
 
 def test_a_hand_that_is_there_already_saves_a_tick():

@@ -125,9 +125,6 @@ HANDLED = {
              "solver-failed", "returned no solution"),
     "spends": ("for _ in range(2): session.spend(gradients=2**62)",
                "crashed", "it must be a whole number from 0 to 4,6"),
-    "untold": ("session.jacobian(session.q0, 'right')", "crashed", "does not declare"),
-    "trials": ("for _ in range(9): session.trial(corrected(session))",
-               "crashed", "the budget of 3 trials is spent"),
     "honest": ("return Result(corrected(session))", "ok", ""),
     "prints": ("print('x' * 10**6); os.write(2, b'\\x1b[31m' * 10**5)\n"
                "        return Result(corrected(session))", "ok", ""),

@@ -8,12 +8,10 @@ import pytest
 from coartic import load_task
 from coartic.baselines.posture_graph import (
     chains_of,
-    cheapest_chains,
     move_other_arm,
     sample_layers,
 )
-from coartic.method import MethodError, Session
-from tests.support.strategies import changed, steps_from
+from tests.support.strategies import steps_from
 
 
 def cheapest(task, layers, hands):
@@ -62,15 +60,6 @@ def test_a_free_arm_is_spread_over_its_way():
     assert spread[1, left] == pytest.approx(first + (last - first) / 3)
     assert np.array_equal(spread[[0, 3]][:, left], chain[[0, 3]][:, left])
     assert np.array_equal(spread[:, :2], chain[:, :2])
-
-
-def test_a_goal_without_a_posture_is_named():
-    task = changed("two-armed-1", goals=[[2, 3.6], [2, 40]], locked_base=["y"], initial_hands="RR")
-    layers, _ = sample_layers(task, 20, np.random.default_rng(7))
-    assert chains_of(task, layers) == []
-    options = {"nodes": 20, "graphs": 1, "chains": 1}
-    with pytest.raises(MethodError, match="^goal 2: no posture was found that puts the left or"):
-        [*cheapest_chains(Session(task, 0, ()), task, np.random.default_rng(7), **options)]
 
 
 def test_a_beam_keeps_the_cheapest_beginnings():

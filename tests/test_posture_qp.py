@@ -85,15 +85,6 @@ def test_a_goal_behind_a_straight_arm_is_reached():
     assert execution.corrections == 0
 
 
-def test_an_unreachable_goal_is_infeasible():
-    task = tiny_task(hands=["left"], initial_hands="LL").model_copy(
-        update={"goals": ((3.0, 1.0), (9.0, 3.0)), "locked_base": ("x", "y")}
-    )
-    with pytest.raises(MethodError, match="goal 2: the left hand ends .* short of it") as caught:
-        solve(GoalsAhead, task, period=20)
-    assert caught.value.outcome == "infeasible"
-
-
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_every_sequence_keeps_the_best(method):
     goals = [[4.0, 1.5], [-3.0, 2.0]]

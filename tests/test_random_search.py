@@ -1,15 +1,14 @@
 """Random search in stages against a loop over single trials, and its runs of version 4.0.0."""
 
+import itertools
+
 import numpy as np
 import pytest
 
-from coartic import CoarticError, MotionModel, load_task
+from coartic import CoarticError, load_task
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands
-from coartic.benchmarks.planning import plan_suite
-from coartic.method import MethodError, Session
+from coartic.method import Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
-from coartic.runs.method_info import run_identity
-from coartic.runs.shipped import open_shipped
 from tests.support.strategies import solve
 from tests.support.suites import KNOWN
 
@@ -18,7 +17,7 @@ HANDS = {"descending": "RRR", "two-armed-1": "RRLR"}
 
 def one_by_one(name, seed, trials, ends, keep="postures", idle_arm=True):
     """Random search as it is defined, one trial after the other; ``ends``: trials after which the
-    centre moves to the best trial. Returns rewards and the postures of all trials."""
+    centre moves to the best trial. Returns the rewards of all trials."""
     task, hands = load_task(name), HANDS[name]
     session = Session(task, seed, OPTIMISER_INFORMATION)
     explored = np.tile(explored_joints(session), (len(hands), 1))
@@ -35,51 +34,36 @@ def one_by_one(name, seed, trials, ends, keep="postures", idle_arm=True):
         noise = session.rng.normal(0.0, 0.05, explored.sum())
         targets[0, explored] = centre[explored] + noise
         made.append(session.trials(hands, targets))
-    return [trial.rewards[0] for trial in made], np.array([trial.reached[0] for trial in made])
+    return [trial.rewards[0] for trial in made]
 
 
-@pytest.mark.parametrize("task", HANDS)
-@pytest.mark.parametrize("keep", ["postures", "targets"])
-@pytest.mark.parametrize("idle_arm", [True, False])
+ENDS = {
+    (40, 1): [],
+    (40, 4): [10, 20, 30],
+    (40, 7): [5, 11, 17, 22, 28, 34],  # 40 k / 7, rounded down
+    (13, 13): range(1, 13),  # a hill climber: the centre is the best trial so far
+    (1_030, 2): [515],
+}
+
+
 @pytest.mark.parametrize(
-    ("trials", "stages", "ends"),
+    ("task", "keep", "idle_arm", "trials", "stages"),
     [
-        (40, 1, []),
-        (40, 4, [10, 20, 30]),
-        (40, 7, [5, 11, 17, 22, 28, 34]),  # 40 k / 7, rounded down
-        (13, 13, range(1, 13)),  # a hill climber: the centre is the best trial so far
-        (1_030, 2, [515]),
+        *(
+            (*each, 40, 4)
+            for each in itertools.product(HANDS, ["postures", "targets"], [True, False])
+        ),
+        *(("two-armed-1", "postures", True, *each) for each in ENDS),
+        *(("descending", "targets", True, *each) for each in ENDS),
     ],
 )
-def test_trials_in_stages_are_those_made_one_by_one(task, keep, idle_arm, trials, stages, ends):
+def test_trials_in_stages_are_those_made_one_by_one(task, keep, idle_arm, trials, stages):
     options = {"hands": HANDS[task], "stages": stages, "keep": keep, "idle_arm": idle_arm}
     result, execution, session = solve(RandomSearch, task, trials=trials, **options)
-    rewards, _ = one_by_one(task, 0, trials, ends, keep, idle_arm)
+    rewards = one_by_one(task, 0, trials, ENDS[trials, stages], keep, idle_arm)
     assert session.rewards == rewards
     assert execution.reward == max(rewards)
     assert result.details == {"evaluations": trials - 1}
-
-
-def test_an_idle_arm_keeps_still_if_it_is_not_explored():
-    _, still = one_by_one("two-armed-1", 0, 20, [10], idle_arm=False)
-    _, moved = one_by_one("two-armed-1", 0, 20, [10])
-    robot = load_task("two-armed-1").robot
-    idle = [("left", 1), ("right", 2), ("left", 3)]  # of RRLR, after the goal before
-    for arm, goal in idle:
-        joints = robot.joints(arm)
-        assert np.array_equal(still[:, goal, joints], still[:, goal - 1, joints])
-        assert (moved[1:, goal, joints] != moved[1:, goal - 1, joints]).all()
-
-
-def test_more_stages_draw_the_same_noise():
-    """Trials before the first part ends are those of one stage; keep has no effect there."""
-    one, two, kept = (
-        solve(RandomSearch, "descending", trials=1_000, **options)[2].rewards
-        for options in ({}, {"stages": 2}, {"keep": "targets"})
-    )
-    assert one == kept
-    assert one[:500] == two[:500]
-    assert np.mean(two[500:]) > np.mean(one[500:])
 
 
 def test_every_hand_sequence_has_stages_of_its_own_share():
@@ -111,27 +95,3 @@ def test_stages_that_cannot_be_are_refused(method, stages, sentence):
 def test_what_is_kept_is_one_of_two():
     with pytest.raises(CoarticError, match="keep is 'both'; it should be 'postures' or 'targets'"):
         KNOWN["random-search"].complete({"keep": "both"})
-
-
-@pytest.mark.parametrize("method", [RandomSearch, RandomSearchHands])
-def test_without_a_first_solution_or_a_trial_it_is_infeasible(method):
-    for options in ({"model": MotionModel(max_iterations=2)}, {"budget": 0}):
-        with pytest.raises(MethodError) as caught:
-            solve(method, "two-armed-2", **options)
-        assert caught.value.outcome == "infeasible"
-
-
-def test_at_their_defaults_new_parameters_change_no_id():
-    """All shipped runs of random search are planned under the ids that version 4.0.0 gave them."""
-    methods = ["random-search", "random-search/hands"]
-    for suite in ("comparison", "families"):
-        with open_shipped(suite) as store:
-            shipped = store.runs()
-        shipped = {*map(run_identity, shipped.run_id[shipped.method.isin(methods)])}
-        planned = {
-            run_identity(job.run_id(number))
-            for job in plan_suite(suite, methods=methods)
-            for number in job.numbers
-        }
-        assert len(shipped) >= 1_000
-        assert shipped <= planned

@@ -13,7 +13,6 @@ from tests.support.processes import apart
 from tests.support.strategies import solve, tiny_task
 
 FEW = {"graphs": 1, "chains": 1}
-INSTANCES = ["one-armed/v1/d001", "two-armed/v1/d006"]
 
 
 def solved(task, method=RecedingHorizon, **parameters):
@@ -93,19 +92,6 @@ def test_each_movement_is_the_first_of_the_shortest_plan_for_the_goals_in_view(h
         q = reached
 
 
-def test_look_ahead_pays_on_average_and_never_much_more_than_all_goals_in_view():
-    """The shortest starts are polished: of one graph's chains one has the best hands already."""
-    rewards = {horizon: [] for horizon in (0, 1, 9)}
-    for name in INSTANCES:
-        for horizon, of_horizon in rewards.items():
-            result, execution = solved(name, nodes=40, horizon=horizon)
-            of_horizon.append(execution.reward)
-            assert execution.corrections == 0
-            rounded = execution.ticks - result.details["path_length"] / PAPER.step
-            assert 0 < rounded <= 2 * len(execution.hands)
-    gaps = [np.mean(np.divide(rewards[horizon], rewards[9]) - 1) for horizon in (0, 1)]
-    assert gaps[0] > gaps[1] > 0
-    # By luck of rounding it may be a tick better.
-    assert all(np.array(rewards[9]) >= np.array(rewards[0]) - 1)
-    task = load_task("two-armed-2")
-    assert solved(task, nodes=100, horizon=3, starts=1)[1].hands == "RLRR"
+def test_the_shortest_starts_are_polished():
+    """Of one graph's chains one has the best hands already."""
+    assert solved("two-armed-2", nodes=100, horizon=3, starts=1)[1].hands == "RLRR"

@@ -74,6 +74,10 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
         ),
         (planned(posture(1.0), posture(2.0), hand="left"), "the robot has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
+        *(
+            ([Movement(goal, "right", "planned", WAY[0])], "it must be a whole number")
+            for goal in (None, [1], WAY)
+        ),
         ([Movement(1, "right", "jump", np.zeros(10))], "unknown kind 'jump'"),
         ([Movement(1, "right", "path", waypoints=[])], "a path needs waypoints"),
         ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),
@@ -128,21 +132,6 @@ def test_a_goal_is_hit_by_one_hand():
     both = [Movement(1, hand, "planned", np.zeros(10)) for hand in ("left", "right")]
     with pytest.raises(CoarticError, match="goal 1: two hands for one goal"):
         execute(tiny_task(), both)
-
-
-@pytest.mark.parametrize(
-    ("field", "sentence"),
-    [
-        ("goal", "goal of a movement is .*; it must be a whole number"),
-        ("hand", "goal 1: the robot has no .* hand; it has 'right'"),
-        ("kind", "goal 1: unknown kind .*; known: "),
-    ],
-)
-@pytest.mark.parametrize("value", [np.zeros(10), None, [1]])
-def test_what_is_no_field_of_a_movement_is_named(field, sentence, value):
-    movements = corrective_trial("ascending", "RRR").movements
-    with pytest.raises(CoarticError, match=sentence):
-        execute("ascending", [replace(movements[0], **{field: value}), *movements[1:]])
 
 
 def test_equal_contents_are_equal_before_and_after_use():

@@ -22,7 +22,6 @@ from coartic import (
 )
 from coartic.tasks.families import shipped_families
 from coartic.tasks.task import check_task
-from tests.support.bad_inputs import GOOD
 from tests.support.strategies import TIED, changed, tiny_task, uneven_task
 
 
@@ -40,16 +39,6 @@ def test_shipped_figures_have_a_source():
     assert load_task("two-armed-1").reconstructed == ("goals", "start")
     assert load_task("two-armed-2").reconstructed == ("goals",)
     assert load_task("ascending").reconstructed == ()
-
-
-def test_several_mistakes_each_get_a_line(tmp_path):
-    """Also a penalty, as version 1 reads it."""
-    wrong = GOOD.replace('"RR"', "1").replace("[5.0, 2.0]", "[nan, inf]")
-    for text, count in ((wrong, 3), (f"{GOOD}[penalty]\njoints = 1.0\n", 1)):
-        with pytest.raises(TaskError) as caught:
-            load_task(write(tmp_path, text))
-        assert len(str(caught.value).splitlines()) == count
-    assert "version 1.1.0 of coartic reads tasks with a penalty" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -80,7 +69,6 @@ def test_a_saved_task_is_read_as_it_was(task, tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"goal": 3}, "Task: goal is an unknown key; did you mean 'goals'?"),
         ({"robot": {"right_links": [0]}}, "robot.right_links[0] is 0; it should be greater than 0"),
         ({"q0": [0, 0, 0, 0, 0, 0, 30, 40, 20, 0]}, "Did you mean 40° = 0.698?"),
         ({"start": {"right": "x"}}, "start.right is 'x'; it should be a list of numbers"),

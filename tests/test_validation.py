@@ -48,7 +48,6 @@ from coartic.analysis.statistics.hypotheses import (
     share_test,
 )
 from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import built_in, registry
 from coartic.benchmarks.runner import perform, run_suite
 from coartic.internal.text import RENAMED, did_you_mean, plain
@@ -115,6 +114,7 @@ TASKS = [
     ("start = 1\n" + GOOD.partition("[start]")[0], "start is 1; it should be a table"),
     ('title = "a\\nb"' + GOOD, "it should be one line of printable text"),
     (task("goals = [[", "goals = [[["), "line"),
+    (f"{GOOD}[penalty]\njoints = 1.0\n", "version 1.1.0 of coartic reads tasks with a penalty"),
 ]
 FAMILIES = [
     (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be at least 2"),
@@ -220,7 +220,7 @@ def test_an_argument(wrong, words, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("read", [load_task, lambda path: registry([path])])
-@pytest.mark.parametrize("kind", ["absent", "pipe", "device", "folder", "large", "long"])
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "large"])
 def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
     path = tmp_path / "mine.v1.toml"
     if kind == "pipe":
@@ -229,13 +229,10 @@ def test_what_is_no_file_is_refused_at_once(read, kind, tmp_path):
         path.symlink_to("/dev/zero")
     elif kind == "folder":
         path.mkdir()
-    elif kind == "large":
+    else:
         with path.open("wb") as file:
             file.truncate(3_000_000_000)
-    elif kind == "long":
-        path = tmp_path / f"{'a' * 5000}.v1.toml"
-    words = r"(?i)mine.v1.toml.*no such file" if kind == "absent" else r"cannot be read|at most"
-    with pytest.raises(CoarticError, match=words) as caught:
+    with pytest.raises(CoarticError, match="cannot be read|at most") as caught:
         read(path)
     (line,) = str(caught.value).splitlines()
     assert len(line) < 700
@@ -317,10 +314,6 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["check", "two-armed/v1/i003"], "coartic draw"),
         (["run", "paper", "--runs", "two"], "--runs is 'two'; it must be a whole number from 1"),
         (["run", "paper", "--jobs", "0"], "--jobs is 0; it must be a whole number from 1"),
-        (
-            ["run", "paper", "--time-limit", "0"],
-            "--time-limit is 0; it should be at least 0.001",
-        ),
         (["list", "--method-file", NO_METHOD], "the name of a method file ends in .py"),
         (
             ["draw", ".", "--run", "0", "--width", "1.5"],
@@ -334,7 +327,6 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["check", "two-armed"], "is a shipped family: coartic list two-armed"),
         (["run", "paper", "--tasks", "long/v1/*"], "range, such as long/v1/i000..i009"),
         (["draw", ".", "--run", "CMA-ES", "--out", "x.gif"], "column run_ids of a report's"),
-        (["draw", "ascending", "--out", "x.gif"], "the name must end in .svg"),
         (["draw", "--run", "1a2b"], "--run needs one results folder"),
         (["draw", ".", *["--run", "1a2b"] * 3], "a film shows at most two runs"),
         (["report", "nowhere"], "there is no folder nowhere"),
@@ -345,7 +337,6 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["new", "My Search"], "coartic new: the name 'My Search' must begin with"),
         (["new", "dual-process/EC1"], "'dual-process/EC1' is reserved"),
         (["new", "cma-es"], "'cma-es' is a name of a method here"),
-        (["new", "ec4"], "'ec4' is a name of a method here"),
         *(([command, "arm.urdf"], OF_ANOTHER_PROGRAM) for command in ("check", "draw", "list")),
     ],
 )
@@ -362,10 +353,11 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
 Trials = coartic.Optimiser.Parameters
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
 UNMASKED = "it should have no masked entries"
+SPAN = np.timedelta64(3, "s")  # NumPy counts it among whole numbers
 ODD = (
     *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
     *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
-    *(-3, np.inf, np.full(10, np.nan), pd.NA, {"a": 1}, MASKED, Path("x"), [True, 1.0]),
+    *(-3, np.inf, np.full(10, np.nan), pd.NA, {"a": 1}, MASKED, Path("x"), [True, 1.0], SPAN),
     *(10**400, [10**400]),
 )
 TASK, ROBOT = load_task("ascending"), Robot()
@@ -390,7 +382,7 @@ USUAL = {
     "row": {"a": 1.0, "a_low": 0.0, "a_high": 2.0}, "column": "a", "scale": 1.0, "unit": "",
     "scores": {"a": [np.array([1.0, 2.0])]}, "method": GROUPS, "other": GROUPS,
     "rng": np.random.default_rng(0), "alternative": "less", "p_values": [0.1, 0.2],
-    "differences": [1.0, 2.0], "total": 5, "share": 0.5, "folder": "nowhere", "tables": {},
+    "total": 5, "share": 0.5, "folder": "nowhere", "tables": {},
     "draw": lambda results: Figure(), "template": "nowhere.jinja", "ticks_per_unit": 1.0,
     "difference": np.ones(10), "jacobian": ROBOT.jacobian(TASK.q0, "right"),
     "rewards": [-300.0, None], "locked_base": ["y"],
@@ -484,6 +476,8 @@ def test_no_wrong_argument_gets_an_error_of_python(call, usual):
         if value is MASKED and name in hints:
             is_array = re.search("Numbers|Config|Sequence.float", str(hints[name].annotation))
             assert words or not is_array, name
+        is_number = isinstance(value, int | float | None)
+        assert words or is_number or type(usual[name]) is not int, (name, value)
         if name == "hand":
             assert re.search("left'?(,| and| or) '?right", words), (value, words)
 
@@ -593,10 +587,10 @@ def test_only_findings_are_joined(wrong):
             "seed is a value of type int; it must",
         ),
         (lambda: judge(), "judge: claims is missing"),
+        (lambda: analysis.all_of(), "one finding at least"),
         (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),
         (lambda: movements_of("RX", np.zeros((2, 10))), "hands is 'RX'"),
         (lambda: movements_of("RR", "x"), "targets"),
-        (lambda: coartic.hand_sequences("two-armed-1", ["L"]), "list of .* 'left' and 'right'"),
         (lambda: Robot(links=(1, 1)), "Robot: links is an unknown key; did you mean 'left_l"),
         (
             lambda: ExplorationCondition("x", ("right",), True, True, "all"),
@@ -629,8 +623,6 @@ def test_no_wrong_movement_gets_an_error_of_python(field):
 @pytest.mark.parametrize(
     ("call", "usual", "name", "value"),
     [
-        (Task, {"goals": [(6, 2)]}, "locked_base", "xy"),
-        (Task, {"goals": [(6, 2)]}, "hands", "left"),
         (Task, {}, "goals", "x"),
         (plan_suite, {"suite": "paper"}, "tasks", "ascending"),
         (plan_suite, {"suite": "paper"}, "methods", "EC1"),
@@ -662,17 +654,3 @@ def test_advice_about_instances_and_their_families_is_taken(tmp_path):
         plan_suite("paper", family_files=[family])
     advice = str(caught.value).rpartition("such as ")[2]
     assert len(plan_suite("paper", family_files=[family], tasks=[advice], methods=["EC4"])) == 10
-
-
-def test_a_span_of_time_is_no_number():
-    """NumPy counts it among whole numbers."""
-    span = np.timedelta64(3)
-    for call in (
-        lambda: coartic.learn(coartic.load_task("ascending"), "EC1", trials=span, seed=0),
-        lambda: plan_suite("paper", runs=span),
-        lambda: plan_suite("paper", seed=span),
-        lambda: mean(np.array([1.0, 2.0, span], dtype=object)),
-        lambda: Local(span),
-    ):
-        with pytest.raises((CoarticError, ValueError), match="timedelta64|should be real numbers"):
-            call()

@@ -95,6 +95,7 @@ STANDING = f"path = '{[0.0] * 10}', ticks = 1"
 EDITS = {  # what is said: of which run, and what was edited
     "reward is ": result(LEARNER, "reward = reward + 1"),
     "best_trial is ": result(LEARNER, "best_trial = 301"),
+    "initial_reward is -": result(LEARNER, "initial_reward = -9"),
     "hands is RR, not LL": result(TINY, "hands = 'LL'"),
     "solution_corrections is 1": result(TINY, "solution_corrections = 2"),
     "other_arm_travel is": result(PATH, "other_arm_travel = 1e-8"),
@@ -153,17 +154,13 @@ EDITS = {  # what is said: of which run, and what was edited
         for number, statement in enumerate(
             (
                 "DELETE FROM suite",
-                "UPDATE suite SET name = NULL",
                 "DELETE FROM plan WHERE position = 0",
-                "UPDATE plan SET runs = 0 WHERE position = 0",
                 "UPDATE cells SET information = 'goals'",
                 "UPDATE environments SET content = '{'",
             )
         )
     },
     "its packages are not": (None, "UPDATE environments SET packages = 'x'"),
-    "Tables or views are not": (None, "ALTER TABLE learning ADD COLUMN base_x REAL"),
-    "ables or views are not": (None, "DROP VIEW solutions"),
 }
 
 

@@ -16,7 +16,6 @@ from coartic.benchmarks.reproduce import find_run
 from coartic.benchmarks.runner import perform
 from coartic.runs.method_info import run_identity, version_of
 from coartic.runs.store import RUNS_FILE, open_store
-from tests.support.processes import python
 from tests.support.suites import ROOT, InProcess
 
 SAME = ["dual-process/EC1", "random-search", "hill-climbing", "corrective-alone/given"]
@@ -155,17 +154,6 @@ def test_what_is_checked_before_a_release():
     assert len(rows) - (rows.suite == "comparison").sum() == len(of_families)
 
 
-COMPUTE = """
-import hashlib, math
-import numpy as np
-x = np.abs(np.random.default_rng(0).standard_normal((16, 16)))
-by_numpy = *np.linalg.eigh(x @ x.T), np.linalg.solve(x, x[0]), x @ x, np.exp(x), np.log(x)
-by_libm = [[*map(f, x.ravel().tolist())] for f in (math.exp, math.log, math.sin)]
-for each in (by_numpy, by_libm):
-    print(hashlib.sha256(b"".join(np.asarray(part).tobytes() for part in each)).hexdigest())
-"""
-
-
 @pytest.mark.process
 def test_workers_round_alike_whatever_the_environment_says(coartic, tmp_path, monkeypatch):
     def made(folder):
@@ -183,18 +171,3 @@ def test_workers_round_alike_whatever_the_environment_says(coartic, tmp_path, mo
     monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
     monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", "")
     assert made("changed") == before
-
-
-@pytest.mark.process
-def test_without_the_variables_of_workers_a_process_may_round_otherwise(record_property):
-    """What differs on this processor is recorded; where nothing does, the variables do nothing."""
-    without = {"OPENBLAS_CORETYPE": "", "NPY_DISABLE_CPU_FEATURES": ""}
-    as_a_worker, plain = (
-        python("-c", COMPUTE, **changed).stdout.split() for changed in ({}, without)
-    )
-    pairs = zip(("NumPy", "libm"), as_a_worker, plain, strict=True)
-    differs = [name for name, before, now in pairs if now != before]
-    record_property("rounds otherwise", differs)
-    if not differs:
-        pytest.skip("on this processor NumPy rounds alike with and without the variables")
-    assert differs == ["NumPy"]

@@ -48,20 +48,10 @@ def test_published_differences():
     assert data.difference[""] == pytest.approx(-572 - (11 * -520 + 9 * -609) / 20)
     assert data.verdict[""] == "undecided"  # also of a mean over sequences
     assert data.difference["RRRR"] == pytest.approx(1.0)
+    assert (data.ours["RRRR"], data.ours_sd["RRRR"]) == pytest.approx((-608, math.sqrt(8)))
+    assert data.run_ids["LRLR"] == planted[2]["run_id"]
     assert np.isnan(data.difference["RRLR"])
     assert data.runs.to_dict() == {"": 3, "RRLR": 0, "RRRR": 2, "LRLR": 1}
-
-
-def test_numbers_are_made_again_from_the_runs(traced, tables):
-    rewards = tables["rewards"]
-    assert len(rewards) > 5
-    by_id = traced.runs.set_index("run_id").reward.astype(float)
-    for row in rewards[rewards.runs > 0].itertuples():
-        ours = by_id[row.run_ids.split()]
-        assert len(ours) == row.runs
-        assert row.ours == pytest.approx(ours.mean())
-        assert row.ours_sd == pytest.approx(ours.std(), nan_ok=True)
-        assert row.difference == pytest.approx(ours.mean() - row.published, nan_ok=True)
 
 
 def test_the_page_of_a_folder_has_verdicts_evidence_and_what_is_missing(tables, tmp_path):
