@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import itertools
-import math
 import os
+import sys
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from shlex import quote
@@ -32,10 +32,10 @@ TaskNamed = Callable[[str], Task]
 
 
 def _plain_value(value: Any) -> _Plain:
-    """Return the value of a parameter: a bool, finite number or text as it is, a list of numbers as
-    a tuple of floats. Raises PydanticCustomError for any other value."""
-    numbers = value if isinstance(value, list | tuple) else [value]
-    if all(isinstance(each, int | float) and math.isfinite(each) for each in numbers) and numbers:
+    """Return the value of a parameter: a bool, finite number or text unchanged, a list of finite
+    numbers, not empty, as a tuple of floats. Raises PydanticCustomError for any other value."""
+    numbers, most = value if isinstance(value, list | tuple) else [value], sys.float_info.max
+    if all(isinstance(each, int | float) and abs(each) <= most for each in numbers) and numbers:
         return value if value is numbers[0] else tuple(map(float, numbers))
     if isinstance(value, str):
         return value

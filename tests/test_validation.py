@@ -125,6 +125,7 @@ FAMILIES = [
     (family("[-5, 5]", "[nan, 5]"), "region.x[0] is nan; it should be a finite number"),
     (family("[-5, 5]", "['a', 5]"), "region.x[0] is 'a'; it should be a finite number"),
     (family("[-5, 5]", "[-5, 1e306]"), "region.x[1] is 1e+306; it should be a finite number"),
+    (f"reach = 1{400 * '0'}" + FAMILY, "it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
     ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
 ]
@@ -132,6 +133,8 @@ SUITES = [
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
     (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it should be at least 0"),
+    (SUITE + "grid = {noise_sd = [inf]}", "a finite number, a text"),
+    (SUITE + f"grid = {{noise_sd = [1{400 * '0'}]}}", "a finite number, a text"),
     (SUITE + "grid = {noise_sd = []}", "blocks[0].grid.noise_sd is []; it needs at least 1 item"),
     (suite('["dual-process/EC1"]', "[]"), "blocks[0].methods is []; it needs at least 1 item"),
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5; it should be a whole number"),
@@ -355,11 +358,13 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
 
 Trials = coartic.Optimiser.Parameters
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
+HUGE = 10**400  # beyond the range of float
 UNMASKED = "it should have no masked entries"
 ODD = (
     *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
     *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
     *(-3, np.inf, np.full(10, np.nan), pd.NA, {"a": 1}, MASKED, Path("x"), [True, 1.0]),
+    *(HUGE, [HUGE]),
 )
 TASK, ROBOT = load_task("ascending"), Robot()
 TRIAL = corrective_trial(TASK, "RRR")

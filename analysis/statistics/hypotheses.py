@@ -278,7 +278,7 @@ def share_test(count: _Count, total: _Count, share: _Share, alternative: Alterna
 
 
 @checked_arguments
-def holm(p_values: Numbers, family: int | None = None) -> list[float]:
+def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
 
     Rejecting adjusted p-values at or below α has a family-wise error rate of α at most, whatever

@@ -34,8 +34,12 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
     ``most``, both included, and whole if ``least`` is an ``int``. True and False are no numbers."""
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
-    is_number = isinstance(value, kind) and not isinstance(value, bool)
-    if not is_number or is_span(value) or not least <= float(value) <= most:
+    is_number = isinstance(value, kind) and not isinstance(value, bool) and not is_span(value)
+    try:
+        fits = is_number and least <= float(value) <= most
+    except OverflowError:  # of an int
+        fits = False
+    if not fits:
         raise ValueError(
             f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
             f"from {least:{'' if whole else 'g'}} to {most:{',' if isinstance(most, int) else 'g'}}"
@@ -72,7 +76,10 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
     if array.dtype == object and all(
         isinstance(each, numbers.Real) and not is_span(each) for each in array.flat
     ):
-        array = array.astype(np.float64)  # a nullable column of pandas
+        try:
+            array = array.astype(np.float64)  # a nullable column of pandas
+        except OverflowError:
+            raise ValueError("should be real numbers in the range of float64") from None
     if array.dtype.kind not in "uif":
         raise ValueError("should be real numbers")
     return array.astype(np.float64, copy=False)

@@ -17,8 +17,8 @@ the others ask the compiled kernels, which use IEEE arithmetic alone
 from __future__ import annotations
 
 import itertools
-import math
 import re
+import sys
 from collections import Counter
 from collections.abc import Iterable
 from contextlib import suppress
@@ -72,7 +72,7 @@ def _in_thousandths(value: float) -> int:
     """Return a number in thousandths, 300 for 0.3. Raises a validation error for anything but a
     finite number with at most three decimals."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value * _PARTS):
+    if not is_number or not abs(value * _PARTS) <= sys.float_info.max:
         raise PydanticCustomError("finite", "should be a finite number")
     if round(value * _PARTS) / _PARTS != value:
         raise sentence_error(f"{value} should have at most three decimals")
