@@ -96,11 +96,8 @@ def names_in(text: str | None) -> list[str]:
 
 
 def _id_named(name: str, names: Mapping[str, str]) -> str:
-    """Return the id for a name or id in any case; an unknown name is returned unchanged.
-
-    ``names`` has the name that people use for each id, or an empty text. If a name is also an id,
-    the id counts.
-    """
+    """Return the id for a name or id in any case, an id before a name; an unknown name is returned
+    unchanged. ``names`` has the name that people use for each id, or an empty text."""
     called = {words.casefold(): each for each, words in names.items() if words}
     ids = {each.casefold(): each for each in names}
     return name if name in names else (called | ids).get(name.casefold(), name)

@@ -88,8 +88,8 @@ def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
 
 def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) -> None:
     """Write the number of every goal, from 1, above it, or below where another goal is close above.
-    ``weight`` scales the distance; ``text`` has options of ``Axes.annotate``, such as ``fontsize``.
-    """
+    ``weight`` scales the distance; ``text`` has options of ``Axes.annotate`` that are not set here,
+    such as ``fontsize``."""
     goals = task.goal_array
     right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
     crowded = _CROWDED * task.robot.scale

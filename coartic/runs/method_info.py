@@ -139,9 +139,7 @@ process imports no method file."""
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     """Return the result of the function of :class:`MethodInfo` that ``question`` names:
-    ``"complete"`` (parameters with defaults, as plain data, without parameters in
-    :attr:`.Method.later` that have their default), ``"why_not"`` (what the method returns: a reason
-    or None) or ``"rules"``.
+    ``"complete"``, ``"why_not"`` or ``"rules"``.
 
     ``arguments`` are parameters (none for ``"rules"``), then for ``"why_not"`` the entries of an
     outline. Raises CoarticError for parameters that do not fit, and if ``why_not`` of the method
@@ -177,7 +175,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
-    """Return the info of a method from its class and the other fields of :class:`MethodInfo`."""
+    """Return the info of a method from its class, its ``origin`` (``built in``, or the path of its
+    file), ``where`` a worker imports it (module or file) and its ``code``."""
     return MethodInfo(
         name=method.name,
         title=method.title,

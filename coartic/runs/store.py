@@ -741,12 +741,9 @@ def _check_files(folder: Path) -> None:
 
 
 def _has_tables(connection: sqlite3.Connection) -> bool:
-    """Return True if the file has the tables of coartic, and False if the file is empty.
-
-    Additions of other programs (statistics, indexes, tables, views) pass, except triggers, which
-    change data as they are written. Raises CoarticError for any other file, and ValueError for a
-    row that names a missing row: no view would show its run.
-    """
+    """Return True if the file has the tables of coartic, and False if the file is empty. Additions
+    of other programs pass, except triggers. Raises CoarticError for any other file, and ValueError
+    for a row that names a missing row: no view would show its run."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     there = {kind for (kind,) in connection.execute("SELECT type FROM sqlite_master")}
@@ -839,7 +836,7 @@ def _explain(path: Path, error: Exception) -> str:
 
 
 def _why_not_opened(path: Path) -> str:
-    """Return why SQLite cannot open a file, in words; empty if the system would open the file."""
+    """Return why SQLite cannot open a file, in words; empty if the reason is not known."""
     try:
         path.open("rb").close()
     except FileNotFoundError:
@@ -852,12 +849,9 @@ def _why_not_opened(path: Path) -> str:
 
 
 def _unpack(blob: bytes, trials: int | None) -> Array:
-    """Return the rewards of the trials of a run from table ``learning``, whose ``blob`` holds them
-    packed (:func:`reward_bytes`), shape ``(k,)`` with k up to ``trials``; NaN stands for a trial
-    that failed or whose reward is not kept.
-
-    Raises ValueError for a blob that is damaged or cut short, and for more rewards than trials.
-    """
+    """Return the rewards that a ``blob`` of table ``learning`` holds (:func:`reward_bytes`), shape
+    ``(k,)`` with k up to ``trials``; NaN for a trial that failed or whose reward is not kept.
+    Raises ValueError for a damaged blob, and for more rewards than trials."""
     size = 4 * (1 + min(trials or 0, MOST_TRIALS))
     try:
         packed = zlib.decompressobj()

@@ -153,7 +153,7 @@ class Family(FileData):
     description: Line
     """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
-    """Hands that may hit goals; the robot has both arms anyway."""
+    """Hands that may hit goals."""
     goals: Annotated[tuple[_GoalsCount, _GoalsCount], _ordered]
     """Least and largest number of goals; each number is equally likely."""
     links: Annotated[tuple[_PerArm, _PerArm], _ordered]
@@ -184,7 +184,8 @@ class Family(FileData):
     """Largest distance of a goal from a shoulder, as a share of the reach, measured along the base
     coordinates that are locked."""
     bent: Thousandths = 200
-    """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
+    """Angle, rad, by which a joint of each arm with one of ``hands`` is bent at least at the
+    start."""
 
 
 def draft(family: Family, address: Address, attempt: int) -> Task:
