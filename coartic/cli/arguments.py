@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 
 def file_or_folder(metavar: str, what: str, *names: str) -> Any:
-    """Return an option that reads a file or a folder, which need not exist, as a Path, by its flags
-    ``names``, without any by the name of its parameter; ``metavar`` names its value in the help,
-    ``what`` is its help. An empty or impossible name raises CoarticError."""
+    """Return an option that reads a file or a folder, which need not exist, as a Path. Its flags
+    are ``names``, or follow from its parameter; ``metavar`` names its value in the help, ``what``
+    is its help. An empty or impossible name raises CoarticError."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
 
@@ -125,10 +125,8 @@ def method_names(registered: Registry) -> Mapping[str, str]:
 
 def methods_meant(names: Sequence[str], registered: Registry, *, expand: bool = True) -> list[str]:
     """Return the ids of registered methods from ids, names and wildcards (``optimum/*``) that users
-    write; without ``expand`` a wildcard for several methods is returned unchanged.
-
-    Raises CoarticError for an unknown name.
-    """
+    write; without ``expand`` a wildcard for several methods is returned unchanged. Raises
+    CoarticError for an unknown name."""
     from coartic.benchmarks.registry import methods_named
     from coartic.benchmarks.suites import check_kind
 

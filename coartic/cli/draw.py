@@ -90,9 +90,8 @@ def _film(
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
-    from coartic.pictures.film import check_film, write_film
+    from coartic.pictures.film import write_film
 
-    check_film(out, replace=replace)
     if len(run_ids) + initial > 2:
         raise CoarticError("a film shows at most two runs, or one run with --initial")
     movements = []

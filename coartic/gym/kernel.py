@@ -166,11 +166,8 @@ def observe(*fields: Any) -> None:
 @entry
 def step_robots(*fields: Any) -> int:
     """Let all robots whose trial goes on reach for their next goal; change the arrays ``fields``,
-    the entries of a :class:`VectorState`, in place.
-
-    Returns the number of trials that make their first step; -1 - n, without a movement, if the
-    action of robot n (from 0) is not finite.
-    """
+    the entries of a :class:`VectorState`, in place. Return the number of trials that make their
+    first step; -1 - n, without a movement, if the action of robot n (from 0) is not finite."""
     state = VectorState(*fields)
     last, begun = len(state.task) - 1, 0
     for n in range(last + 1):

@@ -268,20 +268,18 @@ def _rollout_as_it_is(
 def _as_learned(env: Any) -> Iterator[None]:
     """Set ``training`` and ``update_running_mean`` of an environment and its wrappers to False in
     the block of this context, so that they keep the means by which they normalise."""
-    names = "training", "update_running_mean"
     learning = [
-        (each, name)
+        (each, name, getattr(each, name))
         for each in layers(env)
-        for name in names
+        for name in ("training", "update_running_mean")
         if name in vars(each) or isinstance(getattr(type(each), name, None), property)
     ]
-    before = [getattr(each, name) for each, name in learning]
     try:
-        for each, name in learning:
+        for each, name, _ in learning:
             setattr(each, name, False)
         yield
     finally:
-        for (each, name), value in zip(learning, before, strict=True):
+        for each, name, value in learning:
             setattr(each, name, value)
 
 

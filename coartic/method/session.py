@@ -257,10 +257,7 @@ class Session:
     @property
     def robot(self) -> Robot:
         """The robot, with lengths of links and places of shoulders. Raises UndeclaredError without
-        ``Information.KINEMATIC_MODEL``.
-
-        The method itself counts evaluations of the robot's kinematics, with :meth:`spend`.
-        """
+        ``Information.KINEMATIC_MODEL``. The method itself counts evaluations (:meth:`spend`)."""
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot
 
@@ -279,11 +276,8 @@ class Session:
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
         """Note a use of the corrective process if a corrective movement of a solution has no
-        target: the corrective process finds the target.
-
-        Raises UndeclaredError if the method does not declare the corrective process, and
-        SolutionError if the solution is no sequence. Nothing else is checked.
-        """
+        target: the corrective process finds the target. Raises UndeclaredError if the method does
+        not declare it, and SolutionError if the solution is no sequence."""
         if not isinstance(solution, Sequence):
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
         for m in solution:

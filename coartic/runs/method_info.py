@@ -111,10 +111,7 @@ class MethodInfo:
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
         """Return the reason why the method with parameters does not apply to a task; None if it
-        applies.
-
-        Raises CoarticError for wrong parameters.
-        """
+        applies. Raises CoarticError for wrong parameters."""
         reason = self._ask("why_not", parameters or {}, *outline_of(task))
         return None if reason is None else plain(str(reason))
 
@@ -203,10 +200,8 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 @cache
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
     """Return the class of the method with id ``name`` from ``where``, a module or the path of a
-    file. Raises CoarticError if it is not there.
-
-    Another ``code``, the hash of a file, makes the process import the file again.
-    """
+    file, which another ``code``, a hash of it, makes the process import again. Raises CoarticError
+    if it is not there."""
     is_file = where.endswith(".py")
     module = load_file(Path(where)) if is_file else importlib.import_module(where)
     for method in methods_in(module) if is_file else module.METHODS:

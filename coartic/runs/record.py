@@ -219,10 +219,7 @@ class Run:
     @cached_property
     def result(self) -> str:
         """Hash, 16 hex digits, of status, movements with their ticks and configurations, and
-        rewards of all trials.
-
-        Two runs with the same outcome have the same hash, whatever time and evaluations they took.
-        """
+        rewards of all trials; not of times and counts."""
         movements = [[part, *each] for part in PARTS for each in self.movement_data(part)]
         content = json.dumps([self.outcome.status, *movements]).encode()
         return hashlib.sha256(content + reward_bytes(self.outcome.rewards)).hexdigest()[:16]
@@ -357,11 +354,9 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
-    """Execute solutions of a task side by side under the paper's model.
-
-    Returns for each solution, in order, its execution, or, as an object, the error of a solution
-    that breaks the rules of the task, or is too long (:func:`too_long`).
-    """
+    """Execute solutions of a task under the paper's model; return for each, in order, its
+    execution, or, as an object, the error of a solution that breaks the rules of the task, or is
+    too long (:func:`too_long`)."""
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
     executions = iter(execute_many(compiled_task(task, PAPER), short))

@@ -188,12 +188,9 @@ class Store:
         return empty
 
     def replace_plan(self, plan: Sequence[Job], made_with: Mapping[str, Any]) -> None:
-        """Put a plan in place of the earlier plan. Runs that only the earlier plan asked for stay
-        in the file, and no view shows them. ``made_with`` has versions, platform, commit,
-        ``command`` and ``date`` of this command, by name.
-
-        Raises CoarticError if the folder holds another suite.
-        """
+        """Put a plan in place of the earlier plan, whose runs stay in the file. ``made_with`` has
+        versions, platform, commit, ``command`` and ``date`` of this command, by name. Raises
+        CoarticError if the folder holds another suite."""
         first = plan[0]
         environment = dict(made_with)
         if first.suite_trials is not None:
@@ -259,10 +256,7 @@ class Store:
     @contextmanager
     def transaction(self) -> Iterator[None]:
         """Write all changes of this block, or none if it fails. A block within another block is a
-        part of that block.
-
-        Raises CoarticError if the disk is full or the file is gone.
-        """
+        part of that block. Raises CoarticError if the disk is full or the file is gone."""
         if self._db.in_transaction:
             yield
             return
@@ -335,10 +329,8 @@ class Store:
     # Writing and reading runs.
 
     def write(self, runs: Iterable[Run]) -> None:
-        """Write finished runs, all of them or none, in place of earlier runs with their ids.
-
-        Raises CoarticError if the disk is full or a run does not fit the tables.
-        """
+        """Write finished runs, all of them or none, in place of earlier runs with their ids. Raises
+        CoarticError if the disk is full or a run does not fit the tables."""
         with self.transaction():
             for run in runs:
                 try:
@@ -610,11 +602,9 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
-    """Open a results folder for reading in the block of this context.
-
-    Raises CoarticError if the folder has no results, or results in the format of another version,
-    and while a ``coartic run`` writes into it.
-    """
+    """Open a results folder for reading in the block of this context. Raises CoarticError if the
+    folder has no results, or results in the format of another version, and while a ``coartic run``
+    writes into it."""
     path = folder / RUNS_FILE
     with explain_errors(folder):
         try:
@@ -650,11 +640,8 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 @contextmanager
 def writing(folder: Path) -> Iterator[Store]:
     """Open a results folder for writing in the block of this context, by this process alone, and
-    make a missing folder.
-
-    Raises CoarticError if the folder holds something else or cannot be written, and while another
-    process writes into it.
-    """
+    make a missing folder. Raises CoarticError if the folder holds something else or cannot be
+    written, and while another process writes into it."""
     with explain_errors(folder):
         visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
         if not (folder / RUNS_FILE).exists() and any(visible):
@@ -682,11 +669,8 @@ def writing(folder: Path) -> Iterator[Store]:
 @contextmanager
 def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
     """Lock a folder for this process in the block of this context, or, with ``shared``, share the
-    lock with other readers; ``command`` is named in the error. Systems and disks without such locks
-    are left as they are.
-
-    Raises CoarticError while another process holds the lock.
-    """
+    lock with other readers, where the system and the disk have such locks. Raises CoarticError,
+    which names ``command``, while another process holds the lock."""
     try:
         import fcntl
 

@@ -124,8 +124,8 @@ class Posture(FileData):
     first: Span
     """Angle of the first joint from +x, rad, from, to."""
     others: Span
-    """Angle of each other joint from the link before it, rad, from, to, within ±π/2: an arm whose
-    bends are so small is straight, and thereby singular, where they are all 0."""
+    """Angle of each other joint from the link before it, rad, from, to. Within ±π/2 an arm is
+    singular only where all these angles are 0."""
 
 
 _PARKED = Posture(first=(0, 0), others=(0, 0))
@@ -387,8 +387,7 @@ def shipped_families() -> dict[str, Family]:
 
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
     """Return the families read from files, by name. Raises TaskError for a file that cannot be
-    used, and for a name that another of the files or a shipped family has.
-    """
+    used, and for a name that another of the files or a shipped family has."""
     families: dict[str, Family] = {}
     for path in paths:
         family = read_family(path)
