@@ -6,7 +6,6 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from typing import Any, ClassVar, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
@@ -168,8 +167,8 @@ def run_method(
     chosen = as_task(task)
     if (reason := method.why_not(outline_of(chosen))) is not None:
         raise NotApplicableError(reason)
-    built_in = [getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES]
-    is_ours = type(method) in chain.from_iterable(built_in)
+    built_in = (getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES)
+    is_ours = any(type(method) in methods for methods in built_in)
     check_limits("seed", seed, 0, MOST_RUN_SEED)
     session = Session(chosen, int(seed), method.information, model=model, trusted=is_ours)
     result = method.solve(session)

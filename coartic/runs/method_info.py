@@ -33,7 +33,6 @@ _OF_4_0_0 = frozenset(
     }
 )
 """Hashes by which coartic 4.0.0 knew the code of its methods."""
-_VERSION_OF_4_0_0 = "1.1"
 VERSION = re.compile(r"\d+\.\d+")
 """Code of a built-in method, versions of model and method, in place of a hash."""
 
@@ -41,7 +40,7 @@ VERSION = re.compile(r"\d+\.\d+")
 def version_of(code: str) -> str:
     """Return the version that a stored ``code`` of a method stands for: the code itself, except for
     the hashes of coartic 4.0.0, whose methods are version 1.1 each."""
-    return _VERSION_OF_4_0_0 if code in _OF_4_0_0 else code
+    return "1.1" if code in _OF_4_0_0 else code
 
 
 def run_identity(run_id: str) -> tuple[str, str]:

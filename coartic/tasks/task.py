@@ -267,22 +267,12 @@ class Task(FileData):
             if key not in Task.model_fields:
                 meant = did_you_mean(key, _all_keys())
                 raise sentence_error(f"provenance.{key} is not a key of a task{meant}")
-        text = self.initial_hands
         if not self.initial_is_policy:
-            if not text or set(text) - set(LETTERS):
-                raise sentence_error(
-                    f"initial_hands is {brief_value(text)}; it must be a sequence of L and R such "
-                    f"as 'RRRR', or one of {', '.join(INITIAL_POLICIES)}"
-                )
-            if len(text) != len(self.goals):
-                raise sentence_error(
-                    f"initial_hands {brief_value(text)} names {len(text)} hands for "
-                    f"{counted(len(self.goals), 'goal')}"
-                )
-            for hand in sorted({LETTERS[letter] for letter in text} - set(self.hands)):
-                raise sentence_error(
-                    f"initial_hands {text!r} uses the {hand} hand, which is not among hands"
-                )
+            try:
+                check_hands(self, self.initial_hands)
+            except ValueError as error:
+                others = ", ".join(INITIAL_POLICIES)
+                raise sentence_error(f"initial_hands: {error}, or one of {others}") from None
         # No model's corrective process ends farther from a goal than its rim (check_task).
         if info.context != WITHOUT_REACH and (far := _out_of_reach(self, self.radius)) is not None:
             raise sentence_error(far)
