@@ -5,8 +5,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from coartic import Movement, corrective_trial, load_task
-from coartic.method import BudgetError, Information, Session, UndeclaredError
+from coartic import Movement, NotApplicableError, corrective_trial, load_task
+from coartic.benchmarks.registry import built_in
+from coartic.method import BudgetError, Information, Session, UndeclaredError, run_method
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.motion.solution import movements_of
 from tests.support.strategies import make_trials, sample
@@ -26,6 +27,13 @@ def test_a_budget_that_ends_within_a_batch():
     assert len(session.trials([], targets[:0]).ticks) == 0
     with pytest.raises(BudgetError, match="the budget of 7 trials is spent"):
         session.trials(hands, targets)
+
+
+def test_a_method_is_not_run_on_a_task_to_which_it_does_not_apply():
+    two_armed = built_in()["dual-process/EC4"].configure({"trials": 1})
+    with pytest.raises(NotApplicableError, match="'ascending' has no left hand"):
+        run_method(two_armed, "ascending")
+    assert run_method(two_armed, "two-armed-1")[1].trials_made == 1
 
 
 def test_a_method_without_the_corrective_process_does_not_see_it():

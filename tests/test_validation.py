@@ -104,7 +104,8 @@ TASKS = [
     (task("[[5.0, 1.0], [5.0, 2.0]]", "[]"), "goals is []; it needs at least 1 item"),
     ('locked_base = ["x", "y"]\n' + task("[5.0, 2.0]", "[5.0, 20.0]"), "out of reach"),
     ("goal = 1\n" + GOOD, "goal is an unknown key; did you mean 'goals'?"),
-    (task('"RR"', '"RRR"'), "3 hands for 2 goals"),
+    (task('"RR"', '"RRR"'), "initial_hands: hands 'RRR' do not fit task 'mine': needed is"),
+    ("hands = ['left']\n" + GOOD, "needed is a text with L for each of 2 goals, or one of best-"),
     (task('"RR"', '"RX"'), "initial_hands"),
     (task("right = [0.0, 0.0, 0.0, 0.0]", "right = [0.0, 0.0]"), "start.right"),
     (GOOD.partition("[start]")[0] + "q0 = [1.0, 2.0]\n", "q0 has shape (2,)"),
@@ -125,6 +126,7 @@ FAMILIES = [
     (family("[-5, 5]", "[nan, 5]"), "region.x[0] is nan; it should be a finite number"),
     (family("[-5, 5]", "['a', 5]"), "region.x[0] is 'a'; it should be a finite number"),
     (family("[-5, 5]", "[-5, 1e306]"), "region.x[1] is 1e+306; it should be a finite number"),
+    (f"reach = 1{400 * '0'}" + FAMILY, "it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
     ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
 ]
@@ -132,6 +134,8 @@ SUITES = [
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
     (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it should be at least 0"),
+    (SUITE + "grid = {noise_sd = [inf]}", "a finite number, a text"),
+    (SUITE + f"grid = {{noise_sd = [1{400 * '0'}]}}", "a finite number, a text"),
     (SUITE + "grid = {noise_sd = []}", "blocks[0].grid.noise_sd is []; it needs at least 1 item"),
     (suite('["dual-process/EC1"]', "[]"), "blocks[0].methods is []; it needs at least 1 item"),
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5; it should be a whole number"),
@@ -352,13 +356,14 @@ def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monk
 
 Trials = coartic.Optimiser.Parameters
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
+HUGE = 10**400  # beyond the range of float
 UNMASKED = "it should have no masked entries"
 SPAN = np.timedelta64(3, "s")  # NumPy counts it among whole numbers
 ODD = (
     *(None, 3, 2.5, "x", "", [], [1], {}, object(), np.zeros(3), np.array(["a"]), np.nan, True),
     *((np.zeros(10), None), b"x", [None], pd.DataFrame({"a": [1]}), lambda: 0, [[1], [1, 2]]),
     *(-3, np.inf, np.full(10, np.nan), pd.NA, {"a": 1}, MASKED, Path("x"), [True, 1.0], SPAN),
-    *(10**400, [10**400]),
+    *(HUGE, [HUGE]),
 )
 TASK, ROBOT = load_task("ascending"), Robot()
 TRIAL = corrective_trial(TASK, "RRR")

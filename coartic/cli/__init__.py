@@ -85,7 +85,7 @@ for command, example in COMMANDS:
 
 def main() -> None:
     """Run the command line; exit with code 2 after an error that the user can correct, with code 1
-    after an error of the system."""
+    after an error of the system, or if the command found something wrong."""
     gc.set_threshold(100_000, 50, 1_000)  # imported modules stay: collect garbage rarely
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:  # closed: one of our files would get its number

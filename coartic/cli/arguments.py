@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 
 def file_or_folder(metavar: str, what: str, *names: str) -> Any:
-    """Return an option that reads a file or a folder, which need not exist, as a Path, by its flags
-    ``names``, without any by the name of its parameter; ``metavar`` names its value in the help,
-    ``what`` is its help. An empty or impossible name raises CoarticError."""
+    """Return an option that reads a file or a folder, which need not exist, as a Path. Its flags
+    are ``names``, or follow from its parameter; ``metavar`` names its value in the help, ``what``
+    is its help. An empty or impossible name raises CoarticError."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
 
@@ -96,11 +96,8 @@ def names_in(text: str | None) -> list[str]:
 
 
 def _id_named(name: str, names: Mapping[str, str]) -> str:
-    """Return the id for a name or id in any case; an unknown name is returned unchanged.
-
-    ``names`` has the name that people use for each id, or an empty text. If a name is also an id,
-    the id counts.
-    """
+    """Return the id for a name or id in any case, an id before a name; an unknown name is returned
+    unchanged. ``names`` has the name that people use for each id, or an empty text."""
     called = {words.casefold(): each for each, words in names.items() if words}
     ids = {each.casefold(): each for each in names}
     return name if name in names else (called | ids).get(name.casefold(), name)
@@ -128,10 +125,8 @@ def method_names(registered: Registry) -> Mapping[str, str]:
 
 def methods_meant(names: Sequence[str], registered: Registry, *, expand: bool = True) -> list[str]:
     """Return the ids of registered methods from ids, names and wildcards (``optimum/*``) that users
-    write; without ``expand`` a wildcard for several methods is returned unchanged.
-
-    Raises CoarticError for an unknown name.
-    """
+    write; without ``expand`` a wildcard for several methods is returned unchanged. Raises
+    CoarticError for an unknown name."""
     from coartic.benchmarks.registry import methods_named
     from coartic.benchmarks.suites import check_kind
 

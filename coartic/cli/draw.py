@@ -84,16 +84,14 @@ def draw(
 def _film(
     folder: Path, run_ids: Sequence[str], out: Path, initial: bool, width: int, replace: bool
 ) -> None:
-    """Write a film (.gif, .mp4) of one or two runs of a results folder, side by side, or, with
-    ``initial``, of one run next to the corrective process alone. ``width`` is in pixels. Raises
-    CoarticError for more than two movements or an unknown run, and if ``out`` cannot be written or
-    is there without ``replace``."""
+    """Write a film (.gif, .mp4), ``width`` pixels wide, of one or two runs of a results folder side
+    by side, or, with ``initial``, of one run next to the corrective process alone. Raises
+    CoarticError for more movements or an unknown run, and if ``out`` may not be written."""
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
-    from coartic.pictures.film import check_film, write_film
+    from coartic.pictures.film import write_film
 
-    check_film(out, replace=replace)
     if len(run_ids) + initial > 2:
         raise CoarticError("a film shows at most two runs, or one run with --initial")
     movements = []

@@ -92,10 +92,10 @@ def _with_id(name: str, row: Mapping[Any, Any]) -> str:
 def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> None:
     """Print a table, then pairs of a word and a text.
 
-    The table has at most ten methods of the ranking, without settings and ablations: those with the
-    smallest gaps and, wherever they rank, the learner and random search; and all methods from
-    files, with their ids and settings, and of the labels ``asked`` that are in no joined row, also
-    below the ranking. The pairs are the reasons why these are not ranked, the findings on
+    The table has methods of the ranking, without settings and ablations: those with the smallest
+    gaps and, wherever they rank, the learner and random search; and all methods from files, with
+    their ids and settings, and of the labels ``asked`` that are in no joined row, also below the
+    ranking. The pairs are the reasons why these are not ranked, the findings on
     coarticulation and on cost, numbers of runs and trials that are not those of the paper, the
     failed runs, and ``more``.
     """

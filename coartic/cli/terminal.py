@@ -89,8 +89,8 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 class Display:
     """Progress of a command on standard error, such as runs done, failures and time left. On a
-    terminal one line changes; elsewhere a line appears every ten seconds. What takes longer is
-    shown again, with its time so far."""
+    terminal one line changes; elsewhere a line appears every ten seconds at most. What takes
+    longer is shown again, with its time so far."""
 
     EVERY_S = 10.0
 

@@ -10,19 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.method.optimisers import FAILED
-from coartic.motion.batch import SLOTS, Batch, RobotRecord, RunRecord, batch_for, robot_parameters
+from coartic.motion.batch import SLOTS, Batch, RobotRecord, RunRecord
 from coartic.motion.compile import entry, fill_row, inlined, inner
 from coartic.motion.trial import (
     MOVE,
     account,
     begin,
     correct_runs,
-    empty_accounts,
     find_corrections,
     move_runs,
     set_off,
 )
-from coartic.robot import Array, Configs, Hands, Points, Robot
+from coartic.robot import Array, Configs, Hands, Points
 
 Integers = NDArray[np.int64]
 
@@ -76,48 +75,6 @@ class VectorState(NamedTuple):
     indices: Integers
     """Numbers, from 0, of the robots of a lot, shape ``(SLOTS,)``."""
 
-    @classmethod
-    def empty(
-        cls,
-        robot: Robot,
-        shape: tuple[int, int, int],
-        joints: Integers,
-        sides: Hands,
-        entries: int,
-        ahead: int,
-        reach: float,
-    ) -> VectorState:
-        """Return a state in which no task is loaded and no trial goes on. ``robot`` gives arrays
-        their sizes; ``shape`` is ``(N, T, G)``, the numbers of environments, of tasks and, at most,
-        of goals; ``entries`` is the length of an observation; the other arguments are fields
-        (:class:`VectorState`)."""
-        count, tasks, goals = shape
-        batch = batch_for(robot)
-        return cls(
-            task=np.zeros(count, np.int64),
-            goal=np.zeros(count, np.int64),
-            q=np.zeros((count, robot.dof)),
-            going=np.zeros(count, np.bool_),
-            actions=np.zeros((count, len(sides) - 1 + len(joints))),
-            rewards=np.zeros(count),
-            seen=np.zeros((count, entries), np.float32),
-            parameters=robot_parameters(robot)[:0],
-            kinds=np.full(tasks, -1),
-            goals=np.zeros((tasks, goals, 2)),
-            counts=np.zeros(tasks, np.int64),
-            movable=np.zeros((tasks, len(joints)), np.bool_),
-            joints=joints,
-            sides=sides,
-            ahead=ahead,
-            reach=reach,
-            runs=np.stack([batch.runs] * len(sides)),
-            at=batch.at,
-            corrected=batch.corrected,
-            moved=batch.moved,
-            accounts=empty_accounts(robot, SLOTS, 1).goals[:, 0, 0],
-            indices=np.zeros(SLOTS, np.int64),
-        )
-
 
 @inner
 def _squared_distance(run: RunRecord) -> float:
@@ -134,14 +91,8 @@ def _aim_by_action(
     run: RunRecord, other: RunRecord, movable: Any, action: Any, state: VectorState
 ) -> None:
     """Set ``hand``, ``target``, ``converged`` and ``action`` (MOVE) of ``run``, in place, from an
-    action, shape ``(A,)``: phase 2, *aim*.
-
-    ``run`` and, with two hands, ``other`` have the solutions of the corrective process with one
-    hand each. The hand is the hand whose solution is nearer in joint space, or, with two hands and
-    ``action[0] > 0.5``, the other one. The target is the solution of this hand, or, if the process
-    failed, the present posture, plus ``state.reach`` times the last E entries of the action, one
-    for each of ``state.joints``, clipped to ±1, where ``movable``, bool ``(E,)``, is True.
-    """
+    action ``(A,)``, as :class:`.TaskVectorEnv` says. ``run`` and, with two hands, ``other`` have
+    the solutions of the corrective process; ``movable``, ``(E,)``, is True for joints that move."""
     if len(state.sides) > 1:
         is_nearer = _squared_distance(other) < _squared_distance(run)
         if is_nearer != (action[0] > 0.5):
@@ -215,11 +166,8 @@ def observe(*fields: Any) -> None:
 @entry
 def step_robots(*fields: Any) -> int:
     """Let all robots whose trial goes on reach for their next goal; change the arrays ``fields``,
-    the entries of a :class:`VectorState`, in place.
-
-    Returns the number of trials that make their first step; -1 - n, without a movement, if the
-    action of robot n (from 0) is not finite.
-    """
+    the entries of a :class:`VectorState`, in place. Return the number of trials that make their
+    first step; -1 - n, without a movement, if the action of robot n (from 0) is not finite."""
     state = VectorState(*fields)
     last, begun = len(state.task) - 1, 0
     for n in range(last + 1):

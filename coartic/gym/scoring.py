@@ -51,7 +51,7 @@ def score(
         An environment of this package, or its id. Of a family the instances of the test split are
         scored, or of the ``split`` that is given here. An environment in wrappers is taken as it
         is, with its own instances: policies see and do what the wrappers let them, and trials count
-        in ticks; what wrappers learn stays.
+        in ticks; wrappers learn nothing.
     policy : callable, agent, Method or mapping, optional
         Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
         ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
@@ -137,7 +137,7 @@ def score(
 
 def column(rewards: Iterable[float | None]) -> Array:
     """Return K rewards as a column, an array of shape ``(K, 1)``, with NaN for None."""
-    return np.array([[np.nan if reward is None else reward] for reward in rewards])
+    return np.array([[reward] for reward in rewards], np.float64)
 
 
 def is_normaliser(env: Any) -> bool:
@@ -162,11 +162,9 @@ def _normaliser(given: str | Path | Any) -> Any:
 
 
 def _acting(policy: Any, env: Any, normal: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """Return a function from observations of ``env`` to actions for a policy, a function or an
-    agent with ``predict``. Observations are normalised by ``normal``, a ``VecNormalize``, or, for
-    None, as in the agent's own environment, unless ``env`` normalises them itself. Raises TypeError
-    for any other object, and for an agent whose spaces are not those of ``env`` or whose wrappers
-    an ``env`` without wrappers lacks."""
+    """Return a function from observations of ``env`` to actions for a policy. ``normal``, a
+    ``VecNormalize``, normalises observations; for None, unless ``env`` does, the agent's own
+    environment. Raises TypeError for no policy, and an agent of other spaces or wrappers."""
     normalised = any(map(is_normaliser, layers(env)))
     if normal is None and not normalised:
         normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
@@ -222,11 +220,9 @@ def _rollout(
     tasks: int,
     trials: int = 1,
 ) -> Array:
-    """Let ``act``, which gives actions ``(n, A)`` for observations ``(n, O)``, make ``trials``
-    trials on each of ``tasks`` tasks of a :class:`TaskVectorEnv` with these options.
-
-    Returns the total rewards, ticks, shape ``(tasks, trials)``; NaN where a trial failed.
-    """
+    """Let ``act``, which gives actions ``(n, A)`` for observations ``(n, O)``, make trials on each
+    task of a :class:`TaskVectorEnv` with these options. Return the total rewards, ticks, shape
+    ``(tasks, trials)``; NaN where a trial failed."""
     rows = np.arange(trials * tasks)
     robots, totals = TaskVectorEnv(len(rows), **options), np.zeros(len(rows))
     robots._begin(rows, rows // trials)
@@ -240,10 +236,9 @@ def _rollout(
 def _rollout_as_it_is(
     act: Callable[[NDArray[np.float32]], ArrayLike], env: Any, tasks: int, seed: int
 ) -> Array:
-    """Let ``act``, which gives actions ``(n, A)`` for observations ``(n, O)``, make trials in an
-    environment in wrappers, reset with ``seed``, until each of its ``tasks`` tasks had one. Return
-    the total reward of the first trial on each task, ticks, shape ``(tasks, 1)``; NaN where the
-    trial failed or was cut short."""
+    """Let ``act`` (:func:`_rollout`) make trials in an environment in wrappers, reset with
+    ``seed``, until each of its ``tasks`` tasks had one. Return the total reward of the first trial
+    on each task, ticks, shape ``(tasks, 1)``; NaN where it failed or was cut short."""
     robots, is_one = robots_of(env), isinstance(env, gymnasium.Env)
     totals, rewards = np.zeros(robots.num_envs), dict[int, float]()
 
@@ -273,20 +268,18 @@ def _rollout_as_it_is(
 def _as_learned(env: Any) -> Iterator[None]:
     """Set ``training`` and ``update_running_mean`` of an environment and its wrappers to False in
     the block of this context, so that they keep the means by which they normalise."""
-    names = "training", "update_running_mean"
     learning = [
-        (each, name)
+        (each, name, getattr(each, name))
         for each in layers(env)
-        for name in names
+        for name in ("training", "update_running_mean")
         if name in vars(each) or isinstance(getattr(type(each), name, None), property)
     ]
-    before = [getattr(each, name) for each, name in learning]
     try:
-        for each, name in learning:
+        for each, name, _ in learning:
             setattr(each, name, False)
         yield
     finally:
-        for (each, name), value in zip(learning, before, strict=True):
+        for each, name, value in learning:
             setattr(each, name, value)
 
 

@@ -55,12 +55,9 @@ class RobotEnvs(VecEnv):
     def step_wait(self) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], list[Any]]:
         """Let all N robots reach for their next goal by the actions of :meth:`step_async`.
 
-        Returns observations ``(N, O)``; rewards ``(N,)``: minus the ticks of this step, as a share
-        of the ticks that the corrective process alone takes for the whole trial (1,000,000 where it
-        fails), never below -2; True for trials that have ended, ``(N,)``; and N dictionaries. A
-        trial that has ended starts again at once: its observation is the first of the next trial,
-        and its dictionary has ``terminal_observation`` and ``episode`` (``r``: reward in ticks,
-        ``l``: number of steps, ``t``: 0).
+        Returns observations ``(N, O)``, rewards ``(N,)``, True for trials that have ended,
+        ``(N,)``, and N dictionaries, as :class:`RobotEnvs` says; ``episode`` has ``r`` (reward in
+        ticks), ``l`` (number of steps) and ``t`` (0).
         """
         costs = np.array([self._cost(task) for task in self.robots.state.task.tolist()])
         observations, rewards, ended, _, seen = self.robots.step(self._actions)

@@ -20,8 +20,8 @@ from coartic.gym.kernel import VectorState, observe, step_robots
 from coartic.internal.limits import MOST_RUN_SEED, brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.batch import robot_parameters
-from coartic.motion.trial import count_trials
+from coartic.motion.batch import SLOTS, batch_for, robot_parameters
+from coartic.motion.trial import count_trials, empty_accounts
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.catalogue import as_task
 from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
@@ -160,26 +160,42 @@ class TaskVectorEnv(Recorded, VectorEnv):
         self.names = np.array([getattr(each, "name", each) for each in self.tasks], dtype=object)
         # All robots are taken for the widest, some of whose links have no length.
         self._widest = Robot((1.0,) * links, (1.0,) * links)
-        self._starts = np.zeros((len(self.tasks), self._widest.dof))
         self._kind_of: dict[Any, int] = {}  # number of each robot with its locks and size of goals
         base = [place for place, axis in enumerate("xy") if axis not in locked]
         arms = [np.arange(self._widest.dof)[self._widest.joints(hand)] for hand in hands]
         joints, view = np.concatenate([base, *arms]).astype(np.int64), ahead + 1
         sizes = [view, 2 * view + len(joints), len(joints) * (fewest < links)]
         high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
-        self.state = VectorState.empty(
-            self._widest,
-            (num_envs, len(self.tasks), goals),
-            joints,
-            np.array([HANDS.index(hand) for hand in hands]),
-            len(high),
-            ahead,
-            REACH,
+        tasks, batch, dof = len(self.tasks), batch_for(self._widest), self._widest.dof
+        self.state = VectorState(  # in which no task is loaded and no trial goes on
+            task=np.zeros(num_envs, np.int64),
+            goal=np.zeros(num_envs, np.int64),
+            q=np.zeros((num_envs, dof)),
+            going=np.zeros(num_envs, np.bool_),
+            actions=np.zeros((num_envs, len(hands) - 1 + len(joints))),
+            rewards=np.zeros(num_envs),
+            seen=np.zeros((num_envs, len(high)), np.float32),
+            parameters=robot_parameters(self._widest)[:0],
+            kinds=np.full(tasks, -1),
+            goals=np.zeros((tasks, goals, 2)),
+            counts=np.zeros(tasks, np.int64),
+            movable=np.zeros((tasks, len(joints)), np.bool_),
+            joints=joints,
+            sides=np.array([HANDS.index(hand) for hand in hands]),
+            ahead=ahead,
+            reach=REACH,
+            runs=np.stack([batch.runs] * len(hands)),
+            at=batch.at,
+            corrected=batch.corrected,
+            moved=batch.moved,
+            accounts=empty_accounts(self._widest, SLOTS, 1).goals[:, 0, 0],
+            indices=np.zeros(SLOTS, np.int64),
         )
         self.single_action_space = Box(-1.0, 1.0, self.state.actions.shape[1:], np.float32)
         self.single_observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._starts = np.zeros((tasks, dof))
         self._rngs: list[Any] = [None] * num_envs
 
     def task_at(self, number: int) -> Task:
@@ -226,12 +242,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
         observe(*self.state)
 
     def _move(self, actions: Array, rows: RowIndex = slice(None)) -> None:
-        """Let all robots whose trial goes on reach for their next goal; the results go into the
-        state, in place. ``actions``, shape ``(n, A)``, are of the n robots ``rows``; other robots
-        keep their actions.
-
-        Raises ValueError for actions of another shape, or that are not finite.
-        """
+        """Let all robots whose trial goes on reach for their next goal; change the state in place.
+        ``actions``, ``(n, A)``, are of the n robots ``rows``; other robots keep their actions.
+        Raises ValueError for actions of another shape, or that are not finite."""
         shape = self.state.actions[rows].shape
         if actions.shape != shape:
             raise ValueError(f"actions have shape {actions.shape}; it must be {shape}")

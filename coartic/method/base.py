@@ -6,11 +6,11 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from typing import Any, ClassVar, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
+from coartic.errors import NotApplicableError
 from coartic.internal.limits import MOST_RUN_SEED, check_limits
 from coartic.internal.validation import in_sentences
 from coartic.method.session import Information, MethodError, Session
@@ -54,7 +54,7 @@ class Outline(NamedTuple):
     dof: int
     """Number of degrees of freedom of the robot."""
     hands: tuple[Hand, ...]
-    """Hands that the robot has, of ``"left"`` and ``"right"``."""
+    """Hands that may hit goals, of ``"left"`` and ``"right"``."""
     initial_hands: str
     """Hand sequence, such as ``"RRRR"``, or policy that the task names for a first solution."""
 
@@ -71,8 +71,7 @@ class Outline(NamedTuple):
 
 
 def outline_of(task: Task) -> Outline:
-    """Return name, number of goals, dof, hands and initial hands of a task, by which a method says
-    whether it applies."""
+    """Return the properties of a task by which a method says whether it applies."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
@@ -165,10 +164,13 @@ def run_method(
     SolutionError if its solution is no list, and ValueError for a seed that is no whole number from
     0.
     """
-    built_in = [getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES]
-    is_ours = type(method) in chain.from_iterable(built_in)
+    chosen = as_task(task)
+    if (reason := method.why_not(outline_of(chosen))) is not None:
+        raise NotApplicableError(reason)
+    built_in = (getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES)
+    is_ours = any(type(method) in methods for methods in built_in)
     check_limits("seed", seed, 0, MOST_RUN_SEED)
-    session = Session(as_task(task), int(seed), method.information, model=model, trusted=is_ours)
+    session = Session(chosen, int(seed), method.information, model=model, trusted=is_ours)
     result = method.solve(session)
     session.check_solution(result.solution)
     return result, session

@@ -10,9 +10,8 @@ import math
 import os
 import warnings
 from abc import abstractmethod
-from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,9 +63,6 @@ OPTIMISER_INFORMATION = frozenset({Information.CORRECTIVE_PROCESS, Information.R
 FAILED = 1_000_000
 """Cost of a trial that fails, ticks. One that takes so long has failed, too."""
 HALF_WIDTH = 1.0
-# For type checkers, which take an array of unknown shape for one point.
-Vector = np.ndarray[tuple[int], np.dtype[Any]]
-Matrix = np.ndarray[tuple[int, int], np.dtype[Any]]
 CHUNK = 8192
 """Points that are evaluated at a time, so that many take no more memory."""
 NO_COPIES = (
@@ -124,8 +120,7 @@ class Objective:
 
     The first trials are made at once: the corrective process alone, with ``hands`` or with every
     hand sequence; the best sequence is kept. A point has these hands, unless others are given
-    with it: the lowest cost of points is the cost of the best solution with these hands; solutions
-    with other hands may cost less.
+    with it; solutions with other hands may cost less.
 
     Threads can share an objective, which makes their trials one after the other. A copy is refused,
     in another process as well: it would not count for the budget.
@@ -316,7 +311,7 @@ class Objective:
 
     def movements(self, x: ArrayLike, hands: str | None = None) -> tuple[Movement, ...]:
         """Return the movements of the trial of a point, for :func:`coartic.execute`, which then
-        takes as many ticks as the point costs. No trial is counted.
+        takes as many ticks as the point costs, unless the trial fails. No trial is counted.
 
         ``x`` is the point, shape ``(dim,)``; ``hands`` is the hand sequence of the trial, by
         default :attr:`hands` of this objective. A movement has a target of all joints (one that has
@@ -344,14 +339,6 @@ class Objective:
 
     # Evaluation.
 
-    @overload
-    def __call__(self, x: Sequence[float] | Vector, hands: str | None = None) -> float: ...
-
-    @overload
-    def __call__(
-        self, x: Sequence[Sequence[float]] | Matrix, hands: str | None = None
-    ) -> Array: ...
-
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
         """Return the cost, ticks, of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)``,
         columns as scipy has them. Raises ValueError for shape ``(dim, dim)``, in which points may
@@ -378,7 +365,7 @@ class Objective:
             cost = float(min(-made.rewards.item(), FAILED))
             self._evaluations += 1
             if cost < self._best_cost:
-                self._keep(cost, self._evaluations, point, self._codes, made, 0)
+                self._keep(cost, self._evaluations, point, self._codes[0], made, 0)
             self._warn_of_degrees(cost, made, 0)
         return cost
 
@@ -405,25 +392,20 @@ class Objective:
             left = self._trials_left(len(array))
             for first in range(0, left, CHUNK):
                 part = slice(first, min(first + CHUNK, left))
-                self._evaluate(array[part], codes[part], costs[part])
+                some, hand_codes, points = costs[part], codes[part], array[part]
+                made = self._session._make_trials(hand_codes, self._targets_of(points))
+                np.minimum(-made.rewards, FAILED, out=some)
+                if some.min() < self._best_cost:
+                    before = np.minimum.accumulate(np.append(self._best_cost, some))[:-1]
+                    for n in np.flatnonzero(some < before).tolist():
+                        at = self._evaluations + n + 1
+                        self._keep(float(some[n]), at, points[n], hand_codes[n], made, n)
+                self._evaluations += len(points)
+                worst = int(some.argmax())
+                self._warn_of_degrees(some[worst], made, worst)
         if left < len(array):
             raise BudgetError("all trials of the budget are made")
         return costs
-
-    def _evaluate(self, points: Array, codes: Hands, costs: Array) -> None:
-        """Make a trial for each point ``(N, dim)`` with hands ``codes``, 0 left or 1 right, ``(N,
-        G)``; write costs, ticks, into ``costs`` ``(N,)``, in place; count the evaluations, and keep
-        each point that is better than all before it."""
-        made = self._session._make_trials(codes, self._targets_of(points))
-        np.minimum(-made.rewards, FAILED, out=costs)
-        if costs.min() < self._best_cost:
-            before = np.minimum.accumulate(np.append(self._best_cost, costs))[:-1]
-            for n in np.flatnonzero(costs < before).tolist():
-                at = self._evaluations + n + 1
-                self._keep(float(costs[n]), at, points[n], codes, made, n)
-        self._evaluations += len(points)
-        worst = int(costs.argmax())
-        self._warn_of_degrees(costs[worst], made, worst)
 
     def _warn_of_degrees(self, cost: float, made: Accounts, trial: int) -> None:
         """Warn, except in a method, that targets of trial ``trial`` (from 0) of ``made`` may be
@@ -432,16 +414,16 @@ class Objective:
         if self._task is not None and cost > WHOLE_TURNS / self._session.model.step:
             targets = self._targets_in(made, trial)
             if hint := hint_of(movements_of(self.hands, targets)):
-                warnings.warn(hint, stacklevel=4)
+                warnings.warn(hint, stacklevel=3)
 
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
     ) -> None:
-        """Note a point and its ``cost``, ticks, as the best so far, evaluated as number
-        ``evaluations`` (from 1): its trial is row ``trial`` (from 0) of ``codes`` and ``made``."""
+        """Note a point, its ``cost``, ticks, and its hands ``codes``, ``(G,)``, as the best so far,
+        evaluated as number ``evaluations`` (from 1), in trial ``trial`` (from 0) of ``made``."""
         self._best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(made, trial)
-        self._best_hands = letters_of([HANDS[code] for code in codes[trial]])
+        self._best_hands = letters_of([HANDS[code] for code in codes])
         self._better.append((evaluations, cost))
 
     def _targets_in(self, made: Accounts, trial: int) -> Configs:
@@ -613,7 +595,7 @@ class Optimiser(Method):
     def solve(self, session: Session) -> Result:
         """Call :meth:`optimise` until it returns or the trials are used up; return the movements of
         the best trial. Raises MethodError if there is no trial to make, if the corrective process
-        completes no hand sequence, or if no point is evaluated."""
+        completes no hand sequence, or if no point is evaluated although trials are left."""
         parameters: OptimiserParameters = self.parameters
         try:
             cost = Objective(

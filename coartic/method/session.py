@@ -13,7 +13,7 @@ from threading import RLock
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value, check_limits, real_array
@@ -211,7 +211,7 @@ class Session:
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Hands that the robot has, of ``"left"`` and ``"right"``."""
+        """Hands that may hit goals, of ``"left"`` and ``"right"``."""
         return self._task.hands
 
     @property
@@ -257,10 +257,7 @@ class Session:
     @property
     def robot(self) -> Robot:
         """The robot, with lengths of links and places of shoulders. Raises UndeclaredError without
-        ``Information.KINEMATIC_MODEL``.
-
-        The method itself counts evaluations of the robot's kinematics, with :meth:`spend`.
-        """
+        ``Information.KINEMATIC_MODEL``. The method itself counts evaluations (:meth:`spend`)."""
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot
 
@@ -279,12 +276,9 @@ class Session:
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
         """Note a use of the corrective process if a corrective movement of a solution has no
-        target: the corrective process finds the target.
-
-        Raises UndeclaredError if the method does not declare the corrective process, and
-        SolutionError if the solution is no sequence. Nothing else is checked.
-        """
-        if not isinstance(solution, (tuple, list, Sequence)):  # in the order of their speed
+        target: the corrective process finds the target. Raises UndeclaredError if the method does
+        not declare it, and SolutionError if the solution is no sequence."""
+        if not isinstance(solution, Sequence):
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
         for m in solution:
             if getattr(m, "kind", "") == "corrective" and m.target is None:
@@ -292,15 +286,13 @@ class Session:
 
     def _use(self, *information: Information) -> None:
         for item in information:
-            if item in self._used:
-                continue
             if item not in self._information:
                 declared = ", ".join(sorted(self._information)) or "nothing"
                 raise UndeclaredError(
                     f"the method used {item.value!r}, which it does not declare (declared: "
                     f"{declared})"
                 )
-            self._used.add(item)
+        self._used.update(information)
 
     # Calls that are counted.
 
@@ -328,8 +320,8 @@ class Session:
         its iterations, Jacobians and evaluations. Return the configuration that it finds: the last
         iterate, without an error, if the result is not ``converged``. No movement is made.
 
-        Raises UndeclaredError without ``Information.CORRECTIVE_PROCESS``, and ValueError for
-        arguments that do not fit the task."""
+        Raises UndeclaredError without ``Information.CORRECTIVE_PROCESS``, and ValueError for a goal
+        that the task lacks, and a ``q`` or hand that does not fit the robot."""
         self._use(Information.CORRECTIVE_PROCESS)
         check_limits("goal", goal, 1, self.goals_count)
         correction = correct(
@@ -395,7 +387,7 @@ class Session:
         or two more evaluations of forward kinematics per goal. Where the corrective process is not
         declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
         Raises UndeclaredError without ``Information.REWARD_BY_TRIAL``, BudgetError where no trial
-        is left, ValueError for arrays that do not fit the task.
+        is left, ValueError for hands or arrays that do not fit.
         """
         self._use(Information.REWARD_BY_TRIAL)
         given = check_targets(self._task, targets)
@@ -407,7 +399,7 @@ class Session:
             raise ValueError(f"until has shape {until.shape}; needed is {given.shape[:1]}")
         with self.lock:
             left = self._affordable(len(given))
-            accounts = self._make_trials(codes[:left], given[:left], until=until)
+            accounts = self._make_trials(codes[:left], given[:left], until)
         trials = trials_of(accounts, self.dof)
         if Information.CORRECTIVE_PROCESS in self._information:
             return trials
@@ -440,16 +432,13 @@ class Session:
         not fit the task or ``count``."""
         return hand_codes(self._task, hands, count)
 
-    def _make_trials(
-        self, codes: Hands, targets: Configs, *, until: ArrayLike | None = None
-    ) -> Accounts:
-        """Make and count N trials, with hands 0 (left) or 1 (right), ``(N, G)``, and targets ``(N,
-        G, dof)``, and return their accounts; with ``until``, rewards ``(N,)``, count and return
-        only trials up to the first whose reward exceeds its entry. Neither arguments nor the budget
-        are checked: the caller checks them, and holds ``lock``."""
+    def _make_trials(self, codes: Hands, targets: Configs, until: Array | None = None) -> Accounts:
+        """Make and count N trials (:meth:`trials`) with hands 0 (left) or 1 (right), ``(N, G)``;
+        return their accounts. The caller checks arguments and budget, and holds ``lock``;
+        ``until`` may be longer."""
         accounts = make_trials(self._compiled, codes, targets[:, :, None], outside=not self._of_run)
         if until is not None:
-            better = trials_of(accounts, self.dof).rewards > np.asarray(until)[: len(targets)]
+            better = trials_of(accounts, self.dof).rewards > until[: len(targets)]
             if better.any():
                 made = int(better.argmax()) + 1
                 accounts = Accounts._make(each[:made] for each in accounts)
@@ -458,9 +447,9 @@ class Session:
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """Return the hand sequence of the first trial, such as ``"RRRR"``: the sequence that the
-        task names, whatever ``hands``, or, if the task names a policy, the sequence of ``hands``
-        (by default all of the robot) with which the corrective process alone gets the highest
-        reward, among sequences of one hand (``"best-single-hand"``) or all (``"best-of-all"``).
+        task names, or, if the task names a policy, the sequence of ``hands`` (by default the
+        task's) with which the corrective process alone gets the highest reward, among sequences of
+        one hand (``"best-single-hand"``) or all (``"best-of-all"``).
 
         Trials of this search are counted as ``initial_trials``, not among the method's trials or in
         its budget. Raises NotApplicableError if no sequence completes the task, or more than 4096
@@ -496,7 +485,7 @@ class Session:
 
     @property
     def trials_made(self) -> int:
-        """Number of trials made so far."""
+        """Number of trials made so far, without trials of the search for the initial hands."""
         return self._meter.trials
 
     @property
@@ -513,7 +502,7 @@ class Session:
 
     @property
     def rewards(self) -> list[int | None]:
-        """Total reward of each trial made, in order, a new list; None where a trial failed."""
+        """Total reward of each of these trials, in order, a new list; None where one failed."""
         return [None if reward == NO_REWARD else reward for reward in self._rewards]
 
     # Counts that the method adds itself.

@@ -36,12 +36,10 @@ def draw_robot(
     alpha: float = 1.0,
     colour: str = _BLACK,
 ) -> Callable[[Array], None]:
-    """Draw the base and the arms of the task's hands in configuration ``q``, shape ``(dof,)``.
-
-    Returns a function that moves the drawing to another configuration. ``weight`` scales the width
-    of lines; ``alpha`` is the opacity, from 0 to 1; ``colour`` is a colour of Matplotlib. Set the
-    limits of ``axes`` yourself: the base does not widen them.
-    """
+    """Draw the base and the arms of the task's hands in configuration ``q``, shape ``(dof,)``;
+    return a function that moves the drawing to another configuration. ``weight`` scales the width
+    of lines; ``alpha`` is the opacity, from 0 to 1. Set the limits of ``axes`` yourself: the base
+    does not widen them."""
     base = Polygon(
         task.robot.base_outline(q),
         facecolor=(_BASE_GREY, 0.25 * alpha),
@@ -88,8 +86,8 @@ def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
 
 def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) -> None:
     """Write the number of every goal, from 1, above it, or below where another goal is close above.
-    ``weight`` scales the distance; ``text`` has options of ``Axes.annotate``, such as ``fontsize``.
-    """
+    ``weight`` scales the distance; ``text`` has options of ``Axes.annotate`` that are not set here,
+    such as ``fontsize``."""
     goals = task.goal_array
     right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
     crowded = _CROWDED * task.robot.scale

@@ -28,7 +28,6 @@ from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals, 
 if TYPE_CHECKING:
     from coartic.pictures.trajectories import Trajectory
 
-FILMS = (".gif", ".mp4")
 LASTS_S = 10.0
 """Seconds that the longest movement takes; one of fewer ticks than frames takes less."""
 PAUSE_S, HOLD_S = 0.5, 2.5
@@ -48,17 +47,19 @@ def write_film(
     width: int = 800,
     replace: bool = False,
 ) -> tuple[int, float]:
-    """Write a film of movements side by side, all from their first tick.
+    """Write a film, ``width`` pixels wide, of movements side by side, all from their first tick;
+    return the number of frames that differ, and the ticks that are shown in a second.
 
-    ``movements`` are pairs of a title and a trajectory. Returns the number of frames that differ,
-    and the ticks that are shown in a second.
-
-    ``width`` of the picture is in pixels. A movement that ends before the longest one then stands
-    still. Without ``replace`` no file is written over. Raises CoarticError for movements without a
-    tick, for an ending other than .gif and .mp4, for MP4 without ffmpeg, and if the file cannot be
-    written.
+    ``movements`` are pairs of a title and a trajectory. A movement that ends before the longest one
+    then stands still. Raises CoarticError for movements without a tick, for an ending other than
+    .gif and .mp4, for MP4 without ffmpeg, and if the file cannot be written, or is there without
+    ``replace``.
     """
-    check_film(path, replace=replace)
+    check_ending(path, [".gif", ".mp4"])
+    is_mp4 = path.suffix.lower() == ".mp4"
+    if is_mp4 and not FFMpegWriter.isAvailable():
+        raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
+    check_output(path, replace=replace)
     ticks = max(len(movement.configurations) for _, movement in movements)
     if ticks == 0:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
@@ -73,8 +74,7 @@ def write_film(
     rate: Any = 1 / interval_s
     # Pillow's writer cuts milliseconds off to whole ones: half a one more, or 70 may become 69.
     gif_rate: Any = 1000 / (1000 * interval_s + 0.5)
-    mp4 = path.suffix.lower() == ".mp4"
-    writer = FFMpegWriter(rate, codec="h264") if mp4 else PillowWriter(gif_rate)
+    writer = FFMpegWriter(rate, codec="h264") if is_mp4 else PillowWriter(gif_rate)
     try:
         with errors_in_words(path), tempfile.TemporaryDirectory() as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
@@ -88,16 +88,6 @@ def write_film(
     except subprocess.CalledProcessError as error:
         raise CoarticError(f"cannot write {path}: ffmpeg failed: {error.stderr}") from None
     return len(rows), stride / interval_s
-
-
-def check_film(path: Path, *, replace: bool = False) -> None:
-    """Raise CoarticError for a film whose name does not end in .gif or .mp4, for MP4 without
-    ffmpeg, and if the file cannot be written or is there without ``replace``. Nothing is written.
-    """
-    check_ending(path, FILMS)
-    if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
-        raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
-    check_output(path, replace=replace)
 
 
 def _set_scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:

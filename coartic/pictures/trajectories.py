@@ -139,23 +139,10 @@ class Trajectory:
         width: Annotated[int, Field(ge=200, le=3840)] = 560,
         replace: bool = False,
     ) -> None:
-        """Write a film of the movement.
-
-        Parameters
-        ----------
-        path : str or pathlib.Path
-            The file, ``.gif`` or, where ffmpeg is installed, ``.mp4``.
-        width : int
-            Width of the picture, pixels.
-        replace : bool
-            Whether a file that is there is written over.
-
-        Raises
-        ------
-        CoarticError
-            The name ends otherwise, no control tick was made, or the file cannot be written, or is
-            there and ``replace`` is False.
-        """
+        """Write a film of the movement, ``width`` pixels wide, as a file ``.gif`` or, where ffmpeg
+        is installed, ``.mp4``; with ``replace`` a file that is there is written over. Raises
+        CoarticError for another ending, if no control tick was made, and if the file cannot be
+        written, or is there and ``replace`` is False."""
         from coartic.pictures.film import write_film
 
         title = f"{self.task.name}, {self.execution.hands}"

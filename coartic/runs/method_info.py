@@ -33,7 +33,6 @@ _OF_4_0_0 = frozenset(
     }
 )
 """Hashes by which coartic 4.0.0 knew the code of its methods."""
-_VERSION_OF_4_0_0 = "1.1"
 VERSION = re.compile(r"\d+\.\d+")
 """Code of a built-in method, versions of model and method, in place of a hash."""
 
@@ -41,7 +40,7 @@ VERSION = re.compile(r"\d+\.\d+")
 def version_of(code: str) -> str:
     """Return the version that a stored ``code`` of a method stands for: the code itself, except for
     the hashes of coartic 4.0.0, whose methods are version 1.1 each."""
-    return _VERSION_OF_4_0_0 if code in _OF_4_0_0 else code
+    return "1.1" if code in _OF_4_0_0 else code
 
 
 def run_identity(run_id: str) -> tuple[str, str]:
@@ -111,10 +110,7 @@ class MethodInfo:
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
         """Return the reason why the method with parameters does not apply to a task; None if it
-        applies.
-
-        Raises CoarticError for wrong parameters.
-        """
+        applies. Raises CoarticError for wrong parameters."""
         reason = self._ask("why_not", parameters or {}, *outline_of(task))
         return None if reason is None else plain(str(reason))
 
@@ -139,9 +135,7 @@ process imports no method file."""
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     """Return the result of the function of :class:`MethodInfo` that ``question`` names:
-    ``"complete"`` (parameters with defaults, as plain data, without parameters in
-    :attr:`.Method.later` that have their default), ``"why_not"`` (what the method returns: a reason
-    or None) or ``"rules"``.
+    ``"complete"``, ``"why_not"`` or ``"rules"``.
 
     ``arguments`` are parameters (none for ``"rules"``), then for ``"why_not"`` the entries of an
     outline. Raises CoarticError for parameters that do not fit, and if ``why_not`` of the method
@@ -177,7 +171,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
-    """Return the info of a method from its class and the other fields of :class:`MethodInfo`."""
+    """Return the info of a method from its class, its ``origin`` (``built in``, or the path of its
+    file), ``where`` a worker imports it (module or file) and its ``code``."""
     return MethodInfo(
         name=method.name,
         title=method.title,
@@ -204,10 +199,8 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 @cache
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
     """Return the class of the method with id ``name`` from ``where``, a module or the path of a
-    file. Raises CoarticError if it is not there.
-
-    Another ``code``, the hash of a file, makes the process import the file again.
-    """
+    file, which another ``code``, a hash of it, makes the process import again. Raises CoarticError
+    if it is not there."""
     is_file = where.endswith(".py")
     module = load_file(Path(where)) if is_file else importlib.import_module(where)
     for method in methods_in(module) if is_file else module.METHODS:

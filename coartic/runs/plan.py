@@ -55,11 +55,8 @@ class Cell:
 
     @cached_property
     def digest(self) -> str:
-        """Hash, 64 hex digits, of task, method, parameters, model and trial budget, not of the
-        method's code.
-
-        A time limit is not among them: it can prevent a result, and cannot change one.
-        """
+        """Hash, 64 hex digits, of task, method, parameters, model and trial budget; not of the
+        method's code, nor of a time limit, which can prevent a result, and cannot change one."""
         return hash_of(
             {
                 "task": self.definition,
@@ -99,8 +96,7 @@ class Job:
         return f"{digits}-{self.cell.method.code if code is None else code}"
 
     def run_seed(self, number: int) -> int:
-        """Return the seed of the random numbers of run ``number``, from the suite's seed, the
-        task's name and ``number``: the same for all methods."""
+        """Return the seed of the random numbers of run ``number`` (:func:`run_seed`)."""
         return run_seed(self.seed, self.cell.task.name, number)
 
 
@@ -133,10 +129,8 @@ def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
 
 
 def run_seed(suite_seed: int, task: str, number: int) -> int:
-    """Return the seed of a run, from the suite's seed, the task's name and the run's number alone.
-
-    Every method gets the same seed for the same task and number, so that runs are paired.
-    """
+    """Return the seed of a run, from the suite's seed, the task's name and the run's number alone:
+    the same for all methods, so that runs are paired."""
     words = np.frombuffer(hashlib.sha256(task.encode()).digest()[:16], dtype="<u4")
     sequence = np.random.SeedSequence(suite_seed, spawn_key=(*map(int, words), number))
     return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))

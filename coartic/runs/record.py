@@ -181,20 +181,19 @@ class Run:
 
     @property
     def early_corrections(self) -> int | None:
-        """Corrective movements in the first tenth of a learner's trials after trial 0; None for
-        other methods and failed runs."""
+        """Corrective movements in the first tenth of a learner's trials after trial 0; None if they
+        were not counted."""
         return self._corrections(1)
 
     @property
     def late_corrections(self) -> int | None:
-        """Corrective movements in the last tenth of a learner's trials; None for other methods and
-        failed runs."""
+        """Corrective movements in the last tenth of a learner's trials; None if they were not
+        counted."""
         return self._corrections(-1)
 
     def _corrections(self, place: int) -> int | None:
-        """Return the corrective movements of a learner in trial 0 (place 0) or in a tenth of the
-        other trials (places 1 to 10; -1 is the last); None if they were not counted, or if what the
-        method stored by this name is no list of 11 counts."""
+        """Return the corrective movements of a learner in a tenth of its trials after trial 0 (1 to
+        10; -1 is the last); None unless the method stored a list of 11 counts by this name."""
         counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
         if not isinstance(counts, list) or len(counts) != 11:
             return None
@@ -220,10 +219,7 @@ class Run:
     @cached_property
     def result(self) -> str:
         """Hash, 16 hex digits, of status, movements with their ticks and configurations, and
-        rewards of all trials.
-
-        Two runs with the same outcome have the same hash, whatever time and evaluations they took.
-        """
+        rewards of all trials; not of times and counts."""
         movements = [[part, *each] for part in PARTS for each in self.movement_data(part)]
         content = json.dumps([self.outcome.status, *movements]).encode()
         return hashlib.sha256(content + reward_bytes(self.outcome.rewards)).hexdigest()[:16]
@@ -320,9 +316,9 @@ def movement_data(movement: Movement) -> list[Any]:
     """Return a movement as a list of goal, hand, kind, ticks and path: the form in which workers
     send, hashes count and folders store movements.
 
-    The path is JSON: the target, or the waypoints of a movement of kind ``path``; None stands for
-    missing ticks and a missing target. Adding 0.0 drops the sign of -0.0. Raises TypeError,
-    ValueError or AttributeError for a movement that has no such form.
+    The path is JSON: the target, or the waypoints of a movement of kind ``path``, without the sign
+    of -0.0; None stands for missing ticks and a missing target. Raises TypeError, ValueError or
+    AttributeError for a movement that has no such form.
     """
     m, place = movement, movement.target
     if m.waypoints is not None:
@@ -358,11 +354,9 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
-    """Execute solutions of a task side by side under the paper's model.
-
-    Returns for each solution, in order, its execution, or, as an object, the error of a solution
-    that breaks the rules of the task, or is too long (:func:`too_long`).
-    """
+    """Execute solutions of a task under the paper's model; return for each, in order, its
+    execution, or, as an object, the error of a solution that breaks the rules of the task, or is
+    too long (:func:`too_long`)."""
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
     executions = iter(execute_many(compiled_task(task, PAPER), short))
@@ -380,9 +374,8 @@ def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
         corners += [] if movement.target is None else [movement.target]
     if (count := sum(map(np.size, corners))) > _MOST_NUMBERS:
         return SolutionError(f"its paths have {count} numbers; at most {_MOST_NUMBERS} are allowed")
-    if (
-        len({np.shape(corner) for corner in corners}) == 1
-    ):  # otherwise the solution breaks the rules
+    shapes = {np.shape(corner) for corner in corners}
+    if len(shapes) == 1:  # otherwise the solution breaks the rules
         with np.errstate(over="ignore"):
             steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / PAPER.step
         if steps > MOST_STEPS:

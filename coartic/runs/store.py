@@ -188,12 +188,9 @@ class Store:
         return empty
 
     def replace_plan(self, plan: Sequence[Job], made_with: Mapping[str, Any]) -> None:
-        """Put a plan in place of the earlier plan. Runs that only the earlier plan asked for stay
-        in the file, and no view shows them. ``made_with`` has versions, platform, commit,
-        ``command`` and ``date`` of this command, by name.
-
-        Raises CoarticError if the folder holds another suite.
-        """
+        """Put a plan in place of the earlier plan, whose runs stay in the file. ``made_with`` has
+        versions, platform, commit, ``command`` and ``date`` of this command, by name. Raises
+        CoarticError if the folder holds another suite."""
         first = plan[0]
         environment = dict(made_with)
         if first.suite_trials is not None:
@@ -259,10 +256,7 @@ class Store:
     @contextmanager
     def transaction(self) -> Iterator[None]:
         """Write all changes of this block, or none if it fails. A block within another block is a
-        part of that block.
-
-        Raises CoarticError if the disk is full or the file is gone.
-        """
+        part of that block. Raises CoarticError if the disk is full or the file is gone."""
         if self._db.in_transaction:
             yield
             return
@@ -335,10 +329,8 @@ class Store:
     # Writing and reading runs.
 
     def write(self, runs: Iterable[Run]) -> None:
-        """Write finished runs, all of them or none, in place of earlier runs with their ids.
-
-        Raises CoarticError if the disk is full or a run does not fit the tables.
-        """
+        """Write finished runs, all of them or none, in place of earlier runs with their ids. Raises
+        CoarticError if the disk is full or a run does not fit the tables."""
         with self.transaction():
             for run in runs:
                 try:
@@ -610,11 +602,9 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
-    """Open a results folder for reading in the block of this context.
-
-    Raises CoarticError if the folder has no results, or results in the format of another version,
-    and while a ``coartic run`` writes into it.
-    """
+    """Open a results folder for reading in the block of this context. Raises CoarticError if the
+    folder has no results, or results in the format of another version, and while a ``coartic run``
+    writes into it."""
     path = folder / RUNS_FILE
     with explain_errors(folder):
         try:
@@ -650,11 +640,8 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 @contextmanager
 def writing(folder: Path) -> Iterator[Store]:
     """Open a results folder for writing in the block of this context, by this process alone, and
-    make a missing folder.
-
-    Raises CoarticError if the folder holds something else or cannot be written, and while another
-    process writes into it.
-    """
+    make a missing folder. Raises CoarticError if the folder holds something else or cannot be
+    written, and while another process writes into it."""
     with explain_errors(folder):
         visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
         if not (folder / RUNS_FILE).exists() and any(visible):
@@ -682,11 +669,8 @@ def writing(folder: Path) -> Iterator[Store]:
 @contextmanager
 def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
     """Lock a folder for this process in the block of this context, or, with ``shared``, share the
-    lock with other readers; ``command`` is named in the error. Systems and disks without such locks
-    are left as they are.
-
-    Raises CoarticError while another process holds the lock.
-    """
+    lock with other readers, where the system and the disk have such locks. Raises CoarticError,
+    which names ``command``, while another process holds the lock."""
     try:
         import fcntl
 
@@ -741,12 +725,9 @@ def _check_files(folder: Path) -> None:
 
 
 def _has_tables(connection: sqlite3.Connection) -> bool:
-    """Return True if the file has the tables of coartic, and False if the file is empty.
-
-    Additions of other programs (statistics, indexes, tables, views) pass, except triggers, which
-    change data as they are written. Raises CoarticError for any other file, and ValueError for a
-    row that names a missing row: no view would show its run.
-    """
+    """Return True if the file has the tables of coartic, and False if the file is empty. Additions
+    of other programs pass, except triggers. Raises CoarticError for any other file, and ValueError
+    for a row that names a missing row: no view would show its run."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     there = {kind for (kind,) in connection.execute("SELECT type FROM sqlite_master")}
@@ -839,7 +820,7 @@ def _explain(path: Path, error: Exception) -> str:
 
 
 def _why_not_opened(path: Path) -> str:
-    """Return why SQLite cannot open a file, in words; empty if the system would open the file."""
+    """Return why SQLite cannot open a file, in words; empty if the reason is not known."""
     try:
         path.open("rb").close()
     except FileNotFoundError:
@@ -852,12 +833,9 @@ def _why_not_opened(path: Path) -> str:
 
 
 def _unpack(blob: bytes, trials: int | None) -> Array:
-    """Return the rewards of the trials of a run from table ``learning``, whose ``blob`` holds them
-    packed (:func:`reward_bytes`), shape ``(k,)`` with k up to ``trials``; NaN stands for a trial
-    that failed or whose reward is not kept.
-
-    Raises ValueError for a blob that is damaged or cut short, and for more rewards than trials.
-    """
+    """Return the rewards that a ``blob`` of table ``learning`` holds (:func:`reward_bytes`), shape
+    ``(k,)`` with k up to ``trials``; NaN for a trial that failed or whose reward is not kept.
+    Raises ValueError for a damaged blob, and for more rewards than trials."""
     size = 4 * (1 + min(trials or 0, MOST_TRIALS))
     try:
         packed = zlib.decompressobj()

@@ -17,8 +17,8 @@ the others ask the compiled kernels, which use IEEE arithmetic alone
 from __future__ import annotations
 
 import itertools
-import math
 import re
+import sys
 from collections import Counter
 from collections.abc import Iterable
 from contextlib import suppress
@@ -72,7 +72,7 @@ def _in_thousandths(value: float) -> int:
     """Return a number in thousandths, 300 for 0.3. Raises a validation error for anything but a
     finite number with at most three decimals."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value * _PARTS):
+    if not is_number or not abs(value * _PARTS) <= sys.float_info.max:
         raise PydanticCustomError("finite", "should be a finite number")
     if round(value * _PARTS) / _PARTS != value:
         raise sentence_error(f"{value} should have at most three decimals")
@@ -124,8 +124,8 @@ class Posture(FileData):
     first: Span
     """Angle of the first joint from +x, rad, from, to."""
     others: Span
-    """Angle of each other joint from the link before it, rad, from, to, within ±π/2: an arm whose
-    bends are so small is straight, and thereby singular, where they are all 0."""
+    """Angle of each other joint from the link before it, rad, from, to. Within ±π/2 an arm is
+    singular only where all these angles are 0."""
 
 
 _PARKED = Posture(first=(0, 0), others=(0, 0))
@@ -153,7 +153,7 @@ class Family(FileData):
     description: Line
     """A sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
-    """Hands that may hit goals; the robot has both arms anyway."""
+    """Hands that may hit goals."""
     goals: Annotated[tuple[_GoalsCount, _GoalsCount], _ordered]
     """Least and largest number of goals; each number is equally likely."""
     links: Annotated[tuple[_PerArm, _PerArm], _ordered]
@@ -184,7 +184,8 @@ class Family(FileData):
     """Largest distance of a goal from a shoulder, as a share of the reach, measured along the base
     coordinates that are locked."""
     bent: Thousandths = 200
-    """Angle, rad, by which a joint of each arm is bent at least; 0 lets straight arms start."""
+    """Angle, rad, by which a joint of each arm with one of ``hands`` is bent at least at the
+    start."""
 
 
 def draft(family: Family, address: Address, attempt: int) -> Task:
@@ -386,8 +387,7 @@ def shipped_families() -> dict[str, Family]:
 
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
     """Return the families read from files, by name. Raises TaskError for a file that cannot be
-    used, and for a name that another of the files or a shipped family has.
-    """
+    used, and for a name that another of the files or a shipped family has."""
     families: dict[str, Family] = {}
     for path in paths:
         family = read_family(path)

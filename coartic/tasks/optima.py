@@ -56,11 +56,8 @@ def essence(task: Task) -> str:
 
 def best_shipped(task: Task) -> KnownOptimum | None:
     """Return the best reward known of a task, from the shipped files; the task is recognised by
-    :func:`essence`, whatever its name.
-
-    Returns None for a task that is not shipped, and for instances of a family except the first 40
-    of its test split.
-    """
+    :func:`essence`, whatever its name. Return None for a task that is not there, as instances of a
+    family except the first 40 of its test split."""
     return _by_essence().get(essence(task))
 
 

@@ -8,6 +8,7 @@ the next, so that what is drawn depends on counter and key alone, and on no libr
 from __future__ import annotations
 
 import hashlib
+import struct
 from collections.abc import Sequence
 from typing import TypeVar
 
@@ -39,8 +40,8 @@ def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
 def hash_key(name: str) -> tuple[int, int]:
     """Return the key of a name: the first two words, 32 bits each, little-endian, of the SHA-256 of
     its UTF-8."""
-    digest = hashlib.sha256(name.encode()).digest()
-    return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:8], "little")
+    first, second = struct.unpack("<2I", hashlib.sha256(name.encode()).digest()[:8])
+    return first, second
 
 
 class Draws:
@@ -55,8 +56,8 @@ class Draws:
         self._pairs = (pair for a, b, c, d in blocks for pair in (a << 32 | b, c << 32 | d))
 
     def integer(self, least: int, most: int) -> int:
-        """Draw an integer from ``least`` to ``most``, both included, each equally likely to within
-        (most - least) / 2^64."""
+        """Draw an integer from ``least`` to ``most``, both included, with equal probabilities to
+        within 2^-64."""
         return least + (next(self._pairs) * (most - least + 1) >> 64)
 
     def one_of(self, choices: Sequence[Choice]) -> Choice:

@@ -141,7 +141,7 @@ class Task(FileData):
     description: Line = ""
     """A sentence for lists."""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1, max_length=len(HANDS))] = HANDS
-    """Hands the robot has."""
+    """Hands that may hit goals; the robot has both arms anyway."""
     goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
     """Goal centres x_g in the order in which they are to be hit, length unit."""
     radius: Length = PAPER_RADIUS
@@ -215,10 +215,9 @@ class Task(FileData):
     @model_validator(mode="before")
     @classmethod
     def _with_start(cls, content: Any) -> Any:
-        """Return the content of a task with ``q0``, shape ``(dof,)``, if given, as ``start``, or,
-        without either, with the base at (0, 0) and both arms along +x; what is no dictionary comes
-        back unchanged. Raises a validation error for both, for a ``q0`` of another shape or with
-        entries that are no finite numbers, and for the key ``penalty``."""
+        """Return the content of a task with ``q0``, ``(dof,)``, as ``start``, or, without either,
+        with the base at (0, 0) and both arms along +x; what is no dictionary comes back unchanged.
+        Raises a validation error for both, for a wrong ``q0`` and for the key ``penalty``."""
         if not isinstance(content, dict):
             return content
         if "penalty" in content:
@@ -268,22 +267,12 @@ class Task(FileData):
             if key not in Task.model_fields:
                 meant = did_you_mean(key, _all_keys())
                 raise sentence_error(f"provenance.{key} is not a key of a task{meant}")
-        text = self.initial_hands
         if not self.initial_is_policy:
-            if not text or set(text) - set(LETTERS):
-                raise sentence_error(
-                    f"initial_hands is {brief_value(text)}; it must be a sequence of L and R such "
-                    f"as 'RRRR', or one of {', '.join(INITIAL_POLICIES)}"
-                )
-            if len(text) != len(self.goals):
-                raise sentence_error(
-                    f"initial_hands {brief_value(text)} names {len(text)} hands for "
-                    f"{counted(len(self.goals), 'goal')}"
-                )
-            for hand in sorted({LETTERS[letter] for letter in text} - set(self.hands)):
-                raise sentence_error(
-                    f"initial_hands {text!r} uses the {hand} hand, which is not among hands"
-                )
+            try:
+                check_hands(self, self.initial_hands)
+            except ValueError as error:
+                others = ", ".join(INITIAL_POLICIES)
+                raise sentence_error(f"initial_hands: {error}, or one of {others}") from None
         # No model's corrective process ends farther from a goal than its rim (check_task).
         if info.context != WITHOUT_REACH and (far := _out_of_reach(self, self.radius)) is not None:
             raise sentence_error(far)
@@ -356,9 +345,8 @@ def check_hands(task: Task, hands: str) -> str:
 
 def _out_of_reach(task: Task, tolerance: float) -> str | None:
     """Return a sentence on the first goal that no hand of the task, or not the hand that
-    ``initial_hands`` gives it, can reach; None if all can be reached. ``tolerance`` is the distance
-    from a goal's centre at which the corrective process ends, length unit.
-    """
+    ``initial_hands`` gives it, can reach to ``tolerance``, the distance from its centre at which
+    the corrective process ends, length unit; None if all can be reached."""
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
         excess = {hand: beyond_reach(task, hand, goal, tolerance) for hand in task.hands}
@@ -415,27 +403,9 @@ def shipped_tasks() -> dict[str, Task]:
 
 @checked_arguments
 def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> Task:
-    """Make a task from the content of a task file.
-
-    Parameters
-    ----------
-    content : dict
-        The content, as ``tomllib`` reads it from a TOML file.
-    source : str
-        Name of the content in errors, such as the path of the file.
-    reach : bool
-        Whether to refuse goals that are out of reach.
-
-    Returns
-    -------
-    Task
-        The task, checked.
-
-    Raises
-    ------
-    TaskError
-        The content is no task. The message has a line for each problem.
-    """
+    """Make a task from the content of a task file, which errors call ``source``. With ``reach``
+    goals that are out of reach are refused. Raises TaskError, with a line for each of the first 20
+    problems, for content that is no task."""
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
     except ValidationError as error:
