@@ -1,7 +1,8 @@
 """CMA-ES as in the package ``cma``, bit for bit, at a quarter of its time and without its import.
 
-N. Hansen (2016), The CMA evolution strategy: a tutorial; with negative weights. Constants, stopping
-criteria and the order of operations are those of the package ``cma`` 4.5 with its defaults, so that
+N. Hansen (2016), The CMA evolution strategy: a tutorial (arXiv 1604.00772), whose equations have
+their numbers in brackets here; with negative weights. Constants, stopping criteria and the order of
+operations are those of the package ``cma`` 4.5 with its defaults, so that
 the points are the same to the last bit, which a test checks; but in generations of less than six
 points, as in one dimension, the package mirrors some. It takes four times as long, and most of a
 second to import. Where it begins to rescale the coordinates, at variances 1e8 apart or a condition
@@ -45,23 +46,23 @@ class EvolutionStrategy:
         dim = len(mean)
         self.size = size
         """Points in a generation, λ."""
-        raw = [math.log((size + 1) / 2) - math.log(rank) for rank in range(1, size + 1)]
+        raw = [math.log((size + 1) / 2) - math.log(rank) for rank in range(1, size + 1)]  # (49)
         self._parents = sum(weight > 0 for weight in raw)  # points that are recombined, μ
         total = _added(raw[: self._parents])
         positive = [weight / total for weight in raw[: self._parents]]
         selected = 1 / _added([weight**2 for weight in positive])
-        c_1 = min(1, size / 6) * 2 / ((dim + 1.3) ** 2 + selected)
+        c_1 = min(1, size / 6) * 2 / ((dim + 1.3) ** 2 + selected)  # (57)
 
         def scaled(weights: list[float], to: float) -> list[float]:
             factor = abs(to / (_added(weights) or 1))
             return [weight * factor for weight in weights]
 
-        # Negative weights make up for the positive ones, but cannot make a variance negative. They
-        # are scaled twice, with a rate that differs in its last bit, as in the package.
+        # Negative weights make up for the positive ones, but cannot make a variance negative
+        # (50 to 53). They are scaled twice, with a rate that differs in its last bit, as in the package.
         negative = [weight / total for weight in raw[self._parents :]]
         negative = [weight / -_added(negative) for weight in negative]
         for mass in (0.25 + selected + 1 / selected - 2, 0.25 + selected - 2 + 1 / selected):
-            rate = min(1 - c_1, 2 * mass / ((dim + 2) ** 2 + selected))  # c_μ
+            rate = min(1 - c_1, 2 * mass / ((dim + 2) ** 2 + selected))  # c_μ (58)
             negative = scaled(negative, 1 + c_1 / rate)
             square = _added([weight**2 for weight in negative])
             rejected = _added(negative) ** 2 / (square or 1)
@@ -71,15 +72,15 @@ class EvolutionStrategy:
         self._recombined = np.array(positive)  # weights of the best points, which sum to 1
         self._selected = selected  # variance effective selection mass, μ_eff
         self._c_1 = c_1  # learning rates: of the evolution path in the covariance matrix,
-        self._c_path = (4 + selected / dim) / (dim + (4 + 2 * selected / dim))  # of the path, c_c,
-        self._c_step = min(0.5, (selected + 2) / (dim + (selected + 3)))  # of the step's path, c_σ
+        self._c_path = (4 + selected / dim) / (dim + (4 + 2 * selected / dim))  # of the path, c_c (56),
+        self._c_step = min(0.5, (selected + 2) / (dim + (selected + 3)))  # of the step's path, c_σ (55)
         # Weights of the evolution path and of all points in the covariance matrix, also while the
         # path is stalled.
         of_points = [rate * weight for weight in (*positive, *negative)]
         self._learned = np.array([c_1, *of_points])
         self._stalled = np.array([c_1 * (1 - self._c_path * (2 - self._c_path)), *of_points])
         narrow = max(1, 3 * (1 - 0.5 ** (dim / 9))) * ((selected - 1) / (dim + 1)) ** 0.5 - 1
-        self._damping = 1 + 2 * max(0, narrow) + self._c_step  # of the step size, d_σ
+        self._damping = 1 + 2 * max(0, narrow) + self._c_step  # of the step size, d_σ (55)
         if dim > 100:  # expected length of a standard normal vector
             self._length = dim**0.5 * (1 - 1 / (4 * dim) + 1 / (32 * dim**2))
         else:
@@ -115,7 +116,7 @@ class EvolutionStrategy:
             self._lengths = variances**0.5
             self._decomposed = self._generation
         noise = self._rng.standard_normal((self.size, len(self._mean)))
-        drawn: Array = np.dot(self._axes, (self._lengths * noise).T).T
+        drawn: Array = np.dot(self._axes, (self._lengths * noise).T).T  # (38 to 40)
         return self._mean + self._step_size * drawn
 
     def tell(self, points: Array, costs: Array) -> None:
@@ -134,6 +135,7 @@ class EvolutionStrategy:
         self._flat = 0 if ranked[0] < ranked[int(0.75 * self.size)] else self._flat + 1
 
         points = points[np.argsort(costs)]
+        # The mean (41, 42), then the path of the step size (43).
         before, self._mean = self._mean, np.dot(self._recombined, points[: self._parents])
         shift = self._mean - before
 
@@ -145,13 +147,13 @@ class EvolutionStrategy:
         square = np.sum(self._step_path**2) / (1 - (1 - self._c_step) ** (2 * self._generation))
         is_stalled = not square / len(shift) - 1 < 1 + 4 / (len(shift) + 1)
 
-        self._path = (1 - self._c_path) * self._path
+        self._path = (1 - self._c_path) * self._path  # (45)
         weights, path = self._stalled, (self._c_1 / self._stalled[0]) ** 0.5 * self._path
         if not is_stalled:
             factor = (self._c_path * (2 - self._c_path) * self._selected) ** 0.5 / self._step_size
             self._path += factor * shift
             weights, path = self._learned, self._path
-        # Points with negative weights count as if they had the expected length.
+        # Points with negative weights count as if they had the expected length (46, 47).
         weights, rejected = weights.copy(), slice(1 + self._parents, None)
         vectors = np.vstack([path, (points - before) / self._step_size])
         self._covariance *= 1 - weights.cumsum()[-1]
@@ -161,7 +163,7 @@ class EvolutionStrategy:
         self._covariance += np.dot(weights * vectors.T, vectors)
 
         length = np.sqrt(np.sum(np.square(self._step_path)))
-        change = (length / self._length - 1) * (self._c_step / self._damping)
+        change = (length / self._length - 1) * (self._c_step / self._damping)  # (44)
         self._step_size *= float(exp(min(max(change, -1), 1)))
         threshold = 20 + 0.1 * self._generation
         delta = _STILL * max(1, (self._generation - self._still_since) / threshold) ** 0.5
