@@ -2,12 +2,12 @@
 
 N. Hansen (2016), The CMA evolution strategy: a tutorial (arXiv 1604.00772), whose equations have
 their numbers in brackets here; with negative weights. Constants, stopping criteria and the order of
-operations are those of the package ``cma`` 4.5 with its defaults, so that
-the points are the same to the last bit, which a test checks; but in generations of less than six
-points, as in one dimension, the package mirrors some. It takes four times as long, and most of a
-second to import. Where it begins to rescale the coordinates, at variances 1e8 apart or a condition
-number of 1e12, this strategy ends. Weights are added from left to right, as the package does up to
-Python 3.11; later versions round ``sum`` otherwise, and the points would depend on them.
+operations are those of the package ``cma`` 4.5 with its defaults, so that the points are the same
+to the last bit, which a test checks; but in generations of less than six points, as in one
+dimension, the package mirrors some. It takes four times as long, and most of a second to import.
+Where it begins to rescale the coordinates, at variances 1e8 apart or a condition number of 1e12,
+this strategy ends. Weights are added from left to right, as the package does up to Python 3.11;
+later versions round ``sum`` otherwise, and the points would depend on them.
 """
 
 from __future__ import annotations
@@ -58,7 +58,8 @@ class EvolutionStrategy:
             return [weight * factor for weight in weights]
 
         # Negative weights make up for the positive ones, but cannot make a variance negative
-        # (50 to 53). They are scaled twice, with a rate that differs in its last bit, as in the package.
+        # (50 to 53). They are scaled twice, with a rate that differs in its last bit, as in the
+        # package.
         negative = [weight / total for weight in raw[self._parents :]]
         negative = [weight / -_added(negative) for weight in negative]
         for mass in (0.25 + selected + 1 / selected - 2, 0.25 + selected - 2 + 1 / selected):
@@ -71,9 +72,10 @@ class EvolutionStrategy:
                     negative = scaled(negative, most)
         self._recombined = np.array(positive)  # weights of the best points, which sum to 1
         self._selected = selected  # variance effective selection mass, μ_eff
-        self._c_1 = c_1  # learning rates: of the evolution path in the covariance matrix,
-        self._c_path = (4 + selected / dim) / (dim + (4 + 2 * selected / dim))  # of the path, c_c (56),
-        self._c_step = min(0.5, (selected + 2) / (dim + (selected + 3)))  # of the step's path, c_σ (55)
+        # Learning rates: of the covariance from its path, of this path, of the step size's path.
+        self._c_1 = c_1
+        self._c_path = (4 + selected / dim) / (dim + (4 + 2 * selected / dim))  # c_c (56)
+        self._c_step = min(0.5, (selected + 2) / (dim + (selected + 3)))  # c_σ (55)
         # Weights of the evolution path and of all points in the covariance matrix, also while the
         # path is stalled.
         of_points = [rate * weight for weight in (*positive, *negative)]
