@@ -567,8 +567,10 @@ def problems(
     """
     if not isinstance(split, str) or split not in ("test", "development"):
         raise ValueError(f"split is {brief_value(split)}; it must be 'test' or 'development'")
-    options: dict[str, Any] = {"half_width": half_width, "model": model, "budget": budget}
-    return [objective(name, **options) for name in instance_names(family, split, count)]
+    return [
+        objective(name, half_width=half_width, model=model, budget=budget)
+        for name in instance_names(family, split, count)
+    ]
 
 
 class OptimiserParameters(Parameters):
