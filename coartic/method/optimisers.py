@@ -10,8 +10,9 @@ import math
 import os
 import warnings
 from abc import abstractmethod
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,6 +64,9 @@ OPTIMISER_INFORMATION = frozenset({Information.CORRECTIVE_PROCESS, Information.R
 FAILED = 1_000_000
 """Cost of a trial that fails, ticks. One that takes so long has failed, too."""
 HALF_WIDTH = 1.0
+# For type checkers, which take an array of unknown shape for one point.
+Vector = np.ndarray[tuple[int], np.dtype[Any]]
+Matrix = np.ndarray[tuple[int, int], np.dtype[Any]]
 CHUNK = 8192
 """Points that are evaluated at a time, so that many take no more memory."""
 NO_COPIES = (
@@ -338,6 +342,14 @@ class Objective:
         return Objective(session, task=self.task, **self._asked)
 
     # Evaluation.
+
+    @overload
+    def __call__(self, x: Sequence[float] | Vector, hands: str | None = None) -> float: ...
+
+    @overload
+    def __call__(
+        self, x: Sequence[Sequence[float]] | Matrix, hands: str | None = None
+    ) -> Array: ...
 
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
         """Return the cost, ticks, of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)``,
