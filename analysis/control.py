@@ -133,8 +133,8 @@ def _most_trials(study: Study, task: str, label: str) -> float:
 @checked_arguments
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
     """Return by how much a method's signature exceeds the mean signature of random search with the
-    same hands (:func:`with_control`), in the unit of the signature: a mean over the method's runs
-    whose hands random search has; NaN without such runs."""
+    same hands, in the unit of the signature: a mean over the runs for which :func:`with_control`
+    has random search; NaN without such runs."""
     pairs = with_control(study, signature, task, label).values()
     excess = [values - control.mean() for values, control in pairs if len(control)]
     return float(np.concatenate(excess).mean()) if excess else math.nan

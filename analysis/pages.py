@@ -107,7 +107,8 @@ def fill_page(template: str | Path, **values: Any) -> str:
     Raises
     ------
     CoarticError
-        There is no such template.
+        There is no such template, or a function or filter in it gets a wrong argument, such as a
+        row without the numbers.
     ValueError
         A sentence that the template expects of the results does not hold.
     jinja2.TemplateError

@@ -80,9 +80,10 @@ def common_tasks(study: Study) -> tuple[str, ...]:
 
 @cached
 def equal_trials(study: Study) -> int:
-    """Return the number of trials of a run with which methods are ranked: the number in the suite's
-    file or, if no compared method has it, the number that most algorithms have (of equals the
-    least); if no method has a parameter ``trials``, the most trials that a run made."""
+    """Return the number of trials of a run with which methods are ranked. Of methods that use the
+    reward of each trial: the number in the suite's file, if the command asked for another and one
+    of them has it, or else the number that most algorithms have (of equals the least). Without
+    such a method that has a parameter ``trials``: the most trials that a run made."""
     asked, algorithms = _trials_asked(study), dict[int, set[str]]()
     for method in compared(study):
         for part in study.methods.parts[method]:

@@ -450,9 +450,11 @@ class Study:
         Parameters
         ----------
         task, method : str
-            Name of the task, and label of the method, its id with its setting; also ``"EC4"``.
+            Name of the task, and label of the method, its id with its setting, such as
+            ``"random-search sigma=0.1"``; also ``"EC4"``.
         replay : bool
-            Take the noiseless trial after learning in place of the solution.
+            Take the noiseless trial after learning in place of the solution; runs without such a
+            trial are left out.
 
         Returns
         -------

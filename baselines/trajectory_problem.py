@@ -142,8 +142,8 @@ class PathPlan:
     """Counters of the solver, ready for ``Session.spend``."""
 
     def lengths(self) -> Array:
-        """Return the joint-space lengths of the segments, from the start to goal 1 and from goal to
-        goal, shape ``(G,)``."""
+        """Return the straight joint-space distances from the start to goal 1 and from goal to goal,
+        shape ``(G,)``, also where the plan is curved."""
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]))
 
 

@@ -128,8 +128,9 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of a source whose plan has runs that the joined plan lacks, and of a source with fewer
-    runs of a cell than the command asks for of other cells. ``asked``: numbers of runs by digest of
+    """Warn of a source whose plan has runs that the joined plan lacks, and of a source with a cell
+    of a stochastic method, not asked for, of which there are fewer runs than the command asks for
+    of other cells. ``asked``: numbers of runs by digest of
     the cell; ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
@@ -188,9 +189,9 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 
 def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, str], str]) -> None:
-    """Copy the runs of a source's plan that the target lacks; add them to ``origin``, the folder of
-    each run by :func:`.run_identity` of its id. Raises CoarticError if the target has another
-    result of a run."""
+    """Copy the runs of a source's plan that the target lacks; enter ``name``, the source's folder,
+    for each of them in ``origin``, by :func:`.run_identity` of its id. Raises CoarticError if the
+    target has another result of a run."""
     there = {run_identity(run_id): (run_id, result) for run_id, result in target.results()}
     results = source.results()
     for first in range(0, len(results), _WRITTEN_AT_ONCE):

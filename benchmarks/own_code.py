@@ -33,12 +33,13 @@ _LARGEST_DATA = 2**30  # bytes of a declared file
 
 
 def code_of(method: type[Method], file: Path) -> str:
-    """Return the hash, 12 hexadecimal digits, of all that results of a method in a file come from.
+    """Return the hash, 12 hexadecimal digits, of all that a method file's results come from.
 
     It covers the versions of the method, of the model and of the built-in methods that the file
     imports; the file, its declared data, and every file of the user's that its import loaded; names
-    and versions of the installed packages that these files import. Comments, blank lines, widths
-    and places of files do not count. Raises OSError or CoarticError for a file that cannot be read.
+    and versions of the installed packages that these files import, without those that coartic
+    needs. In Python code comments, blank lines and widths of indentation do not count, nor do
+    places of files. Raises OSError or CoarticError for a file that cannot be read.
     """
     files = {*own_files(), str(file)}
     texts = [content_of(path) for path in files]

@@ -161,11 +161,12 @@ def run_suite(
     Parameters
     ----------
     suite : str, Path or Suite
-        A shipped suite by name, or a suite file (``.toml``).
+        A suite, a shipped one by name, or a suite file (``.toml``).
     folder : str or Path
         Results folder, which is made if it is missing.
     executor, watch
-        Place where methods run, and function called after each run (:func:`perform`).
+        Place where methods run, and function called before the first run and after each
+        (:func:`perform`).
     options
         Fields of :class:`~coartic.benchmarks.planning.Request`, such as ``tasks``, ``methods``,
         ``runs`` per cell and ``trials`` per run.

@@ -37,8 +37,10 @@ def lever(folder):
     forget("coartic")
     os.chdir(folder)
     sys.path.insert(0, str(folder))
-    from kernel import across
+    from kernel import across, joint_lever
 
+    with pytest.raises(TypeError, match="lever is called by kernels alone"):
+        joint_lever(np.zeros(2), np.zeros(2), 0, 1)
     dy = across(np.array([1.0, 6.5]), np.zeros(2))
     return float(dy), sum(across.dispatcher.stats.cache_hits.values())
 

@@ -13,10 +13,10 @@ import pytest
 
 from coartic import CoarticError, corrective_trial, load_task
 from coartic.analysis import runtimes
-from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL
+from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL, WITHOUT_REWARD
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.sections.learning import learning_curves
-from coartic.analysis.study import solved
+from coartic.analysis.study import Study, solved
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of, study_of_trials
 
 ONE, TWO = "ascending", "two-armed-1"
@@ -210,3 +210,8 @@ def test_ticks_saved_are_those_of_the_movements_less_those_of_the_corrective_pro
     assert [row[f"by_goal_{goal}"] for goal in (1, 2, 3)] == pytest.approx([*expected])
     drawn = FIGURES["saved"](traced).data.set_index(["task", "method"])
     assert drawn.by_goal_1["ascending", "dual-process/EC1"] == row.by_goal_1
+    without = traced.methods.information == WITHOUT_REWARD
+    plans = traced.runs[traced.runs.label.map(without)]
+    assert len(plans) > 0
+    alone = Study(traced.folder, traced.plan, traced.made_with, plans)
+    assert FIGURES["saved"](alone) is None

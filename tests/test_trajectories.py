@@ -47,8 +47,9 @@ def test_a_film_and_a_picture(tmp_path):
     mine.plot().savefig(tmp_path / "mine.png")
     with pytest.raises(ValueError, match="goal is 0; it must be a whole number from 1 to 2"):
         mine.subtask(0)
-    with pytest.raises(CoarticError, match="there already"):
-        mine.animate(tmp_path / "mine.gif")
+    for name, words in (("mine.gif", "there already"), ("mine.txt", "must end in .gif or .mp4")):
+        with pytest.raises(CoarticError, match=words):
+            mine.animate(tmp_path / name)
 
 
 def test_a_trajectory_where_the_hand_is_in_the_goal_has_no_row():

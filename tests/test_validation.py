@@ -335,7 +335,6 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["draw", ".", *["--run", "1a2b"] * 3], "a film shows at most two runs"),
         (["report", "nowhere"], "there is no folder nowhere"),
         (["play", "--out", "x.txt"], "the name must end in .html"),
-        (["draw", ".", "--run", "1a2b", "--out", "x.txt"], "the name must end in .gif or .mp4"),
         (["draw", "ascending", "--out", "x.txt"], "the name must end in .svg or .pdf or .png"),
         (["new", "my-search", "--out", "x.txt"], "the name must end in .py"),
         (["new", "My Search"], "coartic new: the name 'My Search' must begin with"),

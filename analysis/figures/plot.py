@@ -142,9 +142,9 @@ def name_in_figure(study: Study, method: str) -> str:
 
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
-    """Return the rows in words, for an alternative text. Names in ``{}`` of the template are
-    columns, ``{title}`` is the name (:func:`.shown_name`) of the method whose label is in column
-    ``method``."""
+    """Return the rows in words, for an alternative text: the template filled in for each row,
+    joined by ``; ``. Names in ``{}`` are columns, ``{title}`` is the name (:func:`.shown_name`) of
+    the method whose label is in column ``method``."""
     rows = rows.assign(title=[shown_name(study, method) for method in rows.method])
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 

@@ -235,10 +235,10 @@ def list_saved(study: Study) -> Rows:
     "n = {n} runs.",
 )
 def draw_saved(study: Study) -> Parts | None:
-    """Draw for each task a row for each of some methods (the learner, random search, the best by
-    kind of information, methods from files), the smallest mean gap first. A row has a bar for each
-    goal: mean ticks of the movement less the ticks of the corrective process alone with the same
-    hands, up where it takes more. None if there is nothing to draw."""
+    """Draw for each task a row for each of some methods (the learner, random search, the best of
+    each kind that uses the reward, methods from files), the smallest mean gap first. A row has a
+    bar for each goal: mean ticks of the movement less the ticks of the corrective process alone
+    with the same hands, up where it takes more. None if there is nothing to draw."""
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
     drawn, parts = {*headline_methods(single)}, []
@@ -252,7 +252,9 @@ def draw_saved(study: Study) -> Parts | None:
         best = part.drop_duplicates("use").method[part.use != WITHOUT_REWARD]
         learners = [each for each in LEARNERS if each in {*part.method}]
         kept = {*best, RANDOM_SEARCH, *learners[-1:], *single.index[~single.built_in.astype(bool)]}
-        parts.append(part[part.method.isin(kept)])
+        part = part[part.method.isin(kept)]
+        if len(part):
+            parts.append(part)
     if not parts:
         return None
     shape, most = style.grid(len(parts)), max(map(len, parts))

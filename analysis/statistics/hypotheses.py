@@ -184,8 +184,9 @@ def stratified_test(
 
 def _moments(pool: Array, places: NDArray[Any], n: int) -> tuple[Array, Array]:
     """Return the difference of means (first less second sample) and the variance of the difference
-    for each row of ``places``, shapes ``(rows,)``. A row has the indices in ``pool``, the values of
-    both samples, of the first sample, ``n`` values, or, with fewer indices, of the second."""
+    for each row of ``places``, shapes ``(rows,)``. A row has the indices, in
+    ``pool`` (the values of both samples), of one sample: the first if they are ``n``, else the
+    second."""
     few = places.shape[1]
     values = pool[places]
     sums, squares = values.sum(axis=1), (values**2).sum(axis=1)

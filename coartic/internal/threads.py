@@ -27,9 +27,9 @@ ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
 
 @cache
 def worker_variables() -> dict[str, str]:
-    """Return the environment variables of a process in which methods run: one thread, and on x86-64
-    OpenBLAS's kernels for Nehalem and NumPy's loops without AVX-512, so that all processors round
-    alike. NumPy's names for AVX-512 depend on its version."""
+    """Return environment variables to set for a process in which methods run: one thread, and on
+    x86-64 OpenBLAS's kernels for Nehalem and NumPy's loops without AVX-512 (whose names depend on
+    its version), so that all processors round alike."""
     if platform.machine() not in ("x86_64", "AMD64"):
         return ONE_THREAD
     major, minor = map(int, metadata.version("numpy").split(".")[:2])

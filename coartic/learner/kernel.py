@@ -150,7 +150,7 @@ def learner_parameters(
     compiled: CompiledTask, condition: ExplorationCondition, first: Sequence[Movement]
 ) -> LearnerParameters:
     """Return a task and a condition as arrays for the learner's kernel; ``first`` has the movement
-    of trial 0 for each goal; a movement without a target stands for **A**."""
+    of trial 0 for each goal; a movement without a target is corrective."""
     task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.full((len(first), width), np.nan)
     for target, movement in zip(first_targets, first, strict=True):

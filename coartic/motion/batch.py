@@ -125,8 +125,9 @@ class Batch(NamedTuple):
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
-    """Return a new batch for kernels, of ``robot``'s width: ``count`` records of runs and the
-    arrays of 72 slots (:data:`SLOTS`), all numbers 0. Kernels need a slot for each run."""
+    """Return a new batch for kernels: ``count`` records of runs, with room for the links of
+    ``robot``, and the arrays of 72 slots (:data:`SLOTS`), all numbers 0. Each run needs a slot, so
+    kernels take at most 72 runs."""
     width = width_of(robot)
     fields = {
         "q": (np.float64, width),  # where the robot is, length unit and rad
@@ -265,8 +266,9 @@ def winding(q: Any, slot: int) -> float:
 
 @inner
 def are_near(at: SlotArrays, count: int) -> bool:
-    """Return True if the angle from +x of every link in the first ``count`` columns of ``at`` is
-    certain to be below 1e5 rad, the range of the fast cosine (:func:`winding`); else False."""
+    """Return True only if the angle from +x of every link in the first ``count`` columns of ``at``,
+    and in columns that pad them, is certain to be below 1e5 rad, the range of the fast cosine
+    (:func:`winding`)."""
     far = 0
     for i in range(padded_count(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1

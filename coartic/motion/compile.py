@@ -67,7 +67,10 @@ class _Kernel:
         return _compile_kernel(self.function, self.kind)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the compiled function, and return its result."""
+        """Call the compiled function, and return its result. Raises TypeError for a kernel that
+        only other kernels can call: Numba makes no way in from Python for it."""
+        if self.kind not in ("entry", "scalar"):
+            raise TypeError(f"{self.function.__name__} is called by kernels alone")
         return self.dispatcher(*arguments)
 
     def __getattr__(self, name: str) -> Any:

@@ -399,8 +399,9 @@ def descend(
 def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) -> None:
     """Iterate the corrective process **A** in the first ``count`` slots of ``batch.at[0]`` until
     each has converged or failed: is not finite, no longer moves, or has made ``max_iterations``.
-    The record of each run in ``batch.runs`` gets the last iterate as ``target``, ``converged`` and
-    ``iterations``, and its ``evaluations`` grow. Afterwards the slots are free.
+    The record of each run in ``batch.runs`` gets ``converged``, ``iterations`` and, in ``target``,
+    base and arm of the last iterate (the entries of the other arm stay), and its ``evaluations``
+    grow. Afterwards the slots, which :func:`load` filled, are free.
 
     ``pull``: None, or a kernel ``pull(at, count, robot, runs)`` that sets ``at.pull``, what the
     next iteration adds to ``at.q`` besides α Jᵀ e: 0 for locked coordinates of the base.

@@ -15,7 +15,13 @@ TaskLike = Task | str | Path
 
 
 def builtin_tasks() -> tuple[str, ...]:
-    """Return the names of the tasks that come with the package, in the paper's order."""
+    """List the tasks that come with the package.
+
+    Returns
+    -------
+    tuple of str
+        Their names, in the paper's order. :func:`load_task` takes each of them.
+    """
     return tuple(shipped_tasks())
 
 
@@ -75,4 +81,11 @@ def load_task(name_or_path: str | Path) -> Task:
 def as_task(task: TaskLike) -> Task:
     """Return the task itself, or load it by its name or from its file (:func:`load_task`). Raises
     TaskError if there is no such task, and TypeError for anything else."""
-    return task if isinstance(task, Task) else load_task(task)
+    if isinstance(task, Task):
+        return task
+    if not isinstance(task, str | Path):
+        raise TypeError(
+            f"task is {brief_value(task)}; it must be a Task, the name of one, such as "
+            "'ascending', or the path of a task file"
+        )
+    return load_task(task)

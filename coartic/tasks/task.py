@@ -403,9 +403,27 @@ def shipped_tasks() -> dict[str, Task]:
 
 @checked_arguments
 def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> Task:
-    """Make a task from the content of a task file, which errors call ``source``. With ``reach``
-    goals that are out of reach are refused. Raises TaskError, with a line for each of the first 20
-    problems, for content that is no task."""
+    """Make a task from the content of a task file.
+
+    Parameters
+    ----------
+    content : dict
+        The content, as ``tomllib`` reads it from a TOML file.
+    source : str
+        Name of the content in errors, such as the path of the file.
+    reach : bool
+        Whether to refuse goals that are out of reach.
+
+    Returns
+    -------
+    Task
+        The task, checked.
+
+    Raises
+    ------
+    TaskError
+        The content is no task. The message has a line for each problem.
+    """
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
     except ValidationError as error:
