@@ -297,8 +297,8 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Of ``far``, indices of rows of ``postures``, keep at its beginning those whose hand is
-    farther than ``tolerance`` from (x, y); return their number. For each fill a row of ``wanted``,
+    """Keep at the beginning of ``far``, indices of rows of ``postures``, the indices of postures
+    whose hand is farther than ``tolerance`` from (x, y); return their number. For each fill a row of ``wanted``,
     the hand's step towards (x, y), shortened, and of ``jacobian``, the columns of the arm's joints.
     ``xs`` and ``ys`` are space for the points of an arm."""
     tip = len(arm.links)

@@ -129,8 +129,8 @@ def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
     """Warn of a source whose plan has runs that the joined plan lacks, and of a source with a cell
-    of a stochastic method, not asked for, of which there are fewer runs than the command asks for
-    of other cells. ``asked``: numbers of runs by digest of
+    of a stochastic method, not asked for, that has fewer runs than the command asks for of other
+    cells. ``asked``: numbers of runs by digest of
     the cell; ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
