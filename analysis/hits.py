@@ -53,8 +53,18 @@ _UNRELATED = 0.3
 _SLOW_GOAL = 1.6
 """Ratio of a goal's time for a path to that of the slowest other goal, with a warning."""
 _NAMED = 5  # of a kind
-_AT_GOAL = ", at goal "
+_SAME = 5
+"""Fewest hits that should not all have one angle."""
 _MONTH = "(jan|feb|m[aä]r|apr|ma[iy]|jun|jul|aug|sep|o[ck]t|nov|de[cz])[a-z]*"
+_ANGLES = {"": 1.0, "degrees are made rad": np.pi / 180, "gradians are made rad": np.pi / 200,
+           "turns are made rad": 2 * np.pi}  # fmt: skip
+AXES = {
+    "": (1, 0), "angles are anticlockwise, as y is upwards": (-1, 0),
+    "x is the other way, as if mirrored": (-1, 2), "axes are turned by 90 degrees": (1, 1),
+    "axes are turned by 180 degrees": (1, 2), "axes are turned by -90 degrees": (1, 3),
+    "x and y are swapped": (-1, 1), "x and y are swapped, with the other sign": (-1, 3),
+}  # fmt: skip
+"""Changes of axes: sign of angles, and turn in right angles afterwards."""
 _DATE = re.compile(rf"\d+\W+{_MONTH}\W*\d*|{_MONTH}\W+\d+|\d+([-./])\d+\3\d{{2,4}}", re.IGNORECASE)
 _HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
 
@@ -187,7 +197,7 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
     headings, and a repeated heading. Warns of rows that are left out because they begin with #."""
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
-    rows, lines, wrong, hidden = [], [], [], []
+    rows, lines, wrong, hidden, separator = [], [], [], [], ","
     try:
         for fields in reader:
             while fields and (not headings or len(fields) > len(headings)):
@@ -201,13 +211,16 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
             if not any(map(str.strip, fields)):
                 continue
             if not headings and first.startswith("sep=") and not any(fields[1:]):
-                if separator := first[4:]:
-                    _refuse_separator(path, separator)
+                separator = first[4:] or ","
             elif not headings:
                 headings = [*map(_written, fields)]
-                for separator in ";\t|" if len(fields) == 1 else "":
-                    if separator in fields[0]:
-                        _refuse_separator(path, separator, headings[0])
+                found = [odd for odd in ";\t|" if len(fields) == 1 and odd in fields[0]]
+                separator = (found or [separator])[0]
+                if separator != ",":
+                    raise CoarticError(
+                        f"{path}: the separator is {separator!r}; needed are values separated by "
+                        f"commas, and numbers with a decimal point: found are {headings[0]}"
+                    )
             elif len(fields) != len(headings):
                 wrong.append((reader.line_num, len(fields)))
             else:
@@ -228,16 +241,6 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
     if hidden:
         warn(f"{path}, {hidden[0]}: it begins with # and is left out{also(hidden)}")
     return pd.DataFrame(rows, columns=headings, dtype=object), lines
-
-
-def _refuse_separator(path: str | Path, separator: str, headings: str = "") -> None:
-    """Raise CoarticError if ``separator`` is not a comma; the message names the file and shows
-    ``headings``, its first line, if given."""
-    if separator != ",":
-        raise CoarticError(
-            f"{path}: the separator is {separator!r}; needed are values separated by commas, and "
-            f"numbers with a decimal point{f': found are {headings}' * bool(headings)}"
-        )
 
 
 def also(names: Sequence[str]) -> str:
@@ -392,10 +395,9 @@ def checked_hits(
     if is_file and not timed:
         seconds = "needed is a whole number; seconds belong into a column duration"
         refuse(frame.ticks % 1 != 0, "ticks", seconds)
-    refuse(frame.ticks <= 0, "ticks", "needed is more than 0, from the hit before to this one")
     unit = ticks_per_unit or 1.0
-    less = f"it is less than a tick with {unit:g} ticks per unit: give ticks_per_unit, 100 for s"
-    refuse(frame.ticks * unit < 1, "ticks", less)
+    too_short = "needed is more than 0, from the hit before to this one"
+    refuse(frame.ticks * unit < 1e-6, "ticks", too_short)
     frame["ticks"] = (frame.ticks * unit).round(6)
     again = frame.duplicated(["subject", "trial", "goal"])
     refuse(again, "goal", "this subject, trial and goal have a line above already; number trials "
@@ -436,20 +438,23 @@ def checked_hits(
                     "row, are hands and goals right, is the base in the length unit of the task, "
                     f"and is the task {task.name!r}?"
                 )
-            if _AT_GOAL in reasons[0]:
-                advice = f"Are goals in their order? {advice}"
-            if fits := _remedy(frame, np.char.find(why.astype(str), " radii from ") > 0, task):
+            far = np.char.find(why.astype(str), " rad") > 0
+            if fits := _remedy(frame, far, task):
                 advice = (
                     f"Most of these hands would be at their goals in a recording {fits}. {advice}"
                 )
+            elif ", at goal " in reasons[0]:
+                advice = f"Are goals in their order? {advice}"
+            elif "at the start" not in reasons[0]:
+                advice = " ".join([*_odd_groups(frame, task), *_copies(frame), advice])
             raise CoarticError(f"{source}, {reasons[0]}{also(reasons)}. {advice}")
         frame = frame[~wrong].reset_index(drop=True)
         called = [name for name, words in zip(called, why, strict=True) if not words]
     if reasons:
         warn(f"{source}: {len(reasons)} of {counted(counts.sum(), 'hit')} are left out as "
              f"implausible, {reasons[0]}{also(reasons)}")  # fmt: skip
-    _warn_of_copies(frame, source)
-    _warn_of_places(frame, task, source)
+    for words in _odd_groups(frame, task) + _copies(frame):
+        warn(f"{source}: {words}")
     if mixed:
         warn(f"{source}, {mixed[0]}: rows of the trial are in no order of goals, up or down; times "
              f"are taken as from the goal with the number before{also(mixed)}")  # fmt: skip
@@ -520,10 +525,16 @@ def _implausible(
         for row in np.flatnonzero(wrong & (why == "")).tolist():
             why[row] = words.format(*(each[row] for each in values))
 
-    places = _hand_places(q, frame.hand, task)
-    ways = np.linalg.norm(places[:, None] - task.goal_array, axis=2)
-    off = ways[np.arange(len(ways)), goal - 1]
-    nearest = np.where(ways.min(axis=1) <= 2 * radius, ways.argmin(axis=1) + 1, 0)
+    starts = _hand_places(np.tile(task.q0, (len(q), 1)), frame.hand, task)
+    spots = [starts, *task.goal_array]
+    ways = np.stack([np.linalg.norm(_hand_places(q, frame.hand, task) - spot, axis=1)
+                     for spot in spots], axis=1)  # fmt: skip
+    off = ways[np.arange(len(ways)), goal]
+    is_near = ways.min(axis=1) <= 2 * radius
+    nearest = np.array(
+        ["the start: is it of the next trial", *(f"goal {k}" for k in range(1, len(spots)))],
+        dtype=object,
+    )
     for name, values in zip(task.robot.joint_names[2:], q.T[2:], strict=True):
         mark(np.abs(values) > _LARGEST_ANGLE, name + " is {:g}, no angle in rad", values)
     # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
@@ -538,11 +549,19 @@ def _implausible(
         arm, start = q[:, task.robot.joints(hand)], task.q0[task.robot.joints(hand)]
         left = pd.Series((arm != start).any(axis=1)).groupby(trial).cummax().to_numpy()
         one = (arm == arm[:, :1]).all(axis=1) & left & (len(start) > 1)
-        mark(one, f"all angles of the {hand} arm are {{:g}}", arm[:, 0])
+        words = f"all angles of the {hand} arm are {{:g}}{', as at the start' * (not start.any())}"
+        mark(one, words, arm[:, 0])
+        filled = _between(arm, goal) & (frame.hand == hand).to_numpy()
+        mark(filled, "the angles of the arm are means of the hits around it, as if filled in")
     far, words = off > most, "the hand is {:.3g} radii from its goal"
-    if far.any() and (nearest[far] > 0).mean() > 0.5:
-        mark(far & (nearest > 0), words + f"{_AT_GOAL}{{}}", off / radius, nearest)
+    if far.any() and is_near[far].mean() > 0.5:
+        mark(far & is_near, words + ", at {}", off / radius, nearest[ways.argmin(axis=1)])
     mark(far, words, off / radius)
+    if len(off) >= _MANY and outer < _CENTRAL * radius and not why.any():
+        warn(
+            f"{source}: three of four hits are within {outer / radius:.2g} radii of the centres of "
+            "goals: is the radius a diameter, or are postures those of rests after hits?"
+        )
     whole = why == ""
     if 2 * whole.sum() < len(whole):
         return why
@@ -600,7 +619,7 @@ def _implausible(
             warn(f"{source}: a quarter of the hits or more is faster than the task's arm, {step}")
         allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
         words = "it takes {:g} ticks, a straight movement {:.0f}"
-        mark(early > allowed, words, ticks, straight)
+        mark((early > allowed) | (ticks < 1), words, ticks, straight)
         words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
         mark(ticks > _SLOWEST * slowest, words, ticks)
     return why
@@ -646,89 +665,135 @@ def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
 
 
 def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
-    """Return in words a change of a recording (degrees to rad, another sign, swapped columns, ...)
-    that puts over 80 % of the hits in mask ``far`` within two radii of their goals; empty if no
-    change does, or if there are fewer than three such hits."""
+    """Return in words a change of a recording (degrees to rad, other axes, swapped columns, ...)
+    that puts over 80 % of the hits in mask ``far`` within two radii of their goals, for each arm
+    with three such hits or more, at several goals; empty if no change does."""
     joints, hands = [*task.robot.joint_names], frame.hand
     q, column = frame[joints].to_numpy(np.float64), np.arange(len(joints))
     arms = [task.robot.joints(hand) for hand in task.hands]
-    is_base, between, mirrored = column < 2, q.copy(), -q
+    is_base, is_first, between = column < 2, np.isin(column, [arm.start for arm in arms]), q.copy()
     for arm in arms:
         between[:, arm] = np.diff(q[:, arm], axis=1, prepend=0.0)
-        mirrored[:, arm.start] += np.pi
-    tried = [
-        ("in which degrees are made rad", np.where(is_base, q, np.deg2rad(q)), hands),
-        ("in which turns are made rad", np.where(is_base, q, 2 * np.pi * q), hands),
-        ("in which angles are anticlockwise", np.where(is_base, q, -q), hands),
-        ("in which angles are from the link before, not from the x axis", between, hands),
-        ("that is mirrored", mirrored, hands),
-        ("with each posture a row lower", np.roll(q, 1, axis=0), hands),
-        ("with each posture a row higher", np.roll(q, -1, axis=0), hands),
-        ("in which hands are swapped", q, hands.map({"left": "right", "right": "left"})),
-    ][: 7 + (len(arms) == 2)]
-    for unit in (10.0, 100.0, 1000.0):
-        tried.append(
-            (f"in which the base is divided by {unit:g}", q / np.where(is_base, unit, 1), hands)
-        )
+    forms = {"": (q, 0.0), "a straight joint has angle 0, not π": (q, np.pi),
+             "angles are from the link before, not from the x axis": (between, 0.0)}  # fmt: skip
+    tried = []
+    for unit, form, axes, moves in product(_ANGLES, forms, AXES, (False, True)):
+        (recorded, straight), (sign, quarters) = forms[form], AXES[axes]
+        angles = sign * (_ANGLES[unit] * recorded - np.where(is_first, 0.0, straight))
+        base = (q[:, 0] + sign * 1j * q[:, 1]) * 1j**quarters
+        angles[:, :2] = np.stack([base.real, base.imag], axis=1) if moves else q[:, :2]
+        words = ", ".join(filter(None, [unit, form, axes]))
+        tried.append((f"in which {words}", angles + is_first * quarters * np.pi / 2, hands))
+    del tried[:2]  # nothing is changed
+    for words, shift in (("lower", 1), ("higher", -1)):
+        rolled = np.roll(q, shift, axis=0)
+        tried.append((f"with each posture a row {words}", rolled, hands))
+        tried.append((f"with all angles a row {words}", np.where(is_base, q, rolled), hands))
+    for unit in (10, 100, 1000):
+        divided = q / np.where(is_base, unit, 1)
+        tried.append((f"in which the base is divided by {unit}", divided, hands))
     for k, name in enumerate(joints):
         tried.append((f"with the other sign of {name}", np.where(column == k, -q, q), hands))
-    if len({arm.stop - arm.start for arm in arms}) == 1 and len(arms) == 2:
-        order = np.concatenate([column[:2], column[arms[1]], column[arms[0]]])
-        tried.append(("in which the columns of the arms are swapped", q[:, order], hands))
+    if len(arms) == 2:
+        other = hands.map({"left": "right", "right": "left"})
+        tried.append(("in which hands are swapped", q, other))
+        if len({arm.stop - arm.start for arm in arms}) == 1:
+            order = np.concatenate([column[:2], column[arms[1]], column[arms[0]]])
+            tried.append(("in which the columns of the arms are swapped", q[:, order], hands))
     for arm in arms:
-        columns_of_arm = column[arm].tolist()
-        orders = (
-            permutations(columns_of_arm) if len(columns_of_arm) <= 4 else [columns_of_arm[::-1]]
-        )
-        for each in orders:
+        few = arm.stop - arm.start <= 4
+        for each in permutations(column[arm].tolist()) if few else [column[arm].tolist()[::-1]]:
             order = column.copy()
             order[arm] = each
             names = ", ".join(joints[k] for k in each)
             tried.append((f"with columns in the order {names}", q[:, order], hands))
-    goals = task.goal_array[frame.goal.to_numpy(np.int64) - 1]
-    if far.sum() < 3:
-        return ""
-    shares = []
-    for _, postures, whose in tried:
-        off = np.linalg.norm(_hand_places(postures, whose, task) - goals, axis=1)
-        shares.append(float((off[far] <= 2 * task.radius).mean()))
-    best = int(np.argmax(shares))
-    return tried[best][0] if shares[best] > 0.8 else ""
+    goals, fits = task.goal_array[frame.goal.to_numpy(np.int64) - 1], {}
+    far = far & (np.linalg.norm(_hand_places(q, hands, task) - goals, axis=1) > 2 * task.radius)
+    for hand in task.hands:
+        rows = np.flatnonzero(far & (hands == hand).to_numpy())
+        if len(rows) < 3 or len({*frame.goal[rows]}) < min(2, len(task.goals)):
+            continue
+        shares = []
+        for _, postures, whose in tried:
+            ways = _hand_places(postures[rows], whose.iloc[rows], task) - goals[rows]
+            shares.append((np.linalg.norm(ways, axis=1) <= 2 * task.radius).mean())
+        if max(shares) > 0.8:
+            fits[hand] = tried[int(np.argmax(shares))][0]
+    if len({*fits.values()}) == 1 and len(fits) == len(task.hands):
+        return fits[task.hands[0]]
+    return " and ".join(f"{fits[hand]} (the {hand} arm)" for hand in fits)
 
 
-def _warn_of_places(frame: pd.DataFrame, task: Task, source: str) -> None:
-    """Warn if three of four hits are close to the centres of their goals, and of a goal with a much
-    larger share of hits outside of it than other goals have."""
+def _repeats(values: Array, edge: float) -> NDArray[np.bool_]:
+    """Return a mask of the rows whose k values, ``(n, k)``, in steps to which they are rounded, are
+    all less than ``edge`` away from 0; empty if chance could make as many, which makes over 2ᵏ
+    times as many rows within five times that distance."""
+    size = np.abs(values).max(axis=1, initial=0.0)
+    exact = size < edge
+    return exact & (exact.sum() >= 3 + (size[~exact] < 5 * edge).sum() / 2 ** values.shape[1])
+
+
+def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return a mask of the hits of a subject in which all angles of an arm, ``(n, joints)``, are
+    means of the hits around it, in the order of rows or of trials at one of the goals ``(n,)``."""
+    q, found = arm.round(9), np.zeros(len(arm), dtype=bool)
+    steps = np.array([np.diff(np.unique(angles)).min(initial=1.0) for angles in q.T])
+    for order in (np.arange(len(q)), np.argsort(goal, kind="stable")):
+        before, middle, after = order[:-2], order[1:-1], order[2:]
+        moved = (np.abs(q[after] - q[before]) > 10 * steps).any(axis=1) & (len(steps) > 1)
+        bends = (q[after] + q[before] - 2 * q[middle])[moved] / steps
+        found[middle[moved]] |= _repeats(bends, 1.6)
+    return found
+
+
+def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
+    """Return a sentence for each goal, and for trials of a subject's hand (such as those after a
+    sensor slips), with a much larger share of hits outside of their goals than others have.
+
+    Such trials begin and end where the sum of deviations from the mean share is least and largest;
+    that its range (Kuiper's statistic) exceeds 2.6 √n SD has by chance a probability of 0.0001.
+    """
     q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
     places = _hand_places(q, frame.hand, task)
     ways = places - task.goal_array[goals - 1]
-    off = np.linalg.norm(ways, axis=1) / task.radius
-    if len(off) >= _MANY and (outer := float(np.quantile(off, 0.75))) < _CENTRAL:
-        warn(f"{source}: three of four hits are within {outer:.2g} radii of the centres of goals: "
-             "is the radius a diameter, or are postures those of rests after hits?")  # fmt: skip
+    out = np.linalg.norm(ways, axis=1) > _OUTSIDE * task.radius
+    groups = []
     for goal in np.unique(goals):
-        here = goals == goal
-        if min(here.sum(), (~here).sum()) < _MANY:
-            continue
-        share, others = ((off[rows] > _OUTSIDE).mean() for rows in (here, ~here))
-        if share > max(0.3, 2.5 * others):
+        here, others = np.flatnonzero(goals == goal), np.flatnonzero(goals != goal)
+        if min(len(here), len(others)) >= _MANY:
             (x, y), (off_x, off_y) = places[here].mean(axis=0), ways[here].mean(axis=0)
-            warn(f"{source}: {100 * share:.0f} % of the hits of goal {goal} are more than "
-                 f"{_OUTSIDE:g} radii from its centre, of others {100 * others:.0f} %. Their mean "
-                 f"is ({x:.3g}, {y:.3g}), ({off_x:+.2g}, {off_y:+.2g}) from it: is the goal "
-                 "elsewhere?")  # fmt: skip
+            mean = f"Their mean is ({x:.3g}, {y:.3g}), ({off_x:+.2g}, {off_y:+.2g}) from it"
+            groups.append((here, others, f"goal {goal}", f"{mean}: is the goal elsewhere?"))
+    for (subject, hand), rows in frame.groupby(["subject", "hand"], sort=False).indices.items():
+        sums = np.cumsum(out[rows] - out[rows].mean())
+        if len(rows) >= _MANY and np.ptp(sums) > 2.6 * np.sqrt(len(rows)) * out[rows].std():
+            inner = slice(*sorted((int(sums.argmin()) + 1, int(sums.argmax()) + 1)))
+            parts = sorted((rows[inner], np.delete(rows, inner)), key=lambda part: out[part].mean())
+            first, last = frame.trial.to_numpy()[parts[1][[0, -1]]]
+            name = f"{subject}'s {hand} hand in trials {first:g} to {last:g}"
+            words = "Did a sensor drift or slip, or change its scale?"
+            groups.append((parts[1], parts[0], name, words))
+    shares = [(out[here].mean(), out[others].mean(), *words) for here, others, *words in groups]
+    return [
+        f"{100 * share:.0f} % of the hits of {name} are more than {_OUTSIDE:g} radii from the "
+        f"centre of the goal, of others {100 * others:.0f} %. {words}"
+        for share, others, name, words in shares
+        if share > max(0.3, 2.5 * others)
+    ]
 
 
 def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> None:
     """Warn if an angle of an arm is rounded, or if many hits of a goal have one posture or one
     angle in common. ``hits`` are the hits of a subject with this arm, ``joints`` the columns of its
     angles; ``source`` begins the warning."""
-    if (postures := len(hits[joints].drop_duplicates())) < _MANY:
-        return
+    postures = len(hits[joints].drop_duplicates())
     for name in joints:
         angles = np.unique(hits[name])
         least = float(np.diff(angles).min(initial=np.inf))
-        if 2 < len(angles) < postures / 2 and least > _COARSE_ANGLE:
+        if len(angles) == 1 < len(joints) and len({*hits.goal}) > 1 and len(hits) >= _SAME:
+            warn(f"{source}: {name} is the same in all {len(hits)} hits: was it measured?")
+            return
+        if 2 < len(angles) < postures / 2 and postures >= _MANY and least > _COARSE_ANGLE:
             warn(f"{source}: {name} has {len(angles)} values, {least:.2g} rad apart or more: is it "
                  "rounded?")  # fmt: skip
             return
@@ -738,24 +803,50 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
             n = len(of_goal)
             most, second = [*of_goal.value_counts().tolist(), 0][:2]
             fewest = 3 if values is numbers else max(5, 0.1 * n)
-            is_odd = most >= max(fewest, 3 * second) and n - most >= 4
-            if is_odd and 2 * (of_goal.nunique() - 1) > n - most:
+            is_odd = most >= max(fewest, 3 * second) and n - most >= 4 and postures >= _MANY
+            is_odd &= 2 * (of_goal.nunique() - 1) > n - most
+            if is_odd or most == n >= _SAME:
                 warn(f"{source}: {values.name} is the same in {most} of {n} hits of goal {goal:g}: "
-                     "is it filled in, out of range, or stuck?")  # fmt: skip
+                     "is it filled in, computed, out of range, or stuck?")  # fmt: skip
                 return
 
 
-def _warn_of_copies(frame: pd.DataFrame, source: str) -> None:
-    """Warn of trials that are equal in all columns but subject and trial, as if copied.
+def _copies(frame: pd.DataFrame) -> list[str]:
+    """Return a sentence for trials that are equal in all postures, as if copied, and for equal
+    times of consecutive hits, or of two trials at all goals, that are more than almost equal ones.
 
-    One such pair within a subject is enough; between subjects, where a chance is larger, it takes
-    at least three different trials that occur twice or more. ``source`` begins the warning.
+    One pair of equal postures within a subject is enough; between subjects, where a chance is
+    larger, it takes at least three different trials that occur twice or more.
     """
-    hits = pd.util.hash_pandas_object(frame.drop(columns=["subject", "trial"]), index=False)
+    words = []
+    hits = frame.drop(columns=["subject", "trial", "ticks"])
+    hits = pd.util.hash_pandas_object(hits, index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()
     copies = trials[trials.duplicated(keep=False)]
     if copies.nunique() >= 3 or copies.reset_index(name="sum").duplicated(["subject", "sum"]).any():
         first = [f"trial {trial:g} of {subject}" for subject, trial in
                  copies.index[copies == copies.iloc[-1]][:2]]  # fmt: skip
-        warn(f"{source}: {len(copies)} trials are equal to others in all numbers, such as "
-              f"{' and '.join(first)}. Is a recording there twice, or a trial copied?")  # fmt: skip
+        words.append(
+            f"{len(copies)} trials are equal to others in all postures, such as "
+            f"{' and '.join(first)}. Is a recording there twice, or a trial copied?"
+        )
+    for subject, of_subject in frame.groupby("subject", sort=False):
+        ticks, number = of_subject.ticks.to_numpy(np.float64), of_subject.trial.to_numpy()
+        if len(ticks) < _MANY or len(each := np.unique(ticks)) < 3:
+            continue
+        unit, rises = np.diff(each).min(), np.diff(ticks)
+        if (runs := _repeats(np.stack([rises[1:], rises[:-1]], axis=1) / unit, 0.5)).any():
+            words.append(f"Consecutive hits of {subject} have equal times, first in trial "
+                         f"{number[runs.argmax()]:g}: are they a mean, or filled in?")  # fmt: skip
+        table = of_subject.pivot_table(index="trial", columns="goal", values="ticks").dropna()
+        times, n = table.to_numpy(), len(table)
+        pairs = [(np.arange(n - lag), np.arange(lag, n)) for lag in range(1, n)]
+        pairs.append(np.triu_indices(min(n, 1000), 1))  # larger ones would take long
+        fine = n > 2 < times.shape[1] and (times.std(axis=0) > unit).all()
+        for one, other in pairs if fine else ():
+            if (same := _repeats((times[other] - times[one]) / unit, 0.5)).any():
+                first, second = (table.index[each[same.argmax()]] for each in (one, other))
+                words.append(f"Trials {first:g} and {second:g} of {subject}, and others, have the "
+                             "same times at all goals: are they copied?")  # fmt: skip
+                break
+    return words

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import chain, combinations
+from itertools import chain, combinations, pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from coartic import CoarticError, Task
 from coartic.analysis.hits import (
+    AXES,
     Implausible,
     also,
     as_names,
@@ -267,6 +268,8 @@ def hits_from_markers(
     rows, used, unfinished, starts = [], np.zeros(len(frame), dtype=bool), [], []
     pauses: list[int] = []
     returns: list[int] = []
+    at_once: list[int] = []
+    broken_off: list[Array] = []  # places of hands in unfinished trials
     away, rests, twice = np.zeros((3, len(frame)), dtype=bool)
     window = max(3, 2 * round(_LONGEST_GAP / step / 2) + 1)  # single samples are noise
     largest = 0.25 * max(task.robot.reach(hand)[1] for hand in hands)
@@ -296,6 +299,7 @@ def hits_from_markers(
             after = tips[:, found[-1][0] + 1 if found else 0 :] - task.goal_array[done]
             nearest = np.linalg.norm(after, axis=2).min(initial=np.inf) - task.radius
             unfinished.append(f"goal {done + 1} in trial {trial[first]:g} by {nearest:.2g}")
+            broken_off.append(tips)
             continue
         used[first : first + found[-1][0] + 1] = True
         away[first] = (np.linalg.norm(tips[:, 0] - origins, axis=1) > largest).any()
@@ -313,6 +317,7 @@ def hits_from_markers(
         left = np.logical_or.accumulate((radii > 1.5).any(axis=0))
         again = np.flatnonzero((left & (radii < 0.5).all(axis=0))[: found[0][0]])
         returns += (first + again[:1]).tolist()
+        at_once += [first + one[0] for one, other in pairwise(found) if other[0] - one[0] == 1]
         before = clock[0]
         for goal, (_, arm, when, posture) in enumerate(found, 1):
             ticks = max((when - before) * ticks_per_unit, 1.0)
@@ -324,7 +329,9 @@ def hits_from_markers(
     swaps &= used
     refuse(swaps, f"{culprit[swaps.argmax()]}the length of a link jumps by more than "
            f"{100 * _TOLERANCE:.0f} %: markers swap, or a flag stands for a gap")  # fmt: skip
-    refuse(used & torn, "the places of the two shoulders do not belong to one base: they differ "
+    remedy = _remedy(broken_off, task)
+    torn &= used & (not remedy)
+    refuse(torn, "the places of the two shoulders do not belong to one base: they differ "
            f"from the task's by more than {100 * _TOLERANCE:.0f} %")  # fmt: skip
     refuse(twice, "the hand is back at the start of the trial and reaches all goals again; needed "
            "is a number for each trial")  # fmt: skip
@@ -342,7 +349,7 @@ def hits_from_markers(
            "are samples missing, or did a marker jump?")  # fmt: skip
     missed = f"the tip misses {' '.join(unfinished[:1])}{also(unfinished)}"
     missed = (f"{source}: {len(unfinished)} of {counted(len(parts), 'trial')} are unfinished and "
-              f"have no hits: {missed}")  # fmt: skip
+              f"have no hits: {missed}{remedy}")  # fmt: skip
     if 2 * len(unfinished) > len(parts):
         middles = [np.nanmedian(places[hand][begin, -1], axis=0) for hand in hands]
         raise CoarticError(
@@ -385,6 +392,7 @@ def hits_from_markers(
     for places_of, words in (
         (pauses, f"the hand rests for more than {1000 * _LONGEST_REST:.0f} ms on the way"),
         (returns, "the hand is back at the start before it hits a goal"),
+        (at_once, "the hand is in the next goal already where it hits one"),
     ):
         if places_of:
             warn(f"{source}, {names[places_of[0]]}: {words}, {counted(len(places_of), 'time')}, "
@@ -501,6 +509,29 @@ def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:
         usual = pd.DataFrame(np.linalg.norm(ways, axis=2)).median().to_numpy()
         if (np.abs(usual / links - 1) <= _TOLERANCE).all():
             return f"Markers {markers[one]} and {markers[other]} may be swapped. "
+    return ""
+
+
+def _remedy(trials: Sequence[Array], task: Task) -> str:
+    """Return in words a change of axes or of the order of goals by which over 80 % of unfinished
+    trials, places of hands ``(hands, n, 2)``, are finished; empty if none does, and for a single
+    trial."""
+    tried = [(f"in which {axes}", axes, task) for axes in AXES if axes]
+    for tips in trials[:20]:
+        near = np.linalg.norm(tips[:, :, None] - task.goal_array, axis=3) < 1.5 * task.radius
+        order = near.any(axis=0).argmax(axis=0).argsort(kind="stable").tolist()
+        ordered = task.model_copy(update={"goals": tuple(task.goals[k] for k in order)})
+        tried.append(
+            (f"with goals in the order {', '.join(str(k + 1) for k in order)}", "", ordered)
+        )
+    for words, axes, ordered in tried if len(trials) > 1 else ():
+        (sign, quarters), done = AXES[axes], []
+        for tips in trials[:20]:
+            places = (tips[..., 0] + sign * 1j * tips[..., 1]) * 1j**quarters
+            turned, clock = np.stack([places.real, places.imag], axis=2), np.arange(tips.shape[1])
+            done.append(len(_hits(turned, ordered, clock, clock[:, None])) == len(task.goals))
+        if np.mean(done) > 0.8:
+            return f". They are finished in a recording {words}"
     return ""
 
 

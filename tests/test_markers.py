@@ -182,6 +182,29 @@ WRONG = {
 }
 
 
+def placed(change):
+    """A change of the x and y of all markers."""
+
+    def changed(t):
+        xs, ys = ([name for name in t if name.endswith(f"_{axis}")] for axis in "xy")
+        x, y = change(t[xs].to_numpy(), t[ys].to_numpy())
+        return t.assign(**dict(zip(xs + ys, np.hstack([x, y]).T, strict=True)))
+
+    return changed
+
+
+WRONG |= {
+    "They are finished in a recording in which angles are anticlockwise, as y is upwards": placed(
+        lambda x, y: (x, -y)
+    ),
+    "They are finished in a recording in which axes are turned by 90 degrees": placed(
+        lambda x, y: (y, -x)
+    ),
+    "They are finished in a recording in which x and y are swapped": placed(lambda x, y: (y, x)),
+    "They are finished in a recording in which x is the other way": placed(lambda x, y: (-x, y)),
+}
+
+
 def from_trial_3(column, change):
     """A change of columns of the second session, trials 3 and 4."""
 
@@ -352,6 +375,22 @@ SAID |= {
 def test_what_counts_as_movement_or_is_cut_from_it_is_said(sentence):
     with pytest.warns(UserWarning, match=sentence):
         assert len(hits_from_markers(SAID[sentence](noisy(recorded(RIGHT))), RIGHT)) == 16
+
+
+@pytest.mark.parametrize("order", [(2, 1, 3, 4), (4, 3, 2, 1)])
+def test_goals_in_another_order_are_named(order):
+    goals = tuple(RIGHT.goals[k - 1] for k in order)
+    markers = recorded(RIGHT.model_copy(update={"goals": goals}))
+    words = f"finished in a recording with goals in the order {', '.join(map(str, order))}"
+    with pytest.raises(CoarticError, match=words):
+        hits_from_markers(markers, RIGHT)
+
+
+def test_a_second_hit_of_a_goal_that_the_tip_does_not_leave_is_said():
+    first, *others = RIGHT.goals
+    task = RIGHT.model_copy(update={"goals": (first, first, *others)})
+    with pytest.warns(UserWarning, match="the hand is in the next goal already where it hits"):
+        assert len(hits_from_markers(recorded(RIGHT), task)) == 20
 
 
 def test_starts_far_in_varied_directions_are_said():
