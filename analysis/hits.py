@@ -666,8 +666,9 @@ def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
 
 def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
     """Return in words a change of a recording (degrees to rad, other axes, swapped columns, ...)
-    that puts over 80 % of the hits in mask ``far`` within two radii of their goals, for each arm
-    with three such hits or more, at several goals; empty if no change does."""
+    that puts over 80 % of the hits in mask ``far`` as close to their goals as 80 % of the others
+    are, at least within two radii, for each arm with three such hits or more, at several goals;
+    empty if no change does."""
     joints, hands = [*task.robot.joint_names], frame.hand
     q, column = frame[joints].to_numpy(np.float64), np.arange(len(joints))
     arms = [task.robot.joints(hand) for hand in task.hands]
@@ -708,7 +709,10 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
             names = ", ".join(joints[k] for k in each)
             tried.append((f"with columns in the order {names}", q[:, order], hands))
     goals, fits = task.goal_array[frame.goal.to_numpy(np.int64) - 1], {}
-    far = far & (np.linalg.norm(_hand_places(q, hands, task) - goals, axis=1) > 2 * task.radius)
+    off = np.linalg.norm(_hand_places(q, hands, task) - goals, axis=1) / task.radius
+    far = far & (off > 2)
+    usual = np.quantile(off[~far], 0.8) if (~far).sum() >= _MANY else 2.0
+    most = float(np.clip(usual, _OUTSIDE, 2.0)) * task.radius
     for hand in task.hands:
         rows = np.flatnonzero(far & (hands == hand).to_numpy())
         if len(rows) < 3 or len({*frame.goal[rows]}) < min(2, len(task.goals)):
@@ -716,7 +720,7 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
         shares = []
         for _, postures, whose in tried:
             ways = _hand_places(postures[rows], whose.iloc[rows], task) - goals[rows]
-            shares.append((np.linalg.norm(ways, axis=1) <= 2 * task.radius).mean())
+            shares.append((np.linalg.norm(ways, axis=1) <= most).mean())
         if max(shares) > 0.8:
             fits[hand] = tried[int(np.argmax(shares))][0]
     if len({*fits.values()}) == 1 and len(fits) == len(task.hands):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import chain, combinations, pairwise
+from itertools import chain, combinations, pairwise, permutations
 from pathlib import Path
 from typing import Literal
 
@@ -261,7 +261,7 @@ def hits_from_markers(
     q[:, :2] = np.mean(bases, axis=0)
     for k in ("xy".index(axis) for axis in task.locked_base):
         agree(f"base_{'xy'[k]}", medians(q[:, k])[:, 0], 0.1, 2 * task.radius, task.radius,
-              f"task {task.name!r} locks it: did the person or the camera move?")  # fmt: skip
+              f"task {task.name!r} locks it: did the person or the camera move, or are axes turned?")  # fmt: skip
     for hand in hands:
         way = np.diff(places[hand], axis=1)
         q[:, task.robot.joints(hand)] = np.diff(np.arctan2(way[..., 1], way[..., 0]), prepend=0.0)
@@ -517,13 +517,10 @@ def _remedy(trials: Sequence[Array], task: Task) -> str:
     trials, places of hands ``(hands, n, 2)``, are finished; empty if none does, and for a single
     trial."""
     tried = [(f"in which {axes}", axes, task) for axes in AXES if axes]
-    for tips in trials[:20]:
-        near = np.linalg.norm(tips[:, :, None] - task.goal_array, axis=3) < 1.5 * task.radius
-        order = near.any(axis=0).argmax(axis=0).argsort(kind="stable").tolist()
-        ordered = task.model_copy(update={"goals": tuple(task.goals[k] for k in order)})
-        tried.append(
-            (f"with goals in the order {', '.join(str(k + 1) for k in order)}", "", ordered)
-        )
+    numbers = tuple(range(1, len(task.goals) + 1))
+    for order in permutations(numbers) if len(numbers) <= 4 else [numbers[::-1]]:
+        ordered = task.model_copy(update={"goals": tuple(task.goals[k - 1] for k in order)})
+        tried.append((f"with goals in the order {', '.join(map(str, order))}", "", ordered))
     for words, axes, ordered in tried if len(trials) > 1 else ():
         (sign, quarters), done = AXES[axes], []
         for tips in trials[:20]:
