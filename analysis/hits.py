@@ -83,14 +83,15 @@ def read_hits(
     count; columns of an arm or a joint that the task does not use are left out with a warning.
     Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
     start of the task on, with a warning. Warns, too, if an arm of the task would be much faster or
-    slower, if trials are there twice, a name is spelt in two ways, rows are in no order of goals,
-    values are rounded or repeat, times seem to be of other rows, of reactions or of a clock that
-    runs on in some trials, and if hits contradict the place or the radius of goals.
+    slower, if trials or their times are there twice, a name is spelt in two ways, rows are in no
+    order of goals, values are rounded, repeat or never vary, times seem to be of other rows, of
+    reactions or of a clock that runs on in some trials, and if hits contradict the place or the
+    radius of goals, or do so in some trials, as if a sensor had slipped.
 
     Each hit is checked among those of its subject. Implausible is a hit whose hand is more than two
     radii from its goal (more if motor noise puts a quarter of all hits outside of their goals),
-    whose base moves where it is locked, whose arm has an angle of more than 20 rad or one number in
-    place of all its angles, or whose time is over 20 times the longest subtask of the corrective
+    whose base moves where it is locked, whose arm has an angle of more than 20 rad, one number in
+    place of all its angles, or exact means of the hits around it, or whose time is over 20 times the longest subtask of the corrective
     process, or too short for a straight movement. Implausible hits are refused, or with
     ``implausible="drop"`` left out; if they are most hits of a subject they are always refused.
 
@@ -666,7 +667,7 @@ def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
 
 def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
     """Return in words a change of a recording (degrees to rad, other axes, swapped columns, ...)
-    that puts over 80 % of the hits in mask ``far`` as close to their goals as 80 % of the others
+    that puts over 80 % of the hits in mask ``far`` as close to their goals as 95 % of the others
     are, at least within two radii, for each arm with three such hits or more, at several goals;
     empty if no change does."""
     joints, hands = [*task.robot.joint_names], frame.hand
@@ -711,7 +712,7 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
     goals, fits = task.goal_array[frame.goal.to_numpy(np.int64) - 1], {}
     off = np.linalg.norm(_hand_places(q, hands, task) - goals, axis=1) / task.radius
     far = far & (off > 2)
-    usual = np.quantile(off[~far], 0.8) if (~far).sum() >= _MANY else 2.0
+    usual = np.quantile(off[~far], 0.95) if (~far).sum() >= _MANY else 2.0
     most = float(np.clip(usual, _OUTSIDE, 2.0)) * task.radius
     for hand in task.hands:
         rows = np.flatnonzero(far & (hands == hand).to_numpy())
