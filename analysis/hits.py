@@ -91,9 +91,10 @@ def read_hits(
     Each hit is checked among those of its subject. Implausible is a hit whose hand is more than two
     radii from its goal (more if motor noise puts a quarter of all hits outside of their goals),
     whose base moves where it is locked, whose arm has an angle of more than 20 rad, one number in
-    place of all its angles, or exact means of the hits around it, or whose time is over 20 times the longest subtask of the corrective
-    process, or too short for a straight movement. Implausible hits are refused, or with
-    ``implausible="drop"`` left out; if they are most hits of a subject they are always refused.
+    place of all its angles, or exact means of the hits around it, or whose time is over 20 times
+    the longest subtask of the corrective process, or too short for a straight movement. Implausible
+    hits are refused, or with ``implausible="drop"`` left out; if they are most hits of a subject
+    they are always refused.
 
     Parameters
     ----------
@@ -439,8 +440,7 @@ def checked_hits(
                     "row, are hands and goals right, is the base in the length unit of the task, "
                     f"and is the task {task.name!r}?"
                 )
-            far = np.char.find(why.astype(str), " rad") > 0
-            if fits := _remedy(frame, far, task):
+            if fits := _remedy(frame, np.char.find(why.astype(str), " rad") > 0, task):
                 advice = (
                     f"Most of these hands would be at their goals in a recording {fits}. {advice}"
                 )
@@ -527,15 +527,13 @@ def _implausible(
             why[row] = words.format(*(each[row] for each in values))
 
     starts = _hand_places(np.tile(task.q0, (len(q), 1)), frame.hand, task)
-    spots = [starts, *task.goal_array]
+    spots = {f"goal {k}": place for k, place in enumerate(task.goal_array, 1)}
+    spots = {"the start: is it of the next trial": starts} | spots
     ways = np.stack([np.linalg.norm(_hand_places(q, frame.hand, task) - spot, axis=1)
-                     for spot in spots], axis=1)  # fmt: skip
+                     for spot in spots.values()], axis=1)  # fmt: skip
     off = ways[np.arange(len(ways)), goal]
     is_near = ways.min(axis=1) <= 2 * radius
-    nearest = np.array(
-        ["the start: is it of the next trial", *(f"goal {k}" for k in range(1, len(spots)))],
-        dtype=object,
-    )
+    nearest = np.array([*spots], dtype=object)[ways.argmin(axis=1)]
     for name, values in zip(task.robot.joint_names[2:], q.T[2:], strict=True):
         mark(np.abs(values) > _LARGEST_ANGLE, name + " is {:g}, no angle in rad", values)
     # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
@@ -556,7 +554,7 @@ def _implausible(
         mark(filled, "the angles of the arm are means of the hits around it, as if filled in")
     far, words = off > most, "the hand is {:.3g} radii from its goal"
     if far.any() and is_near[far].mean() > 0.5:
-        mark(far & is_near, words + ", at {}", off / radius, nearest[ways.argmin(axis=1)])
+        mark(far & is_near, words + ", at {}", off / radius, nearest)
     mark(far, words, off / radius)
     if len(off) >= _MANY and outer < _CENTRAL * radius and not why.any():
         warn(
@@ -733,9 +731,10 @@ def _repeats(values: Array, edge: float) -> NDArray[np.bool_]:
     """Return a mask of the rows whose k values, ``(n, k)``, in steps to which they are rounded, are
     all less than ``edge`` away from 0; empty if chance could make as many, which makes over 2ᵏ
     times as many rows within five times that distance."""
-    size = np.abs(values).max(axis=1, initial=0.0)
+    size: Array = np.abs(values).max(axis=1, initial=0.0)
     exact = size < edge
-    return exact & (exact.sum() >= 3 + (size[~exact] < 5 * edge).sum() / 2 ** values.shape[1])
+    near = int((size[~exact] < 5 * edge).sum())
+    return exact & bool(exact.sum() >= 3 + near / 2 ** values.shape[1])
 
 
 def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -762,14 +761,15 @@ def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
     places = _hand_places(q, frame.hand, task)
     ways = places - task.goal_array[goals - 1]
     out = np.linalg.norm(ways, axis=1) > _OUTSIDE * task.radius
-    groups = []
+    groups: list[tuple[NDArray[np.int64], NDArray[np.int64], str, str]] = []
     for goal in np.unique(goals):
         here, others = np.flatnonzero(goals == goal), np.flatnonzero(goals != goal)
         if min(len(here), len(others)) >= _MANY:
             (x, y), (off_x, off_y) = places[here].mean(axis=0), ways[here].mean(axis=0)
             mean = f"Their mean is ({x:.3g}, {y:.3g}), ({off_x:+.2g}, {off_y:+.2g}) from it"
             groups.append((here, others, f"goal {goal}", f"{mean}: is the goal elsewhere?"))
-    for (subject, hand), rows in frame.groupby(["subject", "hand"], sort=False).indices.items():
+    for subject, hand in product(frame.subject.unique(), task.hands):
+        rows = np.flatnonzero((frame.subject == subject) & (frame.hand == hand))
         sums = np.cumsum(out[rows] - out[rows].mean())
         if len(rows) >= _MANY and np.ptp(sums) > 2.6 * np.sqrt(len(rows)) * out[rows].std():
             inner = slice(*sorted((int(sums.argmin()) + 1, int(sums.argmax()) + 1)))
@@ -824,8 +824,8 @@ def _copies(frame: pd.DataFrame) -> list[str]:
     larger, it takes at least three different trials that occur twice or more.
     """
     words = []
-    hits = frame.drop(columns=["subject", "trial", "ticks"])
-    hits = pd.util.hash_pandas_object(hits, index=False)
+    postures = frame.drop(columns=["subject", "trial", "ticks"])
+    hits = pd.util.hash_pandas_object(postures, index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()
     copies = trials[trials.duplicated(keep=False)]
     if copies.nunique() >= 3 or copies.reset_index(name="sum").duplicated(["subject", "sum"]).any():
@@ -835,6 +835,7 @@ def _copies(frame: pd.DataFrame) -> list[str]:
             f"{len(copies)} trials are equal to others in all postures, such as "
             f"{' and '.join(first)}. Is a recording there twice, or a trial copied?"
         )
+        return words
     for subject, of_subject in frame.groupby("subject", sort=False):
         ticks, number = of_subject.ticks.to_numpy(np.float64), of_subject.trial.to_numpy()
         if len(ticks) < _MANY or len(each := np.unique(ticks)) < 3:

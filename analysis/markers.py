@@ -317,7 +317,7 @@ def hits_from_markers(
         left = np.logical_or.accumulate((radii > 1.5).any(axis=0))
         again = np.flatnonzero((left & (radii < 0.5).all(axis=0))[: found[0][0]])
         returns += (first + again[:1]).tolist()
-        at_once += [first + one[0] for one, other in pairwise(found) if other[0] - one[0] == 1]
+        at_once += [int(first) + one[0] for one, other in pairwise(found) if other[0] - one[0] == 1]
         before = clock[0]
         for goal, (_, arm, when, posture) in enumerate(found, 1):
             ticks = max((when - before) * ticks_per_unit, 1.0)
@@ -525,7 +525,10 @@ def _remedy(trials: Sequence[Array], task: Task) -> str:
         (sign, quarters), done = AXES[axes], []
         for tips in trials[:20]:
             places = (tips[..., 0] + sign * 1j * tips[..., 1]) * 1j**quarters
-            turned, clock = np.stack([places.real, places.imag], axis=2), np.arange(tips.shape[1])
+            turned, clock = (
+                np.stack([places.real, places.imag], axis=2),
+                np.arange(tips.shape[1]) / 1.0,
+            )
             done.append(len(_hits(turned, ordered, clock, clock[:, None])) == len(task.goals))
         if np.mean(done) > 0.8:
             return f". They are finished in a recording {words}"

@@ -56,7 +56,9 @@ WRONG = {
     "angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
     "a line above already; number trials": lambda t: pd.concat([t, t]),
     "line 2: ticks is .*column duration": lambda t: t.assign(ticks=t.ticks / 100),
-    "duration is 0; needed is more than 0": lambda t: t.assign(duration=0.0).drop(columns="ticks"),
+    "duration is 0.0; needed is more than 0": lambda t: t.assign(duration=0.0).drop(
+        columns="ticks"
+    ),
     "median hit takes 0.0.* Are times in": lambda t: t.assign(duration=t.ticks / 1000).drop(
         columns="ticks"
     ),
@@ -356,7 +358,8 @@ OF_ARMS = {
 
 @pytest.mark.parametrize("cause", OF_ARMS)
 def test_a_fault_of_one_arm_or_of_some_trials_is_named(people, cause):
-    with pytest.raises(CoarticError, match=cause):
+    with warnings.catch_warnings(), pytest.raises(CoarticError, match=cause):
+        warnings.simplefilter("ignore")  # of times in what is left
         checked_hits(OF_ARMS[cause](people), TASK)
 
 
