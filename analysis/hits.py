@@ -770,8 +770,10 @@ def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
             groups.append((here, others, f"goal {goal}", f"{mean}: is the goal elsewhere?"))
     for subject, hand in product(frame.subject.unique(), task.hands):
         rows = np.flatnonzero((frame.subject == subject) & (frame.hand == hand))
+        if len(rows) < _MANY:
+            continue
         sums = np.cumsum(out[rows] - out[rows].mean())
-        if len(rows) >= _MANY and np.ptp(sums) > 2.6 * np.sqrt(len(rows)) * out[rows].std():
+        if np.ptp(sums) > 2.6 * np.sqrt(len(rows)) * out[rows].std():
             inner = slice(*sorted((int(sums.argmin()) + 1, int(sums.argmax()) + 1)))
             parts = sorted((rows[inner], np.delete(rows, inner)), key=lambda part: out[part].mean())
             first, last = frame.trial.to_numpy()[parts[1][[0, -1]]]

@@ -358,9 +358,16 @@ OF_ARMS = {
 
 @pytest.mark.parametrize("cause", OF_ARMS)
 def test_a_fault_of_one_arm_or_of_some_trials_is_named(people, cause):
-    with warnings.catch_warnings(), pytest.raises(CoarticError, match=cause):
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of times in what is left
-        checked_hits(OF_ARMS[cause](people), TASK)
+        with pytest.raises(CoarticError, match=cause):
+            checked_hits(OF_ARMS[cause](people), TASK)
+
+
+def test_an_arm_that_is_never_used_is_no_fault():
+    one_hand = TASK.model_copy(update={"hands": ("right",)})
+    hits = reference.hits_of(one_hand, CONDITIONS["EC1"], trials=8, seed=1, subject="a")
+    assert len(checked_hits(hits, TASK)) == 32
 
 
 def means(t, rows, step):
