@@ -261,7 +261,7 @@ def hits_from_markers(
     q[:, :2] = np.mean(bases, axis=0)
     for k in ("xy".index(axis) for axis in task.locked_base):
         agree(f"base_{'xy'[k]}", medians(q[:, k])[:, 0], 0.1, 2 * task.radius, task.radius,
-              f"task {task.name!r} locks it: did the person or the axes move?")  # fmt: skip
+              f"task {task.name!r} locks it: did the person or the camera move?")  # fmt: skip
     for hand in hands:
         way = np.diff(places[hand], axis=1)
         q[:, task.robot.joints(hand)] = np.diff(np.arctan2(way[..., 1], way[..., 0]), prepend=0.0)
