@@ -28,33 +28,15 @@ from coartic.robot import Array
 
 Implausible = Literal["refuse", "drop"]
 """Treatment of hits that the person cannot have made."""
-_LARGEST_ANGLE = 20.0
-"""Largest angle, rad; if most are larger they are taken for degrees."""
-_AMBIGUOUS = 2.5
-"""Turn of a joint between hits, rad, from which its direction is in doubt if angles are wrapped."""
-_LARGEST_TRIAL = 100_000
-"""Largest number of a trial."""
 _SLOWEST = 20
 """Longest plausible time of a hit, in longest subtasks of the corrective process alone."""
 _UNITS = {"s": 100.0, "ms": 0.1, "min": 6000.0, "control steps": 1.0}
 """Ticks in units of a duration, for a person who takes a second for each rad."""
-_MANY = 20
-"""Fewest hits of a subject whose times are looked at for rounding."""
-_COARSE = 10.0
-"""Ticks to which times may be rounded in any case."""
-_COARSE_ANGLE = 0.02
-"""Least difference of angles, rad, from which they are said to be rounded."""
-_CENTRAL = 0.6
-"""Radii from a centre within which three of four hits are too few at the edge of a goal."""
+MANY = 20
+"""Fewest hits, or samples, that are compared with others."""
 _OUTSIDE = 1.25
 """Radii from the centre of a goal from which hits are not at its edge."""
-_UNRELATED = 0.3
-"""Correlation of times with paths below which times may be those of the next row."""
-_SLOW_GOAL = 1.6
-"""Ratio of a goal's time for a path to that of the slowest other goal, with a warning."""
 _NAMED = 5  # of a kind
-_SAME = 5
-"""Fewest hits that should not all have one angle."""
 _MONTH = "(jan|feb|m[aä]r|apr|ma[iy]|jun|jul|aug|sep|o[ck]t|nov|de[cz])[a-z]*"
 _ANGLES = {"": 1.0, "degrees are made rad": np.pi / 180, "gradians are made rad": np.pi / 200,
            "turns are made rad": 2 * np.pi}  # fmt: skip
@@ -245,6 +227,13 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
     return pd.DataFrame(rows, columns=headings, dtype=object), lines
 
 
+def turned(places: Array, axes: str) -> Array:
+    """Return places ``(..., 2)`` after a change of axes, a key of :data:`AXES`."""
+    sign, quarters = AXES[axes]
+    at = (places[..., 0] + sign * 1j * places[..., 1]) * 1j**quarters
+    return np.stack([at.real, at.imag], axis=-1)
+
+
 def also(names: Sequence[str]) -> str:
     """Return `` (also B, C, D, E, 2 more)`` for names A to G: the second to the fifth name and the
     number of others; empty for a single name."""
@@ -252,8 +241,11 @@ def also(names: Sequence[str]) -> str:
     return f" (also {', '.join(named)})" if named else ""
 
 
-def warn(text: str) -> None:
-    """Warn with this text; the warning names the line of the program that called this package."""
+def warn(text: str, refuse: bool = False) -> None:
+    """Warn with this text, in the line of the program that called this package; with ``refuse``
+    raise CoarticError in place of it."""
+    if refuse:
+        raise CoarticError(text)
     warnings.warn(text, stacklevel=5)
 
 
@@ -390,8 +382,8 @@ def checked_hits(
         warn(f"{source}: subjects differ in capitals alone: {', '.join(sorted(people)[:20])}")
     refuse(frame.subject == "", "subject", "needed is a name")
     refuse(~frame.hand.isin(task.hands), "hand", f"needed is {' or '.join(task.hands)}")
-    is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, _LARGEST_TRIAL)
-    refuse(~is_whole, "trial", f"needed is a whole number from 1 to {_LARGEST_TRIAL}")
+    is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, 100_000)
+    refuse(~is_whole, "trial", "needed is a whole number from 1 to 100000")
     last = len(task.goals)
     refuse(~frame.goal.isin(range(1, last + 1)), "goal", f"needed is a number from 1 to {last}")
     if is_file and not timed:
@@ -416,6 +408,9 @@ def checked_hits(
     keys = frame.trial * (last + 1) + frame.goal
     order = np.lexsort([keys.to_numpy(), pd.factorize(frame.subject)[0]])
     frame, called = frame.iloc[order].reset_index(drop=True), [called[n] for n in order]
+    for subject, hand in product(people, task.hands):
+        hits = frame[(frame.subject == subject) & (frame.hand == hand)]
+        _warn_of_values(hits, joints[task.robot.joints(hand)], f"{source}, {subject}")
     initial, counts = initial_solution(task), frame.subject.value_counts()
     slowest = max(initial.ticks_by_goal() if initial else [np.pi / PAPER.step * len(joints)])
     reasons: list[str] = []
@@ -459,22 +454,14 @@ def checked_hits(
     if mixed:
         warn(f"{source}, {mixed[0]}: rows of the trial are in no order of goals, up or down; times "
              f"are taken as from the goal with the number before{also(mixed)}")  # fmt: skip
-    for subject, hand in product(people, task.hands):
-        hits = frame[(frame.subject == subject) & (frame.hand == hand)]
-        _warn_of_values(hits, joints[task.robot.joints(hand)], f"{source}, {subject}")
     _unwrap(frame, task, source, called)
     return frame
 
 
 def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
-    """Unwrap the angles of hits in place, hit by hit, each trial from the task's start on.
-
-    ``frame``, sorted, with rows from 0, has columns ``subject``, ``trial``, ``goal`` and one for
-    each joint, rad; in messages ``source`` names the recording and ``names`` each row. Warns if
-    angles change. Raises CoarticError if a joint of a subject turns by more than
-    :data:`_AMBIGUOUS` between hits, or from the start to the first, so that its direction is in
-    doubt, and somewhere jumps by 2π or differs by more than π between hits of one goal.
-    """
+    """Unwrap the angles of sorted hits in place, each trial from the task's start on, with a
+    warning. Raises CoarticError if angles are wrapped and a joint turns by more than 2.5 rad
+    between hits, so that its direction is in doubt."""
     joints = [*task.robot.joint_names][2:]
     angles = frame[joints].to_numpy(np.float64)
     begins = ~frame.duplicated(["subject", "trial"]).to_numpy()
@@ -489,7 +476,7 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
     spread = at_goal.transform("max") - at_goal.transform("min")
     wrapped = pd.DataFrame((added != 0) | (spread.to_numpy() > np.pi))
     doubtful = wrapped.groupby(frame.subject, sort=False).transform("any").to_numpy()
-    doubtful = doubtful & (np.abs(steps) > _AMBIGUOUS)
+    doubtful = doubtful & (np.abs(steps) > 2.5)
     for row, joint in np.argwhere(doubtful)[:1]:
         step = steps[row, joint]
         raise CoarticError(
@@ -510,14 +497,8 @@ def _implausible(
     frame: pd.DataFrame, task: Task, source: str, unit: float, slowest: float
 ) -> NDArray[np.object_]:
     """Return why sorted hits of a subject are implausible, a text for each, empty for a plausible
-    hit. ``source`` names the recording and the subject in messages; ``unit``: ticks in a unit of
-    time; ``slowest``: longest subtask of the corrective process, ticks.
-
-    Warns of times that seem rounded, of other rows or with a reaction time in them, and of an arm
-    that is much faster or slower than the task's. Raises CoarticError if times are those
-    of a clock that runs on, rounded or constant, or if the median hit takes a number of ticks that
-    no arm of the task could take.
-    """
+    hit, and warn of places and times (:func:`_odd_times`) that are odd. ``source``: name of the
+    recording and the subject; ``unit``: ticks in a unit; ``slowest``: longest subtask, ticks."""
     q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
     goal, ticks = frame.goal.to_numpy(np.int64), frame.ticks.to_numpy(np.float64)
     why = np.full(len(frame), "", dtype=object)
@@ -535,7 +516,7 @@ def _implausible(
     is_near = ways.min(axis=1) <= 2 * radius
     nearest = np.array([*spots], dtype=object)[ways.argmin(axis=1)]
     for name, values in zip(task.robot.joint_names[2:], q.T[2:], strict=True):
-        mark(np.abs(values) > _LARGEST_ANGLE, name + " is {:g}, no angle in rad", values)
+        mark(np.abs(values) > 20, name + " is {:g}, no angle in rad", values)
     # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
     most, outer = 2 * radius, float(np.quantile(off, 0.75))
     if outer <= most:
@@ -556,7 +537,7 @@ def _implausible(
     if far.any() and is_near[far].mean() > 0.5:
         mark(far & is_near, words + ", at {}", off / radius, nearest)
     mark(far, words, off / radius)
-    if len(off) >= _MANY and outer < _CENTRAL * radius and not why.any():
+    if len(off) >= MANY and outer < 0.6 * radius and not why.any():
         warn(
             f"{source}: three of four hits are within {outer / radius:.2g} radii of the centres of "
             "goals: is the radius a diameter, or are postures those of rests after hits?"
@@ -570,87 +551,144 @@ def _implausible(
     way[:, 2:] -= 2 * np.pi * np.rint(way[:, 2:] / (2 * np.pi))
     straight = np.linalg.norm(way, axis=1) / PAPER.step
     known = (begins | follows) & whole
-    paces = ticks / np.maximum(straight, 1.0)
-    _refuse_clocks(frame, paces, begins & whole, follows & whole, source)
-    shifted = [np.log(np.roll(ticks, shift)[known]) for shift in (0, 1, -1)]
-    paths = np.log(np.maximum(straight[known], 1.0))
-    if known.sum() >= _MANY and min(map(np.ptp, [paths, *shifted])) > 0:
-        here, *others = (np.corrcoef(each, paths)[0, 1] for each in shifted)
-        rates = pd.Series(paces[known]).groupby(goal[known]).median()
-        slow = rates.index[rates > _SLOW_GOAL * rates.sort_values().iloc[-2:].min()].tolist()
-        if here < _UNRELATED and max(others) > 2 * _UNRELATED:
-            warn(
-                f"{source}: times fit the hits of the row above or below better (correlation with "
-                f"paths {max(others):.2f}, else {here:.2f}): do they belong to other rows?"
-            )
-        elif slow:
-            warn(
-                f"{source}: goal {slow[0]} takes {rates[slow[0]]:.2g} ticks for each of a straight "
-                f"path, others at most {rates.drop(slow).max():.2g}: is a reaction time in it?"
-            )
-    usual, path = (float(np.median(each[known])) if known.any() else 1.0
-                   for each in (ticks, straight))  # fmt: skip
-    times = np.unique(ticks)
-    least = float(np.diff(times, prepend=0.0).min())
-    is_coarse = least > max(2.0, 0.1 * usual) and len(times) < len(np.unique(q, axis=0))
-    if len(ticks) >= _MANY and is_coarse and np.allclose(times % least, 0.0, atol=1e-3):
-        words = (f"{source}: all times are multiples of {least:g} ticks, the median hit takes "
-                 f"{usual:g}: they are rounded or constant; needed are times to a tenth of a hit "
-                 "or better")  # fmt: skip
-        if least > max(_COARSE, 0.2 * usual):
-            raise CoarticError(words)
-        warn(words)
-    ratio = usual / max(path, 1.0)
-    if known.any() and (usual > _SLOWEST * slowest or not 0.1 < ratio < 8):
-        likely = min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * ratio)))
-        words = (
-            f"{source}: the median hit takes {usual:g} ticks with {unit:g} ticks per unit; a "
-            f"straight movement takes {path:.0f}, the corrective process at most {slowest:.0f}. "
-            f"Are times in {likely} (ticks_per_unit={_UNITS[likely]:g})?"
-        )
-        if usual > _SLOWEST * slowest or ratio <= 0.1:
-            raise CoarticError(words)
-        warn(words)
-    else:
-        early = np.where(known, straight - ticks, -1.0) * PAPER.step
-        if np.quantile(early, 0.75) > 0.1:
-            step = f"whose step is {PAPER.step:g} a tick. Are there more ticks in a unit?"
-            warn(f"{source}: a quarter of the hits or more is faster than the task's arm, {step}")
-        allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
-        words = "it takes {:g} ticks, a straight movement {:.0f}"
-        mark((early > allowed) | (ticks < 1), words, ticks, straight)
-        words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
-        mark(ticks > _SLOWEST * slowest, words, ticks)
+    if known.any():
+        _odd_times(frame, straight, known, source, unit, slowest)
+    early = np.where(known, straight - ticks, -1.0) * PAPER.step
+    allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
+    words = "it takes {:g} ticks, a straight movement {:.0f}"
+    mark((early > allowed) | (ticks < 1), words, ticks, straight)
+    words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
+    mark(ticks > _SLOWEST * slowest, words, ticks)
     return why
 
 
-def _refuse_clocks(
+def _odd_times(
     hits: pd.DataFrame,
-    paces: Array,
-    first: NDArray[np.bool_],
-    later: NDArray[np.bool_],
+    straight: Array,
+    known: NDArray[np.bool_],
     source: str,
+    unit: float,
+    slowest: float,
 ) -> None:
-    """Raise CoarticError if the times of a subject are those of a clock that runs on from goal to
-    goal, and warn if those of some trials are.
+    """Raise CoarticError if a subject's times are those of a clock that runs on, in two units,
+    rounded, or not possible; warn if they seem so, or not to be of these hits alone.
+    ``straight``: ticks of straight movements, ``known`` in mask ``known``; others as above."""
+    ticks, goal, trial = (hits[name].to_numpy(np.float64) for name in ("ticks", "goal", "trial"))
+    logs = pd.DataFrame({"paths": straight, "here": ticks, "above": np.roll(ticks, 1),
+                         "below": np.roll(ticks, -1)}).clip(lower=1e-9)  # fmt: skip
+    logs = logs.assign(paths=logs.paths.clip(lower=1.0)).transform(np.log)[known]
+    paces, goals = (logs.here - logs.paths).transform(np.exp), goal[known]
+    usual, path = float(np.median(ticks[known])), float(np.median(straight[known]))
+    clocks = _clocks(hits[known], paces, np.diff(ticks, prepend=0.0)[known], source)
 
-    ``paces``: ticks of each hit over the ticks of a straight movement to it, shape ``(n,)``;
-    ``first`` and ``later``, masks ``(n,)``: hits of goal 1, and hits whose goal before was hit.
-    """
-    if later.sum() < _MANY:
-        return
-    ticks, trial = hits.ticks.to_numpy(np.float64), hits.trial.to_numpy(np.int64)[later]
-    rises = np.diff(ticks, prepend=0.0)[later]
-    of_ticks = np.log(paces[later])
-    of_rises = of_ticks + np.log(np.maximum(rises, 1e-9) / ticks[later])
+    def likely(pace: float) -> str:
+        return min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * pace)))
+
+    if len(paces) >= MANY:
+        ordered, tenth = np.sort(paces), len(paces) // 10 + 1
+        leaps = (ordered[1:] / ordered[:-1])[tenth - 1 : len(paces) - tenth]
+        is_slow = paces > ordered[tenth - 1 + leaps.argmax()]
+        less, more = paces[~is_slow], paces[is_slow]
+        units = [likely(float(each.median())) for each in (less, more)]
+        if leaps.max() > 5 and units[0] != units[1] and len({*goals[is_slow]}) > 1:
+            one, other = (f"goal {goal[row]:g} in trial {trial[row]:g}"
+                          for row in (less.index[0], more.index[0]))  # fmt: skip
+            factor = more.median() / less.median()
+            point = ", or was a point between thousands read as a decimal point"
+            raise CoarticError(
+                f"{source}: {len(more)} of {len(paces)} hits, first {other}, take {factor:.0f} "
+                f"times as long for their paths as others, first {one}. Is their unit {units[1]} "
+                f"and that of the others {units[0]}{point * (500 < factor < 2000)}?"
+            )
+        rates = paces.groupby(goals).median()
+        slow = rates.index[rates > 1.6 * rates.sort_values().iloc[-2:].min()].tolist()
+        even = logs[~np.isin(goals, slow)]
+        of_goal = even - even.groupby(goal[even.index]).transform("mean")
+        follows = [each.corr().here.paths for each in (even, of_goal) if each.paths.std() > 0.2]
+        rows = logs.corr().paths
+        if rows.here < 0.3 and rows[["above", "below"]].max() > 0.6:
+            warn(
+                f"{source}: times fit the hits of the row above or below better (correlation with "
+                f"paths {rows[['above', 'below']].max():.2f}, else {rows.here:.2f}): do they "
+                "belong to other rows?"
+            )
+        elif min(follows, default=1.0) < 0.5 and not clocks:
+            warn(
+                f"{source}: times hardly follow the paths of hits (correlation {min(follows):.2f}):"
+                " do they belong to these hits, or were they sorted, or another person's?"
+            )
+        elif slow:
+            warn(
+                f"{source}: goal {slow[0]:g} takes {rates[slow[0]]:.2g} ticks for each of a "
+                f"straight path, others at most {rates.drop(slow).max():.2g}: is a reaction time "
+                "in it?"
+            )
+    times = np.unique(ticks)
+    least = float(np.diff(times, prepend=0.0).min())
+    postures = hits.drop(columns=["subject", "trial", "goal", "hand", "ticks"])
+    is_coarse = least > max(2.0, 0.1 * usual) and len(times) < len(postures.drop_duplicates())
+    if len(ticks) >= MANY and is_coarse and np.allclose(times % least, 0.0, atol=1e-3):
+        words = (f"{source}: all times are multiples of {least:g} ticks, the median hit takes "
+                 f"{usual:g}: they are rounded or constant; needed are times to a tenth of a hit "
+                 "or better")  # fmt: skip
+        warn(words, refuse=least > max(10, 0.2 * usual))
+    ratio, too_long = usual / max(path, 1.0), usual > _SLOWEST * slowest
+    if too_long or not 0.1 < ratio < 8:
+        name = likely(ratio)
+        words = (
+            f"{source}: the median hit takes {usual:g} ticks with {unit:g} ticks per unit; a "
+            f"straight movement takes {path:.0f}, the corrective process at most {slowest:.0f}. "
+            f"Are times in {name} (ticks_per_unit={_UNITS[name]:g})?"
+        )
+        warn(words, refuse=too_long or ratio <= 0.1)
+    fast = known & ((straight - ticks) * PAPER.step > 0.1)
+    if fast.mean() > 0.25:
+        shares = pd.Series(fast[known]).groupby(goals).mean().sort_values()
+        part, where = changed(fast, trial)
+        question = "Are there more ticks in a unit?"
+        if shares.iloc[-1] > 0.8 and shares.iloc[:-1].max() < 0.2:
+            question = f"Most are hits of goal {shares.index[-1]:g}: does a counter overflow?"
+        elif part.any():
+            question = f"Most are {where}: are these another person's, or in another unit?"
+        warn(f"{source}: a quarter of the hits or more is faster than the task's arm, whose step "
+             f"is {PAPER.step:g} a tick. {question}")  # fmt: skip
+
+
+def _clocks(hits: pd.DataFrame, paces: pd.Series, rises: Array, source: str) -> bool:
+    """Raise CoarticError if the times of a subject's hits are those of a clock that runs on from
+    goal to goal; warn, and return True, if those of some trials are. ``paces``: ticks of each hit
+    over those of a straight movement, ``rises``: ticks less those of the row before, ``(n,)``."""
+    later = hits.goal.to_numpy() > 1
+    if later.sum() < MANY:
+        return False
+    trial, rises = hits.trial.to_numpy(np.int64)[later], rises[later]
+    of_ticks = np.log(paces.to_numpy())[later]
+    of_rises = of_ticks + np.log(np.maximum(rises, 1e-9) / hits.ticks.to_numpy(np.float64)[later])
     needed = "as those of a clock that runs on; needed are times from the hit before"
     if (rises > 0).all() and np.std(of_rises) < np.std(of_ticks):
         raise CoarticError(f"{source}: in every trial times rise from goal to goal, {needed}")
-    usual = np.median(np.log(paces[first])) if first.any() else np.nan
+    usual = np.log(paces[~later].median())
     errors = [np.bincount(trial, np.abs(each - usual)) for each in (of_ticks, of_rises)]
     clocks = [f"trial {number}" for number in np.flatnonzero(errors[1] < errors[0] / 2)]
-    if _NAMED <= len(clocks) < 0.8 * len(np.unique(trial)):
+    if found := _NAMED <= len(clocks) < 0.8 * len(np.unique(trial)):
         warn(f"{source}, {clocks[0]}: times rise from goal to goal, {needed}{also(clocks)}")
+    return found
+
+
+def changed(odd: NDArray[np.bool_], trial: Array) -> tuple[NDArray[np.bool_], str]:
+    """Return a mask of the hits ``(n,)`` of trials in a row, or before and after them, that are odd
+    more often than others, and these trials in words. It is empty where the range of the sum of
+    deviations from the mean (Kuiper's statistic) is, as by chance, less than 2.6 √n SD."""
+    part, number = np.zeros(len(odd), dtype=bool), np.arange(len(odd))
+    sums = np.cumsum(odd) - (number + 1) * (odd.sum() / max(len(odd), 1))
+    if len(odd) >= MANY and np.ptp(sums) > 2.6 * np.sqrt(len(odd)) * odd.std():
+        first, last = sorted([sums.argmin(), sums.argmax()])
+        part = (number > first) & (number <= last)
+        if odd[part].mean() < odd[~part].mean():
+            part = ~part
+    edges = np.flatnonzero(np.diff(part, prepend=False, append=False)).reshape(-1, 2)
+    words = (f"{trial[begin]:g} to {trial[end - 1]:g}" for begin, end in edges)
+    return part, f"in trials {' and '.join(words)}"
 
 
 def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
@@ -680,45 +718,47 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
     for unit, form, axes, moves in product(_ANGLES, forms, AXES, (False, True)):
         (recorded, straight), (sign, quarters) = forms[form], AXES[axes]
         angles = sign * (_ANGLES[unit] * recorded - np.where(is_first, 0.0, straight))
-        base = (q[:, 0] + sign * 1j * q[:, 1]) * 1j**quarters
-        angles[:, :2] = np.stack([base.real, base.imag], axis=1) if moves else q[:, :2]
-        words = ", ".join(filter(None, [unit, form, axes]))
-        tried.append((f"in which {words}", angles + is_first * quarters * np.pi / 2, hands))
+        angles += is_first * quarters * np.pi / 2
+        angles[:, :2] = turned(q[:, :2], axes) if moves else q[:, :2]
+        tried.append((f"in which {', '.join(filter(None, [unit, form, axes]))}", angles))
     del tried[:2]  # nothing is changed
     for words, shift in (("lower", 1), ("higher", -1)):
         rolled = np.roll(q, shift, axis=0)
-        tried.append((f"with each posture a row {words}", rolled, hands))
-        tried.append((f"with all angles a row {words}", np.where(is_base, q, rolled), hands))
+        tried += [(f"with each posture a row {words}", rolled),
+                  (f"with all angles a row {words}", np.where(is_base, q, rolled))]  # fmt: skip
     for unit in (10, 100, 1000):
-        divided = q / np.where(is_base, unit, 1)
-        tried.append((f"in which the base is divided by {unit}", divided, hands))
+        tried.append((f"in which the base is divided by {unit}", q / np.where(is_base, unit, 1)))
     for k, name in enumerate(joints):
-        tried.append((f"with the other sign of {name}", np.where(column == k, -q, q), hands))
-    if len(arms) == 2:
-        other = hands.map({"left": "right", "right": "left"})
-        tried.append(("in which hands are swapped", q, other))
-        if len({arm.stop - arm.start for arm in arms}) == 1:
-            order = np.concatenate([column[:2], column[arms[1]], column[arms[0]]])
-            tried.append(("in which the columns of the arms are swapped", q[:, order], hands))
+        tried.append((f"with the other sign of {name}", np.where(column == k, -q, q)))
+        for last, words in ((k, ""), (k + 1, ", and back in the next joint")) if k > 1 else ():
+            turn = np.pi * ((column == k) | (column == last))
+            tried.append((f"with a turn by π of {name} (arctan2, not arctan){words}", q + turn))
     for arm in arms:
         few = arm.stop - arm.start <= 4
         for each in permutations(column[arm].tolist()) if few else [column[arm].tolist()[::-1]]:
-            order = column.copy()
-            order[arm] = each
+            ordered = q.copy()
+            ordered[:, arm] = q[:, each]
             names = ", ".join(joints[k] for k in each)
-            tried.append((f"with columns in the order {names}", q[:, order], hands))
+            tried.append((f"with columns in the order {names}", ordered))
+    if len({arm.stop - arm.start for arm in arms}) < len(arms):
+        ordered = q.copy()
+        ordered[:, arms[0]], ordered[:, arms[1]] = q[:, arms[1]], q[:, arms[0]]
+        tried.append(("in which the columns of the arms are swapped", ordered))
+    swapped, other = "in which hands are swapped", hands.map({"left": "right", "right": "left"})
+    tried += [(swapped, q)] * (len(arms) == 2)
     goals, fits = task.goal_array[frame.goal.to_numpy(np.int64) - 1], {}
     off = np.linalg.norm(_hand_places(q, hands, task) - goals, axis=1) / task.radius
     far = far & (off > 2)
-    usual = np.quantile(off[~far], 0.95) if (~far).sum() >= _MANY else 2.0
+    usual = np.quantile(off[~far], 0.95) if (~far).sum() >= MANY else 2.0
     most = float(np.clip(usual, _OUTSIDE, 2.0)) * task.radius
     for hand in task.hands:
         rows = np.flatnonzero(far & (hands == hand).to_numpy())
         if len(rows) < 3 or len({*frame.goal[rows]}) < min(2, len(task.goals)):
             continue
         shares = []
-        for _, postures, whose in tried:
-            ways = _hand_places(postures[rows], whose.iloc[rows], task) - goals[rows]
+        for words, postures in tried:
+            made_by = other if words == swapped else hands
+            ways = _hand_places(postures[rows], made_by.iloc[rows], task) - goals[rows]
             shares.append((np.linalg.norm(ways, axis=1) <= most).mean())
         if max(shares) > 0.8:
             fits[hand] = tried[int(np.argmax(shares))][0]
@@ -751,42 +791,38 @@ def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
-    """Return a sentence for each goal, and for trials of a subject's hand (such as those after a
-    sensor slips), with a much larger share of hits outside of their goals than others have.
-
-    Such trials begin and end where the sum of deviations from the mean share is least and largest;
-    that its range (Kuiper's statistic) exceeds 2.6 √n SD has by chance a probability of 0.0001.
-    """
+    """Return a sentence for trials of a subject's hand, or at a goal (such as those after a sensor
+    slips), and for each goal, with a much larger share of hits outside of goals than others."""
     q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
-    places = _hand_places(q, frame.hand, task)
+    places, trials = _hand_places(q, frame.hand, task), frame.trial.to_numpy(np.float64)
     ways = places - task.goal_array[goals - 1]
     out = np.linalg.norm(ways, axis=1) > _OUTSIDE * task.radius
-    groups: list[tuple[NDArray[np.int64], NDArray[np.int64], str, str]] = []
+    sentences, rest = [], np.ones(len(out), dtype=bool)
+
+    def is_odd(here: NDArray[np.int64], others: NDArray[np.int64], name: str, cause: str) -> bool:
+        share, usual = out[here].mean(), out[others].mean()
+        if odd := bool(share > max(0.3, 2.5 * usual)):
+            sentences.append(
+                f"{100 * share:.0f} % of the hits of {name} are more than {_OUTSIDE:g} radii from "
+                f"the centre of the goal, of others {100 * usual:.0f} %. {cause}"
+            )
+        return odd
+
+    groups = {f"'s {hand} hand": (frame.hand == hand).to_numpy() for hand in task.hands}
+    groups |= {f" at goal {goal}": goals == goal for goal in np.unique(goals)}
+    cause = "Did a sensor drift or slip, change its scale, or was it zeroed again?"
+    for subject, (name, of_name) in product(frame.subject.unique(), groups.items()):
+        rows = np.flatnonzero((frame.subject == subject).to_numpy() & of_name & rest)
+        part, where = changed(out[rows], trials[rows])
+        if part.any() and is_odd(rows[part], rows[~part], f"{subject}{name} {where}", cause):
+            rest[rows[part]] = False
     for goal in np.unique(goals):
-        here, others = np.flatnonzero(goals == goal), np.flatnonzero(goals != goal)
-        if min(len(here), len(others)) >= _MANY:
+        here, others = (np.flatnonzero(rest & each) for each in (goals == goal, goals != goal))
+        if min(len(here), len(others)) >= MANY:
             (x, y), (off_x, off_y) = places[here].mean(axis=0), ways[here].mean(axis=0)
             mean = f"Their mean is ({x:.3g}, {y:.3g}), ({off_x:+.2g}, {off_y:+.2g}) from it"
-            groups.append((here, others, f"goal {goal}", f"{mean}: is the goal elsewhere?"))
-    for subject, hand in product(frame.subject.unique(), task.hands):
-        rows = np.flatnonzero((frame.subject == subject) & (frame.hand == hand))
-        if len(rows) < _MANY:
-            continue
-        sums = np.cumsum(out[rows] - out[rows].mean())
-        if np.ptp(sums) > 2.6 * np.sqrt(len(rows)) * out[rows].std():
-            inner = slice(*sorted((int(sums.argmin()) + 1, int(sums.argmax()) + 1)))
-            parts = sorted((rows[inner], np.delete(rows, inner)), key=lambda part: out[part].mean())
-            first, last = frame.trial.to_numpy()[parts[1][[0, -1]]]
-            name = f"{subject}'s {hand} hand in trials {first:g} to {last:g}"
-            words = "Did a sensor drift or slip, or change its scale?"
-            groups.append((parts[1], parts[0], name, words))
-    shares = [(out[here].mean(), out[others].mean(), *words) for here, others, *words in groups]
-    return [
-        f"{100 * share:.0f} % of the hits of {name} are more than {_OUTSIDE:g} radii from the "
-        f"centre of the goal, of others {100 * others:.0f} %. {words}"
-        for share, others, name, words in shares
-        if share > max(0.3, 2.5 * others)
-    ]
+            is_odd(here, others, f"goal {goal}", f"{mean}: is the goal elsewhere?")
+    return sentences
 
 
 def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> None:
@@ -797,10 +833,10 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
     for name in joints:
         angles = np.unique(hits[name])
         least = float(np.diff(angles).min(initial=np.inf))
-        if len(angles) == 1 < len(joints) and len({*hits.goal}) > 1 and len(hits) >= _SAME:
+        if len(angles) == 1 < len(joints) and len({*hits.goal}) > 1 and len(hits) >= 5:
             warn(f"{source}: {name} is the same in all {len(hits)} hits: was it measured?")
             return
-        if 2 < len(angles) < postures / 2 and postures >= _MANY and least > _COARSE_ANGLE:
+        if 2 < len(angles) < postures / 2 and postures >= MANY and least > 0.02:
             warn(f"{source}: {name} has {len(angles)} values, {least:.2g} rad apart or more: is it "
                  "rounded?")  # fmt: skip
             return
@@ -810,9 +846,9 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
             n = len(of_goal)
             most, second = [*of_goal.value_counts().tolist(), 0][:2]
             fewest = 3 if values is numbers else max(5, 0.1 * n)
-            is_odd = most >= max(fewest, 3 * second) and n - most >= 4 and postures >= _MANY
+            is_odd = most >= max(fewest, 3 * second) and n - most >= 4 and postures >= MANY
             is_odd &= 2 * (of_goal.nunique() - 1) > n - most
-            if is_odd or most == n >= _SAME:
+            if is_odd or most == n >= 5:
                 warn(f"{source}: {values.name} is the same in {most} of {n} hits of goal {goal:g}: "
                      "is it filled in, computed, out of range, or stuck?")  # fmt: skip
                 return
@@ -840,7 +876,7 @@ def _copies(frame: pd.DataFrame) -> list[str]:
         return words
     for subject, of_subject in frame.groupby("subject", sort=False):
         ticks, number = of_subject.ticks.to_numpy(np.float64), of_subject.trial.to_numpy()
-        if len(ticks) < _MANY or len(each := np.unique(ticks)) < 3:
+        if len(ticks) < MANY or len(each := np.unique(ticks)) < 3:
             continue
         unit, rises = np.diff(each).min(), np.diff(ticks)
         if (runs := _repeats(np.stack([rises[1:], rises[:-1]], axis=1) / unit, 0.5)).any():

@@ -21,6 +21,7 @@ from coartic.analysis.hits import (
     checked_hits,
     read_table,
     row_names,
+    turned,
     warn,
     why_no_number,
 )
@@ -522,14 +523,11 @@ def _remedy(trials: Sequence[Array], task: Task) -> str:
         ordered = task.model_copy(update={"goals": tuple(task.goals[k - 1] for k in order)})
         tried.append((f"with goals in the order {', '.join(map(str, order))}", "", ordered))
     for words, axes, ordered in tried if len(trials) > 1 else ():
-        (sign, quarters), done = AXES[axes], []
+        done = []
         for tips in trials[:20]:
-            places = (tips[..., 0] + sign * 1j * tips[..., 1]) * 1j**quarters
-            turned, clock = (
-                np.stack([places.real, places.imag], axis=2),
-                np.arange(tips.shape[1]) / 1.0,
-            )
-            done.append(len(_hits(turned, ordered, clock, clock[:, None])) == len(task.goals))
+            clock = np.arange(float(tips.shape[1]))
+            hits = _hits(turned(tips, axes), ordered, clock, clock[:, None])
+            done.append(len(hits) == len(task.goals))
         if np.mean(done) > 0.8:
             return f". They are finished in a recording {words}"
     return ""
