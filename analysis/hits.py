@@ -597,31 +597,8 @@ def _odd_times(
             point = ", or was a point between thousands read as a decimal point"
             raise CoarticError(
                 f"{source}: {len(more)} of {len(paces)} hits, first {other}, take {factor:.0f} "
-                f"times as long for their paths as others, first {one}. Is their unit {units[1]} "
-                f"and that of the others {units[0]}{point * (500 < factor < 2000)}?"
-            )
-        rates = paces.groupby(goals).median()
-        slow = rates.index[rates > 1.6 * rates.sort_values().iloc[-2:].min()].tolist()
-        even = logs[~np.isin(goals, slow)]
-        of_goal = even - even.groupby(goal[even.index]).transform("mean")
-        follows = [each.corr().here.paths for each in (even, of_goal) if each.paths.std() > 0.2]
-        rows = logs.corr().paths
-        if rows.here < 0.3 and rows[["above", "below"]].max() > 0.6:
-            warn(
-                f"{source}: times fit the hits of the row above or below better (correlation with "
-                f"paths {rows[['above', 'below']].max():.2f}, else {rows.here:.2f}): do they "
-                "belong to other rows?"
-            )
-        elif min(follows, default=1.0) < 0.5 and not clocks:
-            warn(
-                f"{source}: times hardly follow the paths of hits (correlation {min(follows):.2f}):"
-                " do they belong to these hits, or were they sorted, or another person's?"
-            )
-        elif slow:
-            warn(
-                f"{source}: goal {slow[0]:g} takes {rates[slow[0]]:.2g} ticks for each of a "
-                f"straight path, others at most {rates.drop(slow).max():.2g}: is a reaction time "
-                "in it?"
+                f"times as long for their paths as others, first {one}. Do units differ, "
+                f"{units[1]} there and {units[0]} elsewhere{point * bool(500 < factor < 2000)}?"
             )
     times = np.unique(ticks)
     least = float(np.diff(times, prepend=0.0).min())
@@ -641,8 +618,29 @@ def _odd_times(
             f"Are times in {name} (ticks_per_unit={_UNITS[name]:g})?"
         )
         warn(words, refuse=too_long or ratio <= 0.1)
+    doubt = ""
+    if len(paces) >= MANY:
+        rates = paces.groupby(goals).median()
+        slow = rates.index[rates > 1.6 * rates.sort_values().iloc[-2:].min()].tolist()
+        even = logs[~np.isin(goals, slow)]
+        of_goal = even - even.groupby(goal[even.index]).transform("mean")
+        follows = [each.corr().here.paths for each in (even, of_goal) if each.paths.std() > 0.2]
+        rows = logs.corr().paths
+        better = rows[["above", "below"]].max()
+        if rows.here < 0.3 and better > 0.6:
+            doubt = "fit the hits of the row above or below better (correlation with paths "
+            doubt += f"{better:.2f}, else {rows.here:.2f}): do they belong to other rows?"
+        elif min(follows, default=1.0) < 0.5 and not clocks:
+            doubt = f"hardly follow the paths of hits (correlation {min(follows):.2f}): do they "
+            doubt += "belong to these hits, or were they sorted, or another person's?"
+        elif slow:
+            warn(f"{source}: goal {slow[0]:g} takes {rates[slow[0]]:.2g} ticks for each of a "
+                 f"straight path, others at most {rates.drop(slow).max():.2g}: is a reaction time "
+                 "in it?")  # fmt: skip
     fast = known & ((straight - ticks) * PAPER.step > 0.1)
-    if fast.mean() > 0.25:
+    if doubt:
+        warn(f"{source}: times {doubt}")
+    elif fast.mean() >= 0.25:
         shares = pd.Series(fast[known]).groupby(goals).mean().sort_values()
         part, where = changed(fast, trial)
         question = "Are there more ticks in a unit?"
@@ -687,8 +685,8 @@ def changed(odd: NDArray[np.bool_], trial: Array) -> tuple[NDArray[np.bool_], st
         if odd[part].mean() < odd[~part].mean():
             part = ~part
     edges = np.flatnonzero(np.diff(part, prepend=False, append=False)).reshape(-1, 2)
-    words = (f"{trial[begin]:g} to {trial[end - 1]:g}" for begin, end in edges)
-    return part, f"in trials {' and '.join(words)}"
+    ends = [[f"{trial[begin]:g}", f"{trial[end - 1]:g}"] for begin, end in edges]
+    return part, f"in trials {' and '.join(' to '.join(dict.fromkeys(each)) for each in ends)}"
 
 
 def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:

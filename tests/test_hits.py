@@ -182,6 +182,15 @@ TIMES = {
     "b: all times are multiples of 150 ticks, .* or constant": lambda ticks: 0 * ticks + 150,
     "b: in every trial times rise .* clock that runs on": np.cumsum,
     r"b: the median hit takes .*ms \(ticks_per_unit=0.1\)": lambda ticks: 1000 * ticks + 7,
+    "b: 16 of 40 hits, first goal 1 in trial 7, take .* Do units differ, ms there and s else": (
+        lambda ticks: ticks * np.repeat([1, 1000], [24, 16])
+    ),
+    "b: 25 of 40 hits, .* s there and min elsewhere.$": lambda ticks: (
+        ticks * np.repeat([1, 60], [15, 25]) / 60
+    ),
+    "Do units differ, ms there and s elsewhere, or was a point between thousands": lambda ticks: (
+        1000 * ticks.where(ticks < ticks.median(), ticks / 1000)
+    ),
 }
 
 
@@ -195,6 +204,16 @@ def test_times_of_a_person_that_are_none_are_refused(people, read, sentence):
 
 
 ODD_TIMES = {
+    "times hardly follow the paths .* or were they sorted": lambda t: t.ticks.sort_values().array,
+    "times hardly follow the paths of hits .*another person": lambda t: (
+        t.ticks.sample(frac=1, random_state=1).array
+    ),
+    "a quarter .* faster .* Most are in trials 6 to 10: are these another person's": lambda t: (
+        t.ticks * np.where(t.trial > 5, 0.4, 1)
+    ),
+    "a quarter .* faster .* Most are hits of goal 4: does a counter overflow": lambda t: (
+        t.ticks * np.where(t.goal == 4, 0.3, 1)
+    ),
     "goal 1 takes .* is a reaction time in it": lambda t: t.ticks + 400 * (t.goal == 1),
     "times fit the hits of the row .* do they belong to other rows": lambda t: np.roll(t.ticks, 1),
 }
@@ -254,6 +273,9 @@ def elsewhere(task):
 
 
 SHOWN = {
+    "% of the hits of a at goal 1 in trials 21 to 40 .* Did a sensor .*zeroed again": lambda t: (
+        t.assign(base_x=t.base_x - 0.06 * ((t.trial > 20) & (t.goal == 1)))
+    ),
     r"row 0: rows of the trial are in no order of goals.*also row 3, .*35 more": in_order(1, 3, 2),
     r"a: right_1 has \d values, 0.1 rad apart or more: is it rounded": angles(
         lambda x: (10 * x).round() / 10
@@ -322,6 +344,12 @@ REMEDIES = {
     "in which axes are turned by 180 degrees": lambda t: turned(t, RIGHT_ARM, 1, -np.pi),
     "in which x is the other way, as if mirrored": lambda t: turned(t, RIGHT_ARM, -1, np.pi),
     "in which x and y are swapped": lambda t: turned(t, RIGHT_ARM, -1, np.pi / 2),
+    "with a turn by π of right_2 .arctan2, not arctan": lambda t: t.assign(
+        right_2=t.right_2 - np.pi * (t.goal > 1)
+    ),
+    "with a turn by π of right_1 .arctan2, not arctan., and back in the next": lambda t: t.assign(
+        right_1=t.right_1 + np.pi, right_2=t.right_2 - np.pi
+    ),
     "in which a straight joint has angle 0, not π": angles(lambda x: np.pi + x),
     "with all angles a row lower": lambda t: t.assign(**t[RIGHT_ARM].shift(-1).ffill()),
 }
@@ -507,6 +535,14 @@ def test_two_spellings_of_a_name_are_one_and_said(people, read):
     with pytest.warns(UserWarning, match="differ in capitals alone: A, a"):
         read(people.assign(subject=people.subject.map({"a": "a", "b": "A"})))
     assert read(one).subject.unique().tolist() == ["Jos\u00e9 K", "p-1"]
+
+
+def test_values_that_repeat_are_said_also_where_hits_are_refused(practised):
+    with (
+        pytest.raises(CoarticError, match="row 60: the hand is"),
+        pytest.warns(UserWarning, match="the posture is the same in 14 of 40 hits of goal 2"),
+    ):
+        checked_hits(put("right_2", 60, 1.5)(filled(practised)), ONE_ARM)
 
 
 def test_the_first_five_of_a_kind_are_named_and_the_others_counted(people, read):
