@@ -121,12 +121,9 @@ def read_hits(
 
 
 def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return a CSV file as a frame of texts, and a name for each row, such as ``line 2``.
-
-    Blank lines and lines that begin with ``#`` are left out. ``kind``: what should be in the file,
-    with a verb, such as ``recorded hits are``, for a message. Raises CoarticError for a file that
-    cannot be read, is no table of text separated by commas, or repeats its headings.
-    """
+    """Return a CSV file of ``kind`` (such as ``recorded hits are``, for messages) as a frame of
+    texts, and a name for each row, such as ``line 2``. Raises CoarticError for a file that cannot
+    be read, is no table of text separated by commas, or repeats its headings."""
     if words := foreign_file(str(path), f"{kind} a CSV file, see docs/howto/people.md"):
         raise CoarticError(words)
     try:
@@ -141,7 +138,7 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
         kind = "in UTF-16, as Excel and Notepad write 'Unicode'" if wide else "not in UTF-8"
         kind = f"damaged from byte {content.find(0)} on" if len(text) > 1 and not wide else kind
         raise CoarticError(f"{path} is {kind}: save it as CSV in UTF-8")
-    frame, lines = _plain_table(text) or _odd_table(path, text)
+    frame, lines = _table(path, text)
     again = np.flatnonzero(frame.iloc[:, :1] == frame.columns[:1]).tolist()
     if again:
         others = also([lines[row] for row in again])
@@ -149,36 +146,10 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
     return frame, lines
 
 
-def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
-    """Return frame and names of rows as :func:`read_table`, by a fast parser; None for a text with
-    quotes, comments, blank lines, rows that differ in length, or empty, equal or single
-    headings."""
-    head, _, body = text.replace("\r\n", "\n").removesuffix("\n").partition("\n")
-    headings, rows = [*map(_written, head.split(","))], body.count("\n") + 1
-    if (
-        any(odd in text for odd in '"#')
-        or "\r" in body
-        or not all(headings)
-        or not 1 < len({*headings}) == len(headings)
-        or body.count(",") != rows * (len(headings) - 1)
-    ):
-        return None
-    try:
-        frame = pd.read_csv(
-            io.StringIO(body), names=headings, dtype={"subject": str, "hand": str}, na_values=[""],
-            keep_default_na=False, skipinitialspace=True, low_memory=False,
-        )  # fmt: skip
-    except ValueError:  # of rows with more values
-        return None
-    if len(frame) != rows or frame.isna().all(axis=1).any():
-        return None
-    return frame, [f"line {row}" for row in range(2, rows + 2)]
-
-
-def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return frame and names of rows as :func:`read_table`, by a parser that goes line by line.
-    Raises CoarticError for another separator, a row with another number of values than the
-    headings, and a repeated heading. Warns of rows that are left out because they begin with #."""
+def _table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
+    """Return frame and names of rows as :func:`read_table`. Raises CoarticError for another
+    separator, a row with another number of values than the headings, and a repeated heading. Warns
+    of rows that are left out because they begin with #."""
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
     rows, lines, wrong, hidden, separator = [], [], [], [], ","
@@ -314,14 +285,9 @@ def checked_hits(
     implausible: Implausible = "refuse",
     ticks_per_unit: float | None = None,
 ) -> pd.DataFrame:
-    """Return a new frame of recorded hits, checked, unwrapped and sorted, a row for each hit:
-    ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints (:func:`read_hits`).
-
-    ``source``, the name of the file or frame, and ``names``, a name for each row, are for messages.
-    ``ticks_per_unit`` is None for a frame, whose ``ticks`` need not be whole. Raises CoarticError
-    for a missing or wrong value, an implausible hit, and a wrapped joint that turns by more than
-    2.5 rad between hits.
-    """
+    """Return a new frame of recorded hits, checked, unwrapped and sorted (:func:`read_hits`), with
+    ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints. ``source`` and ``names``
+    of rows are for messages; ``ticks_per_unit`` is None for a frame, whose ticks may be broken."""
     if twice := [name for n, name in enumerate(frame.columns) if name in frame.columns[:n]]:
         raise CoarticError(f"{source} has two columns {twice[0]!r}")
     called = names or row_names(frame)
@@ -853,12 +819,9 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
 
 
 def _copies(frame: pd.DataFrame) -> list[str]:
-    """Return a sentence for trials that are equal in all postures, as if copied, and for equal
-    times of consecutive hits, or of two trials at all goals, that are more than almost equal ones.
-
-    One pair of equal postures within a subject is enough; between subjects, where a chance is
-    larger, it takes at least three different trials that occur twice or more.
-    """
+    """Return a sentence for trials that are equal in all postures, as if copied (two of a subject,
+    or three that occur twice or more), and for equal times of consecutive hits, or of two trials at
+    all goals, that are more than almost equal times."""
     words = []
     postures = frame.drop(columns=["subject", "trial", "ticks"])
     hits = pd.util.hash_pandas_object(postures, index=False)

@@ -63,7 +63,7 @@ WRONG = {
         columns="ticks"
     ),
     "base_x is 1e\\+300": put("base_x", 0, 1e300),
-    "line 2: left_2 is inf": put("left_2", 0, np.inf),
+    "line 2: left_2 is '?inf": put("left_2", 0, np.inf),
     "left_2 is '?True'?; needed is a number": put("left_2", 0, np.True_),
     "no column subject.*found are who, trial": lambda t: t.rename(columns={"subject": "who"}),
 }
