@@ -236,10 +236,13 @@ def hits_from_markers(
     for hand in hands:
         way = np.diff(places[hand], axis=1)
         q[:, task.robot.joints(hand)] = np.diff(np.arctan2(way[..., 1], way[..., 0]), prepend=0.0)
-    rows, used, unfinished, starts = [], np.zeros(len(frame), dtype=bool), [], []
-    pauses: list[int] = []
-    returns: list[int] = []
-    at_once: list[int] = []
+    rows, used, unfinished, starts, begun = [], np.zeros(len(frame), dtype=bool), [], [], []
+    counted_in: dict[str, list[int]] = {
+        f"the hand rests for more than {1000 * _LONGEST_REST:.0f} ms on the way": [],
+        "the hand is back at the start before it hits a goal": [],
+        "the hand is in the next goal already where it hits one": [],
+    }
+    pauses, returns, at_once = counted_in.values()
     broken_off: list[Array] = []  # places of hands in unfinished trials
     away, rests, twice = np.zeros((3, len(frame)), dtype=bool)
     window = max(3, 2 * round(_LONGEST_GAP / step / 2) + 1)  # single samples are noise
@@ -275,8 +278,11 @@ def hits_from_markers(
         used[first : first + found[-1][0] + 1] = True
         away[first] = (np.linalg.norm(tips[:, 0] - origins, axis=1) > largest).any()
         to_hit = slice(first, first + found[0][0] + 1)
-        ways = np.hstack([places[hand][to_hit] - places[hand][first] for hand in hands])
-        moved = np.linalg.norm(ways, axis=2).max(axis=1) / task.radius
+        by_arm = [np.linalg.norm(places[hand][to_hit] - places[hand][first], axis=2).max(axis=1)
+                  for hand in hands]  # fmt: skip
+        moved = np.max(by_arm, axis=0) / task.radius
+        moves = [time[to_hit][way > task.radius / 4].min(initial=np.inf) for way in by_arm]
+        begun.append(moves - clock[0])
         moved[-1] = np.inf
         # A smooth movement has gone 8 times as far after twice the time: the rest is before it.
         leaves, is_far = (clock[np.argmax(moved > far)] for far in (0.5, 4))
@@ -360,14 +366,15 @@ def hits_from_markers(
              f"{also(stretched)}")  # fmt: skip
     if absent := [hand for hand in task.hands if hand not in hands]:
         warn(f"{source}: the {absent[0]} arm has no markers and keeps its start")
-    for places_of, words in (
-        (pauses, f"the hand rests for more than {1000 * _LONGEST_REST:.0f} ms on the way"),
-        (returns, "the hand is back at the start before it hits a goal"),
-        (at_once, "the hand is in the next goal already where it hits one"),
-    ):
-        if places_of:
-            warn(f"{source}, {names[places_of[0]]}: {words}, {counted(len(places_of), 'time')}, "
-                 f"which counts as movement{also([names[row] for row in places_of])}")  # fmt: skip
+    for words, samples in counted_in.items():
+        if samples:
+            warn(f"{source}, {names[samples[0]]}: {words}, {counted(len(samples), 'time')}, which "
+                 f"counts as movement{also([names[row] for row in samples])}")  # fmt: skip
+    earliest, moving = np.min(begun, axis=0), np.isfinite(begun).sum(axis=0)
+    if moving.min() >= 10 and (lag := np.ptp(earliest)) > 0.08:
+        warn(f"{source}: the {hands[int(earliest.argmax())]} arm rests for at least "
+             f"{1000 * lag:.0f} ms more than the other at the start of all trials: does its system "
+             "lag behind, or is the clock another?")  # fmt: skip
     start = np.median(starts, axis=0)
     same = np.mean(np.sign(starts) == np.sign(start), axis=0) >= 0.9
     distance = float(np.median(np.linalg.norm(starts, axis=1)))

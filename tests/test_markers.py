@@ -282,7 +282,7 @@ def test_a_recording_that_is_wrong_is_refused(sentence):
 
 def noisy(t, share=0.001, seed=0):
     """Places with noise, as a share of the length of the arm."""
-    noise = share * 0.69 * np.random.default_rng(seed).standard_normal((len(t), 8))
+    noise = share * 0.69 * np.random.default_rng(seed).standard_normal((len(t), t.shape[1] - 3))
     return t.assign(**dict(zip(t.columns[3:], (t.iloc[:, 3:] + noise).to_numpy().T, strict=True)))
 
 
@@ -424,6 +424,21 @@ def test_arms_that_contradict_each_other_or_the_task_are_refused():
     assert base[1] - base[0] == pytest.approx(0.02, abs=0.01)
     with pytest.raises(CoarticError, match="side is 'left', but task 'metres' has the right hand"):
         hits_from_markers(markers, RIGHT, "left")
+
+
+def late_left(t):
+    """The places of the left arm are of 120 ms before, with noise of cameras."""
+    left = [name for name in t if name.startswith("left")]
+    late = t.groupby("trial")[left].shift(12)
+    rest = t.groupby("trial")[left].transform("first")
+    return t.assign(**late.fillna(rest))
+
+
+def test_an_arm_whose_system_lags_behind_is_said():
+    markers = recorded(BOTH, trials=40)
+    assert len(hits_from_markers(noisy(markers), BOTH, "both")) == 160
+    with pytest.warns(UserWarning, match="the left arm rests for at least 1[0-4]0 ms more than"):
+        hits_from_markers(noisy(late_left(markers)), BOTH, "both")
 
 
 def test_unfinished_trials_are_named_and_counted():
