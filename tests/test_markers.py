@@ -435,10 +435,12 @@ def late_left(t):
 
 
 def test_an_arm_whose_system_lags_behind_is_said():
-    markers = recorded(BOTH, trials=40)
-    assert len(hits_from_markers(noisy(markers), BOTH, "both")) == 160
+    reached = {"goals": ((0.5, 3.5), (-0.5, 3.4)), "initial_hands": "RR"}
+    task = BOTH.model_copy(update={"locked_base": ("x", "y"), **reached})
+    markers = recorded(task, trials=40)
+    assert len(hits_from_markers(noisy(markers), task, "both")) == 80
     with pytest.warns(UserWarning, match="the left arm rests for at least 1[0-4]0 ms more than"):
-        hits_from_markers(noisy(late_left(markers)), BOTH, "both")
+        hits_from_markers(noisy(late_left(markers)), task, "both")
 
 
 def test_unfinished_trials_are_named_and_counted():
