@@ -152,7 +152,7 @@ def _table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
     of rows that are left out because they begin with #."""
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
-    rows, lines, wrong, hidden, separator = [], [], [], [], ","
+    rows, lines, wrong, hidden = [], [], [], []
     try:
         for fields in reader:
             while fields and (not headings or len(fields) > len(headings)):
@@ -166,12 +166,10 @@ def _table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
             if not any(map(str.strip, fields)):
                 continue
             if not headings and first.startswith("sep=") and not any(fields[1:]):
-                separator = first[4:] or ","
-            elif not headings:
+                continue
+            if not headings:
                 headings = [*map(_written, fields)]
-                found = [odd for odd in ";\t|" if len(fields) == 1 and odd in fields[0]]
-                separator = (found or [separator])[0]
-                if separator != ",":
+                for separator in [odd for odd in ";\t|" if len(fields) == 1 and odd in fields[0]]:
                     raise CoarticError(
                         f"{path}: the separator is {separator!r}; needed are values separated by "
                         f"commas, and numbers with a decimal point: found are {headings[0]}"
@@ -367,10 +365,9 @@ def checked_hits(
         refuse(frame[name].abs() > LARGEST_ENTRY, name, far)
     trials = [frame.subject, frame.trial]
     steps = np.sign(frame.groupby(trials).goal.diff()).groupby(trials)
-    turned = (steps.transform("min") * steps.transform("max") < 0) & ~frame.duplicated(
-        ["subject", "trial"]
-    )
-    mixed = [called[row] for row in np.flatnonzero(turned).tolist()]
+    back = (steps.transform("min") * steps.transform("max") < 0).to_numpy()
+    begins = ~frame.duplicated(["subject", "trial"]).to_numpy()
+    mixed = [called[row] for row in np.flatnonzero(back & begins).tolist()]
     keys = frame.trial * (last + 1) + frame.goal
     order = np.lexsort([keys.to_numpy(), pd.factorize(frame.subject)[0]])
     frame, called = frame.iloc[order].reset_index(drop=True), [called[n] for n in order]
@@ -473,11 +470,11 @@ def _implausible(
         for row in np.flatnonzero(wrong & (why == "")).tolist():
             why[row] = words.format(*(each[row] for each in values))
 
-    starts = _hand_places(np.tile(task.q0, (len(q), 1)), frame.hand, task)
-    spots = {f"goal {k}": place for k, place in enumerate(task.goal_array, 1)}
-    spots = {"the start: is it of the next trial": starts} | spots
-    ways = np.stack([np.linalg.norm(_hand_places(q, frame.hand, task) - spot, axis=1)
-                     for spot in spots.values()], axis=1)  # fmt: skip
+    spots = {"the start: is it of the next trial":
+             _hand_places(np.tile(task.q0, (len(q), 1)), frame.hand, task)}  # fmt: skip
+    spots |= {f"goal {k}": place for k, place in enumerate(task.goal_array, 1)}
+    places = _hand_places(q, frame.hand, task)
+    ways = np.stack([np.linalg.norm(places - spot, axis=1) for spot in spots.values()], axis=1)
     off = ways[np.arange(len(ways)), goal]
     is_near = ways.min(axis=1) <= 2 * radius
     nearest = np.array([*spots], dtype=object)[ways.argmin(axis=1)]
@@ -515,10 +512,10 @@ def _implausible(
     follows[1:] = (trial[1:] == trial[:-1]) & (goal[1:] == goal[:-1] + 1) & whole[:-1]
     way = np.where(begins[:, None], q - task.q0, q - np.roll(q, 1, axis=0))
     way[:, 2:] -= 2 * np.pi * np.rint(way[:, 2:] / (2 * np.pi))
-    straight = np.linalg.norm(way, axis=1) / PAPER.step
     known = (begins | follows) & whole
+    straight = np.where(known, np.linalg.norm(way, axis=1) / PAPER.step, np.nan)
     if known.any():
-        _odd_times(frame, straight, known, source, unit, slowest)
+        _odd_times(frame, straight, source, unit, slowest)
     early = np.where(known, straight - ticks, -1.0) * PAPER.step
     allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
     words = "it takes {:g} ticks, a straight movement {:.0f}"
@@ -529,17 +526,13 @@ def _implausible(
 
 
 def _odd_times(
-    hits: pd.DataFrame,
-    straight: Array,
-    known: NDArray[np.bool_],
-    source: str,
-    unit: float,
-    slowest: float,
+    hits: pd.DataFrame, straight: Array, source: str, unit: float, slowest: float
 ) -> None:
     """Raise CoarticError if a subject's times are those of a clock that runs on, in two units,
     rounded, or not possible; warn if they seem so, or not to be of these hits alone.
-    ``straight``: ticks of straight movements, ``known`` in mask ``known``; others as above."""
+    ``straight``: ticks of straight movements, NaN where unknown; others as above."""
     ticks, goal, trial = (hits[name].to_numpy(np.float64) for name in ("ticks", "goal", "trial"))
+    known = np.isfinite(straight)
     logs = pd.DataFrame({"paths": straight, "here": ticks, "above": np.roll(ticks, 1),
                          "below": np.roll(ticks, -1)}).clip(lower=1e-9)  # fmt: skip
     logs = logs.assign(paths=logs.paths.clip(lower=1.0)).transform(np.log)[known]
@@ -584,31 +577,29 @@ def _odd_times(
             f"Are times in {name} (ticks_per_unit={_UNITS[name]:g})?"
         )
         warn(words, refuse=too_long or ratio <= 0.1)
-    doubt = ""
+    follows, slow = [1.0], []
     if len(paces) >= MANY:
         rates = paces.groupby(goals).median()
         slow = rates.index[rates > 1.6 * rates.sort_values().iloc[-2:].min()].tolist()
         even = logs[~np.isin(goals, slow)]
         of_goal = even - even.groupby(goal[even.index]).transform("mean")
-        follows = [each.corr().here.paths for each in (even, of_goal) if each.paths.std() > 0.2]
         rows = logs.corr().paths
         better = rows[["above", "below"]].max()
-        if rows.here < 0.3 and better > 0.6:
-            doubt = "fit the hits of the row above or below better (correlation with paths "
-            doubt += f"{better:.2f}, else {rows.here:.2f}): do they belong to other rows?"
-        elif min(follows, default=1.0) < 0.5 and not clocks:
-            doubt = f"hardly follow the paths of hits (correlation {min(follows):.2f}): do they "
-            doubt += "belong to these hits, or were they sorted, or another person's?"
-        elif slow:
-            warn(f"{source}: goal {slow[0]:g} takes {rates[slow[0]]:.2g} ticks for each of a "
-                 f"straight path, others at most {rates.drop(slow).max():.2g}: is a reaction time "
-                 "in it?")  # fmt: skip
+        follows += [rows.here] * bool(rows.here < 0.3 and better > 0.6)
+        follows += [each.corr().here.paths for each in (even, of_goal) if each.paths.std() > 0.2]
     fast = known & ((straight - ticks) * PAPER.step > 0.1)
-    if doubt:
-        warn(f"{source}: times {doubt}")
-    elif fast.mean() >= 0.25:
+    if is_odd := min(follows) < 0.5 and not clocks:
+        shifted = f", {better:.2f} with the row above or below" * bool(better > 0.6)
+        warn(f"{source}: times hardly follow the paths of hits (correlation {min(follows):.2f}"
+             f"{shifted}): do they belong to other rows, or were they sorted, or another person's?"
+        )  # fmt: skip
+    if slow and not is_odd:
+        warn(f"{source}: goal {slow[0]:g} takes {rates[slow[0]]:.2g} ticks for each of a straight "
+             f"path, others at most {rates.drop(slow).max():.2g}: is a reaction time in it?"
+        )  # fmt: skip
+    if fast.mean() >= 0.25 and not is_odd:
         shares = pd.Series(fast[known]).groupby(goals).mean().sort_values()
-        part, where = changed(fast, trial)
+        part, where = _changed(fast, trial)
         question = "Are there more ticks in a unit?"
         if shares.iloc[-1] > 0.8 and shares.iloc[:-1].max() < 0.2:
             question = f"Most are hits of goal {shares.index[-1]:g}: does a counter overflow?"
@@ -639,7 +630,7 @@ def _clocks(hits: pd.DataFrame, paces: pd.Series, rises: Array, source: str) -> 
     return found
 
 
-def changed(odd: NDArray[np.bool_], trial: Array) -> tuple[NDArray[np.bool_], str]:
+def _changed(odd: NDArray[np.bool_], trial: Array) -> tuple[NDArray[np.bool_], str]:
     """Return a mask of the hits ``(n,)`` of trials in a row, or before and after them, that are odd
     more often than others, and these trials in words. It is empty where the range of the sum of
     deviations from the mean (Kuiper's statistic) is, as by chance, less than 2.6 √n SD."""
@@ -667,9 +658,8 @@ def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
 
 def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
     """Return in words a change of a recording (degrees to rad, other axes, swapped columns, ...)
-    that puts over 80 % of the hits in mask ``far`` as close to their goals as 95 % of the others
-    are, at least within two radii, for each arm with three such hits or more, at several goals;
-    empty if no change does."""
+    that puts over 80 % of an arm's hits in mask ``far``, three or more at several goals, as close
+    to goals as 95 % of the others are, at least within two radii; empty if no change does."""
     joints, hands = [*task.robot.joint_names], frame.hand
     q, column = frame[joints].to_numpy(np.float64), np.arange(len(joints))
     arms = [task.robot.joints(hand) for hand in task.hands]
@@ -777,7 +767,7 @@ def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
     cause = "Did a sensor drift or slip, change its scale, or was it zeroed again?"
     for subject, (name, of_name) in product(frame.subject.unique(), groups.items()):
         rows = np.flatnonzero((frame.subject == subject).to_numpy() & of_name & rest)
-        part, where = changed(out[rows], trials[rows])
+        part, where = _changed(out[rows], trials[rows])
         if part.any() and is_odd(rows[part], rows[~part], f"{subject}{name} {where}", cause):
             rest[rows[part]] = False
     for goal in np.unique(goals):
@@ -822,7 +812,6 @@ def _copies(frame: pd.DataFrame) -> list[str]:
     """Return a sentence for trials that are equal in all postures, as if copied (two of a subject,
     or three that occur twice or more), and for equal times of consecutive hits, or of two trials at
     all goals, that are more than almost equal times."""
-    words = []
     postures = frame.drop(columns=["subject", "trial", "ticks"])
     hits = pd.util.hash_pandas_object(postures, index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()
@@ -830,11 +819,10 @@ def _copies(frame: pd.DataFrame) -> list[str]:
     if copies.nunique() >= 3 or copies.reset_index(name="sum").duplicated(["subject", "sum"]).any():
         first = [f"trial {trial:g} of {subject}" for subject, trial in
                  copies.index[copies == copies.iloc[-1]][:2]]  # fmt: skip
-        words.append(
-            f"{len(copies)} trials are equal to others in all postures, such as "
-            f"{' and '.join(first)}. Is a recording there twice, or a trial copied?"
-        )
-        return words
+        return [f"{len(copies)} trials are equal to others in all postures, such as "
+                f"{' and '.join(first)}. Is a recording there twice, or a trial copied?"
+        ]  # fmt: skip
+    words = []
     for subject, of_subject in frame.groupby("subject", sort=False):
         ticks, number = of_subject.ticks.to_numpy(np.float64), of_subject.trial.to_numpy()
         if len(ticks) < MANY or len(each := np.unique(ticks)) < 3:

@@ -215,7 +215,9 @@ ODD_TIMES = {
         t.ticks * np.where(t.goal == 4, 0.3, 1)
     ),
     "goal 1 takes .* is a reaction time in it": lambda t: t.ticks + 400 * (t.goal == 1),
-    "times fit the hits of the row .* do they belong to other rows": lambda t: np.roll(t.ticks, 1),
+    "times hardly follow .* with the row above or below.: do they belong to other rows": lambda t: (
+        np.roll(t.ticks, 1)
+    ),
 }
 
 
