@@ -66,9 +66,10 @@ def read_hits(
     Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
     start of the task on, with a warning. Warns, too, if an arm of the task would be much faster or
     slower, if trials or their times are there twice, a name is spelt in two ways, rows are in no
-    order of goals, values are rounded, repeat or never vary, times seem to be of other rows, of
-    reactions or of a clock that runs on in some trials, and if hits contradict the place or the
-    radius of goals, or do so in some trials, as if a sensor had slipped.
+    order of goals, values are rounded, repeat or never vary, times do not follow paths, are those
+    of reactions or of a clock that runs on in some trials, and if hits contradict the place or the
+    radius of goals, or do so in some trials, as if a sensor had slipped. Not seen are another
+    person or clock rate from the first trial on, trials in another order, and smoothing over them.
 
     Each hit is checked among those of its subject. Implausible is a hit whose hand is more than two
     radii from its goal (more if motor noise puts a quarter of all hits outside of their goals),
@@ -103,9 +104,9 @@ def read_hits(
     Raises
     ------
     CoarticError
-        The file is no such table, hits are implausible, times are rounded or those of a clock that
-        runs on, or a wrapped joint turns by more than 2.5 rad between hits. A sentence says where
-        and what is needed.
+        The file is no such table, hits are implausible, times are rounded, in two units or those of
+        a clock that runs on, or a wrapped joint turns by more than 2.5 rad between hits. A sentence
+        says where and what is needed.
     """
     if ticks_per_unit is not None and not 0 < ticks_per_unit < np.inf:
         raise CoarticError(

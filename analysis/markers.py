@@ -54,8 +54,9 @@ def hits_from_markers(
     its time and posture are interpolated to where the tip enters the goal. Gaps of up to 50 ms
     (empty, NaN, or both coordinates 0) are bridged by a straight line, with a warning. An arm
     without markers keeps its start, with a warning. Warns, too, of samples that repeat, places that
-    are rounded, frames that seem lost, links whose length follows a joint, trials that begin away
-    from the task's start, rests on the way, and hits of a goal that the tip does not leave before.
+    are rounded, frames that seem lost, links whose length follows a joint, an arm that starts later
+    than the other in all trials, trials that begin away from the task's start, rests on the way,
+    and hits of a goal that the tip does not leave before.
 
     Parameters
     ----------
@@ -306,7 +307,7 @@ def hits_from_markers(
     swaps &= used
     refuse(swaps, f"{culprit[swaps.argmax()]}the length of a link jumps by more than "
            f"{100 * _TOLERANCE:.0f} %: markers swap, or a flag stands for a gap")  # fmt: skip
-    remedy = _remedy(broken_off, task)
+    remedy = _finished_by(broken_off, task)
     torn &= used & (not remedy)
     refuse(torn, "the places of the two shoulders do not belong to one base: they differ "
            f"from the task's by more than {100 * _TOLERANCE:.0f} %")  # fmt: skip
@@ -482,7 +483,7 @@ def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:
     return ""
 
 
-def _remedy(trials: Sequence[Array], task: Task) -> str:
+def _finished_by(trials: Sequence[Array], task: Task) -> str:
     """Return in words a change of axes or of the order of goals that finishes over 80 % of
     unfinished trials, places of hands ``(hands, n, 2)``; empty if none does, or for one trial."""
     tried = [(f"in which {axes}", axes, task) for axes in AXES if axes]
