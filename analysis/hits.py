@@ -234,12 +234,10 @@ def row_names(frame: pd.DataFrame) -> list[str]:
 def as_names(values: pd.Series) -> pd.Series:
     """Return names as texts with single spaces and plain hyphens (:func:`_written`); whole numbers
     without ``.0``, and an empty text for a missing name."""
-
-    def name(value: object) -> str:
+    known = {}
+    for value in values.dropna().unique():
         whole = isinstance(value, float) and value.is_integer()
-        return _written(f"{value:.0f}" if whole else str(value))
-
-    known = {value: name(value) for value in values.dropna().unique()}
+        known[value] = _written(f"{value:.0f}" if whole else str(value))
     return values.map(known).astype(object).where(values.notna(), "")
 
 
@@ -691,14 +689,12 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
     for arm in arms:
         few = arm.stop - arm.start <= 4
         for each in permutations(column[arm].tolist()) if few else [column[arm].tolist()[::-1]]:
-            ordered = q.copy()
-            ordered[:, arm] = q[:, each]
+            order = [*column[: arm.start], *each, *column[arm.stop :]]
             names = ", ".join(joints[k] for k in each)
-            tried.append((f"with columns in the order {names}", ordered))
+            tried.append((f"with columns in the order {names}", q[:, order]))
     if len({arm.stop - arm.start for arm in arms}) < len(arms):
-        ordered = q.copy()
-        ordered[:, arms[0]], ordered[:, arms[1]] = q[:, arms[1]], q[:, arms[0]]
-        tried.append(("in which the columns of the arms are swapped", ordered))
+        order = [0, 1, *column[arms[1]], *column[arms[0]]]
+        tried.append(("in which the columns of the arms are swapped", q[:, order]))
     swapped, other = "in which hands are swapped", hands.map({"left": "right", "right": "left"})
     tried += [(swapped, q)] * (len(arms) == 2)
     goals, fits = task.goal_array[frame.goal.to_numpy(np.int64) - 1], {}

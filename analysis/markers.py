@@ -125,10 +125,9 @@ def hits_from_markers(
     refuse((people == "").to_numpy(), "subject is empty; needed is a name")
     refuse(others.to_numpy(), "another subject; needed is a file for each person")
     trial, time = as_numbers(frame.trial), as_numbers(frame.time)
-    for name, numbers in (("trial", trial), ("time", time)):
-        for row in np.flatnonzero(~np.isfinite(numbers))[:1].tolist():
-            value = frame[name][row]
-            refuse(~np.isfinite(numbers), f"{name} is {value!r}; {why_no_number(value)}")
+    for name, none in (("trial", ~np.isfinite(trial)), ("time", ~np.isfinite(time))):
+        value = frame[name][int(none.argmax())]
+        refuse(none, f"{name} is {value!r}; {why_no_number(value)}")
     refuse((trial % 1 != 0) | (trial < 1), "trial is no whole number from 1")
     begins = np.append(True, np.diff(trial) != 0)
     again = pd.Series(np.where(begins, trial, np.nan)).duplicated().to_numpy() & begins
@@ -389,8 +388,6 @@ def hits_from_markers(
              f"of task {task.name!r}, in varied directions: is there one start?")  # fmt: skip
     table = pd.DataFrame(rows, columns=["subject", "trial", "goal", "hand", "ticks",
                                         *task.robot.joint_names])  # fmt: skip
-    for hand in {*HANDS}.difference(task.hands):
-        table = table.drop(columns=[*table.columns[5:][task.robot.joints(hand)]])
     calls = [f"trial {row[1]:g}, goal {row[2]}" for row in rows]
     hits = checked_hits(table, task, source, calls, implausible)
     hits.attrs["unfinished"] = len(unfinished)
