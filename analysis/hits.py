@@ -28,33 +28,25 @@ from coartic.robot import Array
 
 Implausible = Literal["refuse", "drop"]
 """Treatment of hits that the person cannot have made."""
-_LARGEST_ANGLE = 20.0
-"""Largest angle, rad; if most are larger they are taken for degrees."""
-_AMBIGUOUS = 2.5
-"""Turn of a joint between hits, rad, from which its direction is in doubt if angles are wrapped."""
-_LARGEST_TRIAL = 100_000
-"""Largest number of a trial."""
 _SLOWEST = 20
 """Longest plausible time of a hit, in longest subtasks of the corrective process alone."""
 _UNITS = {"s": 100.0, "ms": 0.1, "min": 6000.0, "control steps": 1.0}
 """Ticks in units of a duration, for a person who takes a second for each rad."""
-_MANY = 20
-"""Fewest hits of a subject whose times are looked at for rounding."""
-_COARSE = 10.0
-"""Ticks to which times may be rounded in any case."""
-_COARSE_ANGLE = 0.02
-"""Least difference of angles, rad, from which they are said to be rounded."""
-_CENTRAL = 0.6
-"""Radii from a centre within which three of four hits are too few at the edge of a goal."""
+MANY = 20
+"""Fewest hits, or samples, that are compared with others."""
 _OUTSIDE = 1.25
 """Radii from the centre of a goal from which hits are not at its edge."""
-_UNRELATED = 0.3
-"""Correlation of times with paths below which times may be those of the next row."""
-_SLOW_GOAL = 1.6
-"""Ratio of a goal's time for a path to that of the slowest other goal, with a warning."""
 _NAMED = 5  # of a kind
-_AT_GOAL = ", at goal "
 _MONTH = "(jan|feb|m[aä]r|apr|ma[iy]|jun|jul|aug|sep|o[ck]t|nov|de[cz])[a-z]*"
+_ANGLES = {"": 1.0, "degrees are made rad": np.pi / 180, "gradians are made rad": np.pi / 200,
+           "turns are made rad": 2 * np.pi}  # fmt: skip
+AXES = {
+    "": (1, 0), "angles are anticlockwise, as y is upwards": (-1, 0),
+    "x is the other way, as if mirrored": (-1, 2), "axes are turned by 90 degrees": (1, 1),
+    "axes are turned by 180 degrees": (1, 2), "axes are turned by -90 degrees": (1, 3),
+    "x and y are swapped": (-1, 1), "x and y are swapped, with the other sign": (-1, 3),
+}  # fmt: skip
+"""Changes of axes: sign of angles, and turn in right angles afterwards."""
 _DATE = re.compile(rf"\d+\W+{_MONTH}\W*\d*|{_MONTH}\W+\d+|\d+([-./])\d+\3\d{{2,4}}", re.IGNORECASE)
 _HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
 
@@ -73,16 +65,19 @@ def read_hits(
     count; columns of an arm or a joint that the task does not use are left out with a warning.
     Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
     start of the task on, with a warning. Warns, too, if an arm of the task would be much faster or
-    slower, if trials are there twice, a name is spelt in two ways, rows are in no order of goals,
-    values are rounded or repeat, times seem to be of other rows, of reactions or of a clock that
-    runs on in some trials, and if hits contradict the place or the radius of goals.
+    slower, if trials or their times are there twice, a name is spelt in two ways, rows are in no
+    order of goals, values are rounded, repeat or never vary, times do not follow paths, are those
+    of reactions or of a clock that runs on in some trials, and if hits contradict the place or the
+    radius of goals, or do so in some trials, as if a sensor had slipped. Not seen are another
+    person or clock rate from the first trial on, trials in another order, and smoothing over them.
 
     Each hit is checked among those of its subject. Implausible is a hit whose hand is more than two
     radii from its goal (more if motor noise puts a quarter of all hits outside of their goals),
-    whose base moves where it is locked, whose arm has an angle of more than 20 rad or one number in
-    place of all its angles, or whose time is over 20 times the longest subtask of the corrective
-    process, or too short for a straight movement. Implausible hits are refused, or with
-    ``implausible="drop"`` left out; if they are most hits of a subject they are always refused.
+    whose base moves where it is locked, whose arm has an angle of more than 20 rad, one number in
+    place of all its angles, or exact means of the hits around it, or whose time is over 20 times
+    the longest subtask of the corrective process, or too short for a straight movement. Implausible
+    hits are refused, or with ``implausible="drop"`` left out; if they are most hits of a subject
+    they are always refused.
 
     Parameters
     ----------
@@ -109,9 +104,9 @@ def read_hits(
     Raises
     ------
     CoarticError
-        The file is no such table, hits are implausible, times are rounded or those of a clock that
-        runs on, or a wrapped joint turns by more than 2.5 rad between hits. A sentence says where
-        and what is needed.
+        The file is no such table, hits are implausible, times are rounded, in two units or those of
+        a clock that runs on, or a wrapped joint turns by more than 2.5 rad between hits. A sentence
+        says where and what is needed.
     """
     if ticks_per_unit is not None and not 0 < ticks_per_unit < np.inf:
         raise CoarticError(
@@ -127,12 +122,9 @@ def read_hits(
 
 
 def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return a CSV file as a frame of texts, and a name for each row, such as ``line 2``.
-
-    Blank lines and lines that begin with ``#`` are left out. ``kind``: what should be in the file,
-    with a verb, such as ``recorded hits are``, for a message. Raises CoarticError for a file that
-    cannot be read, is no table of text separated by commas, or repeats its headings.
-    """
+    """Return a CSV file of ``kind`` (such as ``recorded hits are``, for messages) as a frame of
+    texts, and a name for each row, such as ``line 2``. Raises CoarticError for a file that cannot
+    be read, is no table of text separated by commas, or repeats its headings."""
     if words := foreign_file(str(path), f"{kind} a CSV file, see docs/howto/people.md"):
         raise CoarticError(words)
     try:
@@ -147,7 +139,7 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
         kind = "in UTF-16, as Excel and Notepad write 'Unicode'" if wide else "not in UTF-8"
         kind = f"damaged from byte {content.find(0)} on" if len(text) > 1 and not wide else kind
         raise CoarticError(f"{path} is {kind}: save it as CSV in UTF-8")
-    frame, lines = _plain_table(text) or _odd_table(path, text)
+    frame, lines = _table(path, text)
     again = np.flatnonzero(frame.iloc[:, :1] == frame.columns[:1]).tolist()
     if again:
         others = also([lines[row] for row in again])
@@ -155,36 +147,10 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
     return frame, lines
 
 
-def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
-    """Return frame and names of rows as :func:`read_table`, by a fast parser; None for a text with
-    quotes, comments, blank lines, rows that differ in length, or empty, equal or single
-    headings."""
-    head, _, body = text.replace("\r\n", "\n").removesuffix("\n").partition("\n")
-    headings, rows = [*map(_written, head.split(","))], body.count("\n") + 1
-    if (
-        any(odd in text for odd in '"#')
-        or "\r" in body
-        or not all(headings)
-        or not 1 < len({*headings}) == len(headings)
-        or body.count(",") != rows * (len(headings) - 1)
-    ):
-        return None
-    try:
-        frame = pd.read_csv(
-            io.StringIO(body), names=headings, dtype={"subject": str, "hand": str}, na_values=[""],
-            keep_default_na=False, skipinitialspace=True, low_memory=False,
-        )  # fmt: skip
-    except ValueError:  # of rows with more values
-        return None
-    if len(frame) != rows or frame.isna().all(axis=1).any():
-        return None
-    return frame, [f"line {row}" for row in range(2, rows + 2)]
-
-
-def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return frame and names of rows as :func:`read_table`, by a parser that goes line by line.
-    Raises CoarticError for another separator, a row with another number of values than the
-    headings, and a repeated heading. Warns of rows that are left out because they begin with #."""
+def _table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
+    """Return frame and names of rows as :func:`read_table`. Raises CoarticError for another
+    separator, a row with another number of values than the headings, and a repeated heading. Warns
+    of rows that are left out because they begin with #."""
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
     rows, lines, wrong, hidden = [], [], [], []
@@ -201,13 +167,14 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
             if not any(map(str.strip, fields)):
                 continue
             if not headings and first.startswith("sep=") and not any(fields[1:]):
-                if separator := first[4:]:
-                    _refuse_separator(path, separator)
-            elif not headings:
+                continue
+            if not headings:
                 headings = [*map(_written, fields)]
-                for separator in ";\t|" if len(fields) == 1 else "":
-                    if separator in fields[0]:
-                        _refuse_separator(path, separator, headings[0])
+                for separator in [odd for odd in ";\t|" if len(fields) == 1 and odd in fields[0]]:
+                    raise CoarticError(
+                        f"{path}: the separator is {separator!r}; needed are values separated by "
+                        f"commas, and numbers with a decimal point: found are {headings[0]}"
+                    )
             elif len(fields) != len(headings):
                 wrong.append((reader.line_num, len(fields)))
             else:
@@ -230,14 +197,11 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
     return pd.DataFrame(rows, columns=headings, dtype=object), lines
 
 
-def _refuse_separator(path: str | Path, separator: str, headings: str = "") -> None:
-    """Raise CoarticError if ``separator`` is not a comma; the message names the file and shows
-    ``headings``, its first line, if given."""
-    if separator != ",":
-        raise CoarticError(
-            f"{path}: the separator is {separator!r}; needed are values separated by commas, and "
-            f"numbers with a decimal point{f': found are {headings}' * bool(headings)}"
-        )
+def turned(places: Array, axes: str) -> Array:
+    """Return places ``(..., 2)`` after a change of axes, a key of :data:`AXES`."""
+    sign, quarters = AXES[axes]
+    at = (places[..., 0] + sign * 1j * places[..., 1]) * 1j**quarters
+    return np.stack([at.real, at.imag], axis=-1)
 
 
 def also(names: Sequence[str]) -> str:
@@ -247,8 +211,11 @@ def also(names: Sequence[str]) -> str:
     return f" (also {', '.join(named)})" if named else ""
 
 
-def warn(text: str) -> None:
-    """Warn with this text; the warning names the line of the program that called this package."""
+def warn(text: str, refuse: bool = False) -> None:
+    """Warn with this text, in the line of the program that called this package; with ``refuse``
+    raise CoarticError in place of it."""
+    if refuse:
+        raise CoarticError(text)
     warnings.warn(text, stacklevel=5)
 
 
@@ -267,12 +234,10 @@ def row_names(frame: pd.DataFrame) -> list[str]:
 def as_names(values: pd.Series) -> pd.Series:
     """Return names as texts with single spaces and plain hyphens (:func:`_written`); whole numbers
     without ``.0``, and an empty text for a missing name."""
-
-    def name(value: object) -> str:
+    known = {}
+    for value in values.dropna().unique():
         whole = isinstance(value, float) and value.is_integer()
-        return _written(f"{value:.0f}" if whole else str(value))
-
-    known = {value: name(value) for value in values.dropna().unique()}
+        known[value] = _written(f"{value:.0f}" if whole else str(value))
     return values.map(known).astype(object).where(values.notna(), "")
 
 
@@ -317,14 +282,9 @@ def checked_hits(
     implausible: Implausible = "refuse",
     ticks_per_unit: float | None = None,
 ) -> pd.DataFrame:
-    """Return a new frame of recorded hits, checked, unwrapped and sorted, a row for each hit:
-    ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints (:func:`read_hits`).
-
-    ``source``, the name of the file or frame, and ``names``, a name for each row, are for messages.
-    ``ticks_per_unit`` is None for a frame, whose ``ticks`` need not be whole. Raises CoarticError
-    for a missing or wrong value, an implausible hit, and a wrapped joint that turns by more than
-    2.5 rad between hits.
-    """
+    """Return a new frame of recorded hits, checked, unwrapped and sorted (:func:`read_hits`), with
+    ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints. ``source`` and ``names``
+    of rows are for messages; ``ticks_per_unit`` is None for a frame, whose ticks may be broken."""
     if twice := [name for n, name in enumerate(frame.columns) if name in frame.columns[:n]]:
         raise CoarticError(f"{source} has two columns {twice[0]!r}")
     called = names or row_names(frame)
@@ -385,17 +345,16 @@ def checked_hits(
         warn(f"{source}: subjects differ in capitals alone: {', '.join(sorted(people)[:20])}")
     refuse(frame.subject == "", "subject", "needed is a name")
     refuse(~frame.hand.isin(task.hands), "hand", f"needed is {' or '.join(task.hands)}")
-    is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, _LARGEST_TRIAL)
-    refuse(~is_whole, "trial", f"needed is a whole number from 1 to {_LARGEST_TRIAL}")
+    is_whole = (frame.trial % 1 == 0) & frame.trial.between(1, 100_000)
+    refuse(~is_whole, "trial", "needed is a whole number from 1 to 100000")
     last = len(task.goals)
     refuse(~frame.goal.isin(range(1, last + 1)), "goal", f"needed is a number from 1 to {last}")
     if is_file and not timed:
         seconds = "needed is a whole number; seconds belong into a column duration"
         refuse(frame.ticks % 1 != 0, "ticks", seconds)
-    refuse(frame.ticks <= 0, "ticks", "needed is more than 0, from the hit before to this one")
     unit = ticks_per_unit or 1.0
-    less = f"it is less than a tick with {unit:g} ticks per unit: give ticks_per_unit, 100 for s"
-    refuse(frame.ticks * unit < 1, "ticks", less)
+    too_short = "needed is more than 0, from the hit before to this one"
+    refuse(frame.ticks * unit < 1e-6, "ticks", too_short)
     frame["ticks"] = (frame.ticks * unit).round(6)
     again = frame.duplicated(["subject", "trial", "goal"])
     refuse(again, "goal", "this subject, trial and goal have a line above already; number trials "
@@ -405,13 +364,15 @@ def checked_hits(
         refuse(frame[name].abs() > LARGEST_ENTRY, name, far)
     trials = [frame.subject, frame.trial]
     steps = np.sign(frame.groupby(trials).goal.diff()).groupby(trials)
-    turned = (steps.transform("min") * steps.transform("max") < 0) & ~frame.duplicated(
-        ["subject", "trial"]
-    )
-    mixed = [called[row] for row in np.flatnonzero(turned).tolist()]
+    back = (steps.transform("min") * steps.transform("max") < 0).to_numpy()
+    begins = ~frame.duplicated(["subject", "trial"]).to_numpy()
+    mixed = [called[row] for row in np.flatnonzero(back & begins).tolist()]
     keys = frame.trial * (last + 1) + frame.goal
     order = np.lexsort([keys.to_numpy(), pd.factorize(frame.subject)[0]])
     frame, called = frame.iloc[order].reset_index(drop=True), [called[n] for n in order]
+    for subject, hand in product(people, task.hands):
+        hits = frame[(frame.subject == subject) & (frame.hand == hand)]
+        _warn_of_values(hits, joints[task.robot.joints(hand)], f"{source}, {subject}")
     initial, counts = initial_solution(task), frame.subject.value_counts()
     slowest = max(initial.ticks_by_goal() if initial else [np.pi / PAPER.step * len(joints)])
     reasons: list[str] = []
@@ -436,39 +397,33 @@ def checked_hits(
                     "row, are hands and goals right, is the base in the length unit of the task, "
                     f"and is the task {task.name!r}?"
                 )
-            if _AT_GOAL in reasons[0]:
-                advice = f"Are goals in their order? {advice}"
-            if fits := _remedy(frame, np.char.find(why.astype(str), " radii from ") > 0, task):
+            if fits := _remedy(frame, np.char.find(why.astype(str), " rad") > 0, task):
                 advice = (
                     f"Most of these hands would be at their goals in a recording {fits}. {advice}"
                 )
+            elif ", at goal " in reasons[0]:
+                advice = f"Are goals in their order? {advice}"
+            elif "at the start" not in reasons[0]:
+                advice = " ".join([*_odd_groups(frame, task), *_copies(frame), advice])
             raise CoarticError(f"{source}, {reasons[0]}{also(reasons)}. {advice}")
         frame = frame[~wrong].reset_index(drop=True)
         called = [name for name, words in zip(called, why, strict=True) if not words]
     if reasons:
         warn(f"{source}: {len(reasons)} of {counted(counts.sum(), 'hit')} are left out as "
              f"implausible, {reasons[0]}{also(reasons)}")  # fmt: skip
-    _warn_of_copies(frame, source)
-    _warn_of_places(frame, task, source)
+    for words in _odd_groups(frame, task) + _copies(frame):
+        warn(f"{source}: {words}")
     if mixed:
         warn(f"{source}, {mixed[0]}: rows of the trial are in no order of goals, up or down; times "
              f"are taken as from the goal with the number before{also(mixed)}")  # fmt: skip
-    for subject, hand in product(people, task.hands):
-        hits = frame[(frame.subject == subject) & (frame.hand == hand)]
-        _warn_of_values(hits, joints[task.robot.joints(hand)], f"{source}, {subject}")
     _unwrap(frame, task, source, called)
     return frame
 
 
 def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
-    """Unwrap the angles of hits in place, hit by hit, each trial from the task's start on.
-
-    ``frame``, sorted, with rows from 0, has columns ``subject``, ``trial``, ``goal`` and one for
-    each joint, rad; in messages ``source`` names the recording and ``names`` each row. Warns if
-    angles change. Raises CoarticError if a joint of a subject turns by more than
-    :data:`_AMBIGUOUS` between hits, or from the start to the first, so that its direction is in
-    doubt, and somewhere jumps by 2π or differs by more than π between hits of one goal.
-    """
+    """Unwrap the angles of sorted hits in place, each trial from the task's start on, with a
+    warning. Raises CoarticError if angles are wrapped and a joint turns by more than 2.5 rad
+    between hits, so that its direction is in doubt."""
     joints = [*task.robot.joint_names][2:]
     angles = frame[joints].to_numpy(np.float64)
     begins = ~frame.duplicated(["subject", "trial"]).to_numpy()
@@ -483,7 +438,7 @@ def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) 
     spread = at_goal.transform("max") - at_goal.transform("min")
     wrapped = pd.DataFrame((added != 0) | (spread.to_numpy() > np.pi))
     doubtful = wrapped.groupby(frame.subject, sort=False).transform("any").to_numpy()
-    doubtful = doubtful & (np.abs(steps) > _AMBIGUOUS)
+    doubtful = doubtful & (np.abs(steps) > 2.5)
     for row, joint in np.argwhere(doubtful)[:1]:
         step = steps[row, joint]
         raise CoarticError(
@@ -504,14 +459,8 @@ def _implausible(
     frame: pd.DataFrame, task: Task, source: str, unit: float, slowest: float
 ) -> NDArray[np.object_]:
     """Return why sorted hits of a subject are implausible, a text for each, empty for a plausible
-    hit. ``source`` names the recording and the subject in messages; ``unit``: ticks in a unit of
-    time; ``slowest``: longest subtask of the corrective process, ticks.
-
-    Warns of times that seem rounded, of other rows or with a reaction time in them, and of an arm
-    that is much faster or slower than the task's. Raises CoarticError if times are those
-    of a clock that runs on, rounded or constant, or if the median hit takes a number of ticks that
-    no arm of the task could take.
-    """
+    hit, and warn of places and times (:func:`_odd_times`) that are odd. ``source``: name of the
+    recording and the subject; ``unit``: ticks in a unit; ``slowest``: longest subtask, ticks."""
     q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
     goal, ticks = frame.goal.to_numpy(np.int64), frame.ticks.to_numpy(np.float64)
     why = np.full(len(frame), "", dtype=object)
@@ -520,12 +469,16 @@ def _implausible(
         for row in np.flatnonzero(wrong & (why == "")).tolist():
             why[row] = words.format(*(each[row] for each in values))
 
+    spots = {"the start: is it of the next trial":
+             _hand_places(np.tile(task.q0, (len(q), 1)), frame.hand, task)}  # fmt: skip
+    spots |= {f"goal {k}": place for k, place in enumerate(task.goal_array, 1)}
     places = _hand_places(q, frame.hand, task)
-    ways = np.linalg.norm(places[:, None] - task.goal_array, axis=2)
-    off = ways[np.arange(len(ways)), goal - 1]
-    nearest = np.where(ways.min(axis=1) <= 2 * radius, ways.argmin(axis=1) + 1, 0)
+    ways = np.stack([np.linalg.norm(places - spot, axis=1) for spot in spots.values()], axis=1)
+    off = ways[np.arange(len(ways)), goal]
+    is_near = ways.min(axis=1) <= 2 * radius
+    nearest = np.array([*spots], dtype=object)[ways.argmin(axis=1)]
     for name, values in zip(task.robot.joint_names[2:], q.T[2:], strict=True):
-        mark(np.abs(values) > _LARGEST_ANGLE, name + " is {:g}, no angle in rad", values)
+        mark(np.abs(values) > 20, name + " is {:g}, no angle in rad", values)
     # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
     most, outer = 2 * radius, float(np.quantile(off, 0.75))
     if outer <= most:
@@ -538,11 +491,19 @@ def _implausible(
         arm, start = q[:, task.robot.joints(hand)], task.q0[task.robot.joints(hand)]
         left = pd.Series((arm != start).any(axis=1)).groupby(trial).cummax().to_numpy()
         one = (arm == arm[:, :1]).all(axis=1) & left & (len(start) > 1)
-        mark(one, f"all angles of the {hand} arm are {{:g}}", arm[:, 0])
+        words = f"all angles of the {hand} arm are {{:g}}{', as at the start' * (not start.any())}"
+        mark(one, words, arm[:, 0])
+        filled = _between(arm, goal) & (frame.hand == hand).to_numpy()
+        mark(filled, "the angles of the arm are means of the hits around it, as if filled in")
     far, words = off > most, "the hand is {:.3g} radii from its goal"
-    if far.any() and (nearest[far] > 0).mean() > 0.5:
-        mark(far & (nearest > 0), words + f"{_AT_GOAL}{{}}", off / radius, nearest)
+    if far.any() and is_near[far].mean() > 0.5:
+        mark(far & is_near, words + ", at {}", off / radius, nearest)
     mark(far, words, off / radius)
+    if len(off) >= MANY and outer < 0.6 * radius and not why.any():
+        warn(
+            f"{source}: three of four hits are within {outer / radius:.2g} radii of the centres of "
+            "goals: is the radius a diameter, or are postures those of rests after hits?"
+        )
     whole = why == ""
     if 2 * whole.sum() < len(whole):
         return why
@@ -550,89 +511,138 @@ def _implausible(
     follows[1:] = (trial[1:] == trial[:-1]) & (goal[1:] == goal[:-1] + 1) & whole[:-1]
     way = np.where(begins[:, None], q - task.q0, q - np.roll(q, 1, axis=0))
     way[:, 2:] -= 2 * np.pi * np.rint(way[:, 2:] / (2 * np.pi))
-    straight = np.linalg.norm(way, axis=1) / PAPER.step
     known = (begins | follows) & whole
-    paces = ticks / np.maximum(straight, 1.0)
-    _refuse_clocks(frame, paces, begins & whole, follows & whole, source)
-    shifted = [np.log(np.roll(ticks, shift)[known]) for shift in (0, 1, -1)]
-    paths = np.log(np.maximum(straight[known], 1.0))
-    if known.sum() >= _MANY and min(map(np.ptp, [paths, *shifted])) > 0:
-        here, *others = (np.corrcoef(each, paths)[0, 1] for each in shifted)
-        rates = pd.Series(paces[known]).groupby(goal[known]).median()
-        slow = rates.index[rates > _SLOW_GOAL * rates.sort_values().iloc[-2:].min()].tolist()
-        if here < _UNRELATED and max(others) > 2 * _UNRELATED:
-            warn(
-                f"{source}: times fit the hits of the row above or below better (correlation with "
-                f"paths {max(others):.2f}, else {here:.2f}): do they belong to other rows?"
-            )
-        elif slow:
-            warn(
-                f"{source}: goal {slow[0]} takes {rates[slow[0]]:.2g} ticks for each of a straight "
-                f"path, others at most {rates.drop(slow).max():.2g}: is a reaction time in it?"
-            )
-    usual, path = (float(np.median(each[known])) if known.any() else 1.0
-                   for each in (ticks, straight))  # fmt: skip
-    times = np.unique(ticks)
-    least = float(np.diff(times, prepend=0.0).min())
-    is_coarse = least > max(2.0, 0.1 * usual) and len(times) < len(np.unique(q, axis=0))
-    if len(ticks) >= _MANY and is_coarse and np.allclose(times % least, 0.0, atol=1e-3):
-        words = (f"{source}: all times are multiples of {least:g} ticks, the median hit takes "
-                 f"{usual:g}: they are rounded or constant; needed are times to a tenth of a hit "
-                 "or better")  # fmt: skip
-        if least > max(_COARSE, 0.2 * usual):
-            raise CoarticError(words)
-        warn(words)
-    ratio = usual / max(path, 1.0)
-    if known.any() and (usual > _SLOWEST * slowest or not 0.1 < ratio < 8):
-        likely = min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * ratio)))
-        words = (
-            f"{source}: the median hit takes {usual:g} ticks with {unit:g} ticks per unit; a "
-            f"straight movement takes {path:.0f}, the corrective process at most {slowest:.0f}. "
-            f"Are times in {likely} (ticks_per_unit={_UNITS[likely]:g})?"
-        )
-        if usual > _SLOWEST * slowest or ratio <= 0.1:
-            raise CoarticError(words)
-        warn(words)
-    else:
-        early = np.where(known, straight - ticks, -1.0) * PAPER.step
-        if np.quantile(early, 0.75) > 0.1:
-            step = f"whose step is {PAPER.step:g} a tick. Are there more ticks in a unit?"
-            warn(f"{source}: a quarter of the hits or more is faster than the task's arm, {step}")
-        allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
-        words = "it takes {:g} ticks, a straight movement {:.0f}"
-        mark(early > allowed, words, ticks, straight)
-        words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
-        mark(ticks > _SLOWEST * slowest, words, ticks)
+    straight = np.where(known, np.linalg.norm(way, axis=1) / PAPER.step, np.nan)
+    if known.any():
+        _odd_times(frame, straight, source, unit, slowest)
+    early = np.where(known, straight - ticks, -1.0) * PAPER.step
+    allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
+    words = "it takes {:g} ticks, a straight movement {:.0f}"
+    mark((early > allowed) | (ticks < 1), words, ticks, straight)
+    words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
+    mark(ticks > _SLOWEST * slowest, words, ticks)
     return why
 
 
-def _refuse_clocks(
-    hits: pd.DataFrame,
-    paces: Array,
-    first: NDArray[np.bool_],
-    later: NDArray[np.bool_],
-    source: str,
+def _odd_times(
+    hits: pd.DataFrame, straight: Array, source: str, unit: float, slowest: float
 ) -> None:
-    """Raise CoarticError if the times of a subject are those of a clock that runs on from goal to
-    goal, and warn if those of some trials are.
+    """Raise CoarticError if a subject's times are those of a clock that runs on, in two units,
+    rounded, or not possible; warn if they seem so, or not to be of these hits alone.
+    ``straight``: ticks of straight movements, NaN where unknown; others as above."""
+    ticks, goal, trial = (hits[name].to_numpy(np.float64) for name in ("ticks", "goal", "trial"))
+    known = np.isfinite(straight)
+    logs = pd.DataFrame({"paths": straight, "here": ticks, "above": np.roll(ticks, 1),
+                         "below": np.roll(ticks, -1)}).clip(lower=1e-9)  # fmt: skip
+    logs = logs.assign(paths=logs.paths.clip(lower=1.0)).transform(np.log)[known]
+    paces, goals = (logs.here - logs.paths).transform(np.exp), goal[known]
+    usual, path = float(np.median(ticks[known])), float(np.median(straight[known]))
+    clocks = _clocks(hits[known], paces, np.diff(ticks, prepend=0.0)[known], source)
 
-    ``paces``: ticks of each hit over the ticks of a straight movement to it, shape ``(n,)``;
-    ``first`` and ``later``, masks ``(n,)``: hits of goal 1, and hits whose goal before was hit.
-    """
-    if later.sum() < _MANY:
-        return
-    ticks, trial = hits.ticks.to_numpy(np.float64), hits.trial.to_numpy(np.int64)[later]
-    rises = np.diff(ticks, prepend=0.0)[later]
-    of_ticks = np.log(paces[later])
-    of_rises = of_ticks + np.log(np.maximum(rises, 1e-9) / ticks[later])
+    def likely(pace: float) -> str:
+        return min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * pace)))
+
+    if len(paces) >= MANY:
+        ordered, tenth = np.sort(paces), len(paces) // 10 + 1
+        leaps = (ordered[1:] / ordered[:-1])[tenth - 1 : len(paces) - tenth]
+        is_slow = paces > ordered[tenth - 1 + leaps.argmax()]
+        less, more = paces[~is_slow], paces[is_slow]
+        units = [likely(float(each.median())) for each in (less, more)]
+        if leaps.max() > 5 and units[0] != units[1] and len({*goals[is_slow]}) > 1:
+            one, other = (f"goal {goal[row]:g} in trial {trial[row]:g}"
+                          for row in (less.index[0], more.index[0]))  # fmt: skip
+            factor = more.median() / less.median()
+            point = ", or was a point between thousands read as a decimal point"
+            raise CoarticError(
+                f"{source}: {len(more)} of {len(paces)} hits, first {other}, take {factor:.0f} "
+                f"times as long for their paths as others, first {one}. Do units differ, "
+                f"{units[1]} there and {units[0]} elsewhere{point * bool(500 < factor < 2000)}?"
+            )
+    times = np.unique(ticks)
+    least = float(np.diff(times, prepend=0.0).min())
+    postures = hits.drop(columns=["subject", "trial", "goal", "hand", "ticks"])
+    is_coarse = least > max(2.0, 0.1 * usual) and len(times) < len(postures.drop_duplicates())
+    if len(ticks) >= MANY and is_coarse and np.allclose(times % least, 0.0, atol=1e-3):
+        words = (f"{source}: all times are multiples of {least:g} ticks, the median hit takes "
+                 f"{usual:g}: they are rounded or constant; needed are times to a tenth of a hit "
+                 "or better")  # fmt: skip
+        warn(words, refuse=least > max(10, 0.2 * usual))
+    ratio, too_long = usual / max(path, 1.0), usual > _SLOWEST * slowest
+    if too_long or not 0.1 < ratio < 8:
+        name = likely(ratio)
+        words = (
+            f"{source}: the median hit takes {usual:g} ticks with {unit:g} ticks per unit; a "
+            f"straight movement takes {path:.0f}, the corrective process at most {slowest:.0f}. "
+            f"Are times in {name} (ticks_per_unit={_UNITS[name]:g})?"
+        )
+        warn(words, refuse=too_long or ratio <= 0.1)
+    follows, slow = [1.0], []
+    if len(paces) >= MANY:
+        rates = paces.groupby(goals).median()
+        slow = rates.index[rates > 1.6 * rates.sort_values().iloc[-2:].min()].tolist()
+        even = logs[~np.isin(goals, slow)]
+        of_goal = even - even.groupby(goal[even.index]).transform("mean")
+        rows = logs.corr().paths
+        better = rows[["above", "below"]].max()
+        follows += [rows.here] * bool(rows.here < 0.3 and better > 0.6)
+        follows += [each.corr().here.paths for each in (even, of_goal) if each.paths.std() > 0.2]
+    fast = known & ((straight - ticks) * PAPER.step > 0.1)
+    if is_odd := min(follows) < 0.5 and not clocks:
+        shifted = f", {better:.2f} with the row above or below" * bool(better > 0.6)
+        warn(f"{source}: times hardly follow the paths of hits (correlation {min(follows):.2f}"
+             f"{shifted}): do they belong to other rows, or were they sorted, or another person's?"
+        )  # fmt: skip
+    if slow and not is_odd:
+        warn(f"{source}: goal {slow[0]:g} takes {rates[slow[0]]:.2g} ticks for each of a straight "
+             f"path, others at most {rates.drop(slow).max():.2g}: is a reaction time in it?"
+        )  # fmt: skip
+    if fast.mean() >= 0.25 and not is_odd:
+        shares = pd.Series(fast[known]).groupby(goals).mean().sort_values()
+        part, where = _changed(fast, trial)
+        question = "Are there more ticks in a unit?"
+        if shares.iloc[-1] > 0.8 and shares.iloc[:-1].max() < 0.2:
+            question = f"Most are hits of goal {shares.index[-1]:g}: does a counter overflow?"
+        elif part.any():
+            question = f"Most are {where}: are these another person's, or in another unit?"
+        warn(f"{source}: a quarter of the hits or more is faster than the task's arm, whose step "
+             f"is {PAPER.step:g} a tick. {question}")  # fmt: skip
+
+
+def _clocks(hits: pd.DataFrame, paces: pd.Series, rises: Array, source: str) -> bool:
+    """Raise CoarticError if the times of a subject's hits are those of a clock that runs on from
+    goal to goal; warn, and return True, if those of some trials are. ``paces``: ticks of each hit
+    over those of a straight movement, ``rises``: ticks less those of the row before, ``(n,)``."""
+    later = hits.goal.to_numpy() > 1
+    if later.sum() < MANY:
+        return False
+    trial, rises = hits.trial.to_numpy(np.int64)[later], rises[later]
+    of_ticks = np.log(paces.to_numpy())[later]
+    of_rises = of_ticks + np.log(np.maximum(rises, 1e-9) / hits.ticks.to_numpy(np.float64)[later])
     needed = "as those of a clock that runs on; needed are times from the hit before"
     if (rises > 0).all() and np.std(of_rises) < np.std(of_ticks):
         raise CoarticError(f"{source}: in every trial times rise from goal to goal, {needed}")
-    usual = np.median(np.log(paces[first])) if first.any() else np.nan
+    usual = np.log(paces[~later].median())
     errors = [np.bincount(trial, np.abs(each - usual)) for each in (of_ticks, of_rises)]
     clocks = [f"trial {number}" for number in np.flatnonzero(errors[1] < errors[0] / 2)]
-    if _NAMED <= len(clocks) < 0.8 * len(np.unique(trial)):
+    if found := _NAMED <= len(clocks) < 0.8 * len(np.unique(trial)):
         warn(f"{source}, {clocks[0]}: times rise from goal to goal, {needed}{also(clocks)}")
+    return found
+
+
+def _changed(odd: NDArray[np.bool_], trial: Array) -> tuple[NDArray[np.bool_], str]:
+    """Return a mask of the hits ``(n,)`` of trials in a row, or before and after them, that are odd
+    more often than others, and these trials in words. It is empty where the range of the sum of
+    deviations from the mean (Kuiper's statistic) is, as by chance, less than 2.6 √n SD."""
+    part, number = np.zeros(len(odd), dtype=bool), np.arange(len(odd))
+    sums = np.cumsum(odd) - (number + 1) * (odd.sum() / max(len(odd), 1))
+    if len(odd) >= MANY and np.ptp(sums) > 2.6 * np.sqrt(len(odd)) * odd.std():
+        first, last = sorted([sums.argmin(), sums.argmax()])
+        part = (number > first) & (number <= last)
+        if odd[part].mean() < odd[~part].mean():
+            part = ~part
+    edges = np.flatnonzero(np.diff(part, prepend=False, append=False)).reshape(-1, 2)
+    ends = [[f"{trial[begin]:g}", f"{trial[end - 1]:g}"] for begin, end in edges]
+    return part, f"in trials {' and '.join(' to '.join(dict.fromkeys(each)) for each in ends)}"
 
 
 def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
@@ -646,89 +656,138 @@ def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
 
 
 def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
-    """Return in words a change of a recording (degrees to rad, another sign, swapped columns, ...)
-    that puts over 80 % of the hits in mask ``far`` within two radii of their goals; empty if no
-    change does, or if there are fewer than three such hits."""
+    """Return in words a change of a recording (degrees to rad, other axes, swapped columns, ...)
+    that puts over 80 % of an arm's hits in mask ``far``, three or more at several goals, as close
+    to goals as 95 % of the others are, at least within two radii; empty if no change does."""
     joints, hands = [*task.robot.joint_names], frame.hand
     q, column = frame[joints].to_numpy(np.float64), np.arange(len(joints))
     arms = [task.robot.joints(hand) for hand in task.hands]
-    is_base, between, mirrored = column < 2, q.copy(), -q
+    is_base, is_first, between = column < 2, np.isin(column, [arm.start for arm in arms]), q.copy()
     for arm in arms:
         between[:, arm] = np.diff(q[:, arm], axis=1, prepend=0.0)
-        mirrored[:, arm.start] += np.pi
-    tried = [
-        ("in which degrees are made rad", np.where(is_base, q, np.deg2rad(q)), hands),
-        ("in which turns are made rad", np.where(is_base, q, 2 * np.pi * q), hands),
-        ("in which angles are anticlockwise", np.where(is_base, q, -q), hands),
-        ("in which angles are from the link before, not from the x axis", between, hands),
-        ("that is mirrored", mirrored, hands),
-        ("with each posture a row lower", np.roll(q, 1, axis=0), hands),
-        ("with each posture a row higher", np.roll(q, -1, axis=0), hands),
-        ("in which hands are swapped", q, hands.map({"left": "right", "right": "left"})),
-    ][: 7 + (len(arms) == 2)]
-    for unit in (10.0, 100.0, 1000.0):
-        tried.append(
-            (f"in which the base is divided by {unit:g}", q / np.where(is_base, unit, 1), hands)
-        )
+    forms = {"": (q, 0.0), "a straight joint has angle 0, not π": (q, np.pi),
+             "angles are from the link before, not from the x axis": (between, 0.0)}  # fmt: skip
+    tried = []
+    for unit, form, axes, moves in product(_ANGLES, forms, AXES, (False, True)):
+        (recorded, straight), (sign, quarters) = forms[form], AXES[axes]
+        angles = sign * (_ANGLES[unit] * recorded - np.where(is_first, 0.0, straight))
+        angles += is_first * quarters * np.pi / 2
+        angles[:, :2] = turned(q[:, :2], axes) if moves else q[:, :2]
+        tried.append((f"in which {', '.join(filter(None, [unit, form, axes]))}", angles))
+    del tried[:2]  # nothing is changed
+    for words, shift in (("lower", 1), ("higher", -1)):
+        rolled = np.roll(q, shift, axis=0)
+        tried += [(f"with each posture a row {words}", rolled),
+                  (f"with all angles a row {words}", np.where(is_base, q, rolled))]  # fmt: skip
+    for unit in (10, 100, 1000):
+        tried.append((f"in which the base is divided by {unit}", q / np.where(is_base, unit, 1)))
     for k, name in enumerate(joints):
-        tried.append((f"with the other sign of {name}", np.where(column == k, -q, q), hands))
-    if len({arm.stop - arm.start for arm in arms}) == 1 and len(arms) == 2:
-        order = np.concatenate([column[:2], column[arms[1]], column[arms[0]]])
-        tried.append(("in which the columns of the arms are swapped", q[:, order], hands))
+        tried.append((f"with the other sign of {name}", np.where(column == k, -q, q)))
+        for last, words in ((k, ""), (k + 1, ", and back in the next joint")) if k > 1 else ():
+            turn = np.pi * ((column == k) | (column == last))
+            tried.append((f"with a turn by π of {name} (arctan2, not arctan){words}", q + turn))
     for arm in arms:
-        columns_of_arm = column[arm].tolist()
-        orders = (
-            permutations(columns_of_arm) if len(columns_of_arm) <= 4 else [columns_of_arm[::-1]]
-        )
-        for each in orders:
-            order = column.copy()
-            order[arm] = each
+        few = arm.stop - arm.start <= 4
+        for each in permutations(column[arm].tolist()) if few else [column[arm].tolist()[::-1]]:
+            order = [*column[: arm.start], *each, *column[arm.stop :]]
             names = ", ".join(joints[k] for k in each)
-            tried.append((f"with columns in the order {names}", q[:, order], hands))
-    goals = task.goal_array[frame.goal.to_numpy(np.int64) - 1]
-    if far.sum() < 3:
-        return ""
-    shares = []
-    for _, postures, whose in tried:
-        off = np.linalg.norm(_hand_places(postures, whose, task) - goals, axis=1)
-        shares.append(float((off[far] <= 2 * task.radius).mean()))
-    best = int(np.argmax(shares))
-    return tried[best][0] if shares[best] > 0.8 else ""
-
-
-def _warn_of_places(frame: pd.DataFrame, task: Task, source: str) -> None:
-    """Warn if three of four hits are close to the centres of their goals, and of a goal with a much
-    larger share of hits outside of it than other goals have."""
-    q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
-    places = _hand_places(q, frame.hand, task)
-    ways = places - task.goal_array[goals - 1]
-    off = np.linalg.norm(ways, axis=1) / task.radius
-    if len(off) >= _MANY and (outer := float(np.quantile(off, 0.75))) < _CENTRAL:
-        warn(f"{source}: three of four hits are within {outer:.2g} radii of the centres of goals: "
-             "is the radius a diameter, or are postures those of rests after hits?")  # fmt: skip
-    for goal in np.unique(goals):
-        here = goals == goal
-        if min(here.sum(), (~here).sum()) < _MANY:
+            tried.append((f"with columns in the order {names}", q[:, order]))
+    if len({arm.stop - arm.start for arm in arms}) < len(arms):
+        order = [0, 1, *column[arms[1]], *column[arms[0]]]
+        tried.append(("in which the columns of the arms are swapped", q[:, order]))
+    swapped, other = "in which hands are swapped", hands.map({"left": "right", "right": "left"})
+    tried += [(swapped, q)] * (len(arms) == 2)
+    goals, fits = task.goal_array[frame.goal.to_numpy(np.int64) - 1], {}
+    off = np.linalg.norm(_hand_places(q, hands, task) - goals, axis=1) / task.radius
+    far = far & (off > 2)
+    usual = np.quantile(off[~far], 0.95) if (~far).sum() >= MANY else 2.0
+    most = float(np.clip(usual, _OUTSIDE, 2.0)) * task.radius
+    for hand in task.hands:
+        rows = np.flatnonzero(far & (hands == hand).to_numpy())
+        if len(rows) < 3 or len({*frame.goal[rows]}) < min(2, len(task.goals)):
             continue
-        share, others = ((off[rows] > _OUTSIDE).mean() for rows in (here, ~here))
-        if share > max(0.3, 2.5 * others):
+        shares = []
+        for words, postures in tried:
+            made_by = other if words == swapped else hands
+            ways = _hand_places(postures[rows], made_by.iloc[rows], task) - goals[rows]
+            shares.append((np.linalg.norm(ways, axis=1) <= most).mean())
+        if max(shares) > 0.8:
+            fits[hand] = tried[int(np.argmax(shares))][0]
+    if len({*fits.values()}) == 1 and len(fits) == len(task.hands):
+        return fits[task.hands[0]]
+    return " and ".join(f"{fits[hand]} (the {hand} arm)" for hand in fits)
+
+
+def _repeats(values: Array, edge: float) -> NDArray[np.bool_]:
+    """Return a mask of the rows whose k values, ``(n, k)``, in steps to which they are rounded, are
+    all less than ``edge`` away from 0; empty if chance could make as many, which makes over 2ᵏ
+    times as many rows within five times that distance."""
+    size: Array = np.abs(values).max(axis=1, initial=0.0)
+    exact = size < edge
+    near = int((size[~exact] < 5 * edge).sum())
+    return exact & bool(exact.sum() >= 3 + near / 2 ** values.shape[1])
+
+
+def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return a mask of the hits of a subject in which all angles of an arm, ``(n, joints)``, are
+    means of the hits around it, in the order of rows or of trials at one of the goals ``(n,)``."""
+    q, found = arm.round(9), np.zeros(len(arm), dtype=bool)
+    steps = np.array([np.diff(np.unique(angles)).min(initial=1.0) for angles in q.T])
+    for order in (np.arange(len(q)), np.argsort(goal, kind="stable")):
+        before, middle, after = order[:-2], order[1:-1], order[2:]
+        moved = (np.abs(q[after] - q[before]) > 10 * steps).any(axis=1) & (len(steps) > 1)
+        bends = (q[after] + q[before] - 2 * q[middle])[moved] / steps
+        found[middle[moved]] |= _repeats(bends, 1.6)
+    return found
+
+
+def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
+    """Return a sentence for trials of a subject's hand, or at a goal (such as those after a sensor
+    slips), and for each goal, with a much larger share of hits outside of goals than others."""
+    q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
+    places, trials = _hand_places(q, frame.hand, task), frame.trial.to_numpy(np.float64)
+    ways = places - task.goal_array[goals - 1]
+    out = np.linalg.norm(ways, axis=1) > _OUTSIDE * task.radius
+    sentences, rest = [], np.ones(len(out), dtype=bool)
+
+    def is_odd(here: NDArray[np.int64], others: NDArray[np.int64], name: str, cause: str) -> bool:
+        share, usual = out[here].mean(), out[others].mean()
+        if odd := bool(share > max(0.3, 2.5 * usual)):
+            sentences.append(
+                f"{100 * share:.0f} % of the hits of {name} are more than {_OUTSIDE:g} radii from "
+                f"the centre of the goal, of others {100 * usual:.0f} %. {cause}"
+            )
+        return odd
+
+    groups = {f"'s {hand} hand": (frame.hand == hand).to_numpy() for hand in task.hands}
+    groups |= {f" at goal {goal}": goals == goal for goal in np.unique(goals)}
+    cause = "Did a sensor drift or slip, change its scale, or was it zeroed again?"
+    for subject, (name, of_name) in product(frame.subject.unique(), groups.items()):
+        rows = np.flatnonzero((frame.subject == subject).to_numpy() & of_name & rest)
+        part, where = _changed(out[rows], trials[rows])
+        if part.any() and is_odd(rows[part], rows[~part], f"{subject}{name} {where}", cause):
+            rest[rows[part]] = False
+    for goal in np.unique(goals):
+        here, others = (np.flatnonzero(rest & each) for each in (goals == goal, goals != goal))
+        if min(len(here), len(others)) >= MANY:
             (x, y), (off_x, off_y) = places[here].mean(axis=0), ways[here].mean(axis=0)
-            warn(f"{source}: {100 * share:.0f} % of the hits of goal {goal} are more than "
-                 f"{_OUTSIDE:g} radii from its centre, of others {100 * others:.0f} %. Their mean "
-                 f"is ({x:.3g}, {y:.3g}), ({off_x:+.2g}, {off_y:+.2g}) from it: is the goal "
-                 "elsewhere?")  # fmt: skip
+            mean = f"Their mean is ({x:.3g}, {y:.3g}), ({off_x:+.2g}, {off_y:+.2g}) from it"
+            is_odd(here, others, f"goal {goal}", f"{mean}: is the goal elsewhere?")
+    return sentences
 
 
 def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> None:
     """Warn if an angle of an arm is rounded, or if many hits of a goal have one posture or one
     angle in common. ``hits`` are the hits of a subject with this arm, ``joints`` the columns of its
     angles; ``source`` begins the warning."""
-    if (postures := len(hits[joints].drop_duplicates())) < _MANY:
-        return
+    postures = len(hits[joints].drop_duplicates())
     for name in joints:
         angles = np.unique(hits[name])
         least = float(np.diff(angles).min(initial=np.inf))
-        if 2 < len(angles) < postures / 2 and least > _COARSE_ANGLE:
+        if len(angles) == 1 < len(joints) and len({*hits.goal}) > 1 and len(hits) >= 5:
+            warn(f"{source}: {name} is the same in all {len(hits)} hits: was it measured?")
+            return
+        if 2 < len(angles) < postures / 2 and postures >= MANY and least > 0.02:
             warn(f"{source}: {name} has {len(angles)} values, {least:.2g} rad apart or more: is it "
                  "rounded?")  # fmt: skip
             return
@@ -738,24 +797,46 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
             n = len(of_goal)
             most, second = [*of_goal.value_counts().tolist(), 0][:2]
             fewest = 3 if values is numbers else max(5, 0.1 * n)
-            is_odd = most >= max(fewest, 3 * second) and n - most >= 4
-            if is_odd and 2 * (of_goal.nunique() - 1) > n - most:
+            is_odd = most >= max(fewest, 3 * second) and n - most >= 4 and postures >= MANY
+            is_odd &= 2 * (of_goal.nunique() - 1) > n - most
+            if is_odd or most == n >= 5:
                 warn(f"{source}: {values.name} is the same in {most} of {n} hits of goal {goal:g}: "
-                     "is it filled in, out of range, or stuck?")  # fmt: skip
+                     "is it filled in, computed, out of range, or stuck?")  # fmt: skip
                 return
 
 
-def _warn_of_copies(frame: pd.DataFrame, source: str) -> None:
-    """Warn of trials that are equal in all columns but subject and trial, as if copied.
-
-    One such pair within a subject is enough; between subjects, where a chance is larger, it takes
-    at least three different trials that occur twice or more. ``source`` begins the warning.
-    """
-    hits = pd.util.hash_pandas_object(frame.drop(columns=["subject", "trial"]), index=False)
+def _copies(frame: pd.DataFrame) -> list[str]:
+    """Return a sentence for trials that are equal in all postures, as if copied (two of a subject,
+    or three that occur twice or more), and for equal times of consecutive hits, or of two trials at
+    all goals, that are more than almost equal times."""
+    postures = frame.drop(columns=["subject", "trial", "ticks"])
+    hits = pd.util.hash_pandas_object(postures, index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()
     copies = trials[trials.duplicated(keep=False)]
     if copies.nunique() >= 3 or copies.reset_index(name="sum").duplicated(["subject", "sum"]).any():
         first = [f"trial {trial:g} of {subject}" for subject, trial in
                  copies.index[copies == copies.iloc[-1]][:2]]  # fmt: skip
-        warn(f"{source}: {len(copies)} trials are equal to others in all numbers, such as "
-              f"{' and '.join(first)}. Is a recording there twice, or a trial copied?")  # fmt: skip
+        return [f"{len(copies)} trials are equal to others in all postures, such as "
+                f"{' and '.join(first)}. Is a recording there twice, or a trial copied?"
+        ]  # fmt: skip
+    words = []
+    for subject, of_subject in frame.groupby("subject", sort=False):
+        ticks, number = of_subject.ticks.to_numpy(np.float64), of_subject.trial.to_numpy()
+        if len(ticks) < MANY or len(each := np.unique(ticks)) < 3:
+            continue
+        unit, rises = np.diff(each).min(), np.diff(ticks)
+        if (runs := _repeats(np.stack([rises[1:], rises[:-1]], axis=1) / unit, 0.5)).any():
+            words.append(f"Consecutive hits of {subject} have equal times, first in trial "
+                         f"{number[runs.argmax()]:g}: are they a mean, or filled in?")  # fmt: skip
+        table = of_subject.pivot_table(index="trial", columns="goal", values="ticks").dropna()
+        times, n = table.to_numpy(), len(table)
+        pairs = [(np.arange(n - lag), np.arange(lag, n)) for lag in range(1, n)]
+        pairs.append(np.triu_indices(min(n, 1000), 1))  # larger ones would take long
+        fine = n > 2 < times.shape[1] and (times.std(axis=0) > unit).all()
+        for one, other in pairs if fine else ():
+            if (same := _repeats((times[other] - times[one]) / unit, 0.5)).any():
+                first, second = (table.index[each[same.argmax()]] for each in (one, other))
+                words.append(f"Trials {first:g} and {second:g} of {subject}, and others, have the "
+                             "same times at all goals: are they copied?")  # fmt: skip
+                break
+    return words

@@ -56,9 +56,14 @@ WRONG = {
     "angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
     "a line above already; number trials": lambda t: pd.concat([t, t]),
     "line 2: ticks is .*column duration": lambda t: t.assign(ticks=t.ticks / 100),
-    "less than a tick": lambda t: t.assign(duration=t.ticks / 1000).drop(columns="ticks"),
+    "duration is 0.0; needed is more than 0": lambda t: t.assign(duration=0.0).drop(
+        columns="ticks"
+    ),
+    "median hit takes 0.0.* Are times in": lambda t: t.assign(duration=t.ticks / 1000).drop(
+        columns="ticks"
+    ),
     "base_x is 1e\\+300": put("base_x", 0, 1e300),
-    "line 2: left_2 is inf": put("left_2", 0, np.inf),
+    "line 2: left_2 is '?inf": put("left_2", 0, np.inf),
     "left_2 is '?True'?; needed is a number": put("left_2", 0, np.True_),
     "no column subject.*found are who, trial": lambda t: t.rename(columns={"subject": "who"}),
 }
@@ -177,6 +182,15 @@ TIMES = {
     "b: all times are multiples of 150 ticks, .* or constant": lambda ticks: 0 * ticks + 150,
     "b: in every trial times rise .* clock that runs on": np.cumsum,
     r"b: the median hit takes .*ms \(ticks_per_unit=0.1\)": lambda ticks: 1000 * ticks + 7,
+    "b: 16 of 40 hits, first goal 1 in trial 7, take .* Do units differ, ms there and s else": (
+        lambda ticks: ticks * np.repeat([1, 1000], [24, 16])
+    ),
+    "b: 25 of 40 hits, .* s there and min elsewhere.$": lambda ticks: (
+        ticks * np.repeat([1, 60], [15, 25]) / 60
+    ),
+    "Do units differ, ms there and s elsewhere, or was a point between thousands": lambda ticks: (
+        1000 * ticks.where(ticks < ticks.median(), ticks / 1000)
+    ),
 }
 
 
@@ -190,8 +204,20 @@ def test_times_of_a_person_that_are_none_are_refused(people, read, sentence):
 
 
 ODD_TIMES = {
+    "times hardly follow the paths .* or were they sorted": lambda t: t.ticks.sort_values().array,
+    "times hardly follow the paths of hits .*another person": lambda t: (
+        t.ticks.sample(frac=1, random_state=1).array
+    ),
+    "a quarter .* faster .* Most are in trials 6 to 10: are these another person's": lambda t: (
+        t.ticks * np.where(t.trial > 5, 0.4, 1)
+    ),
+    "a quarter .* faster .* Most are hits of goal 4: does a counter overflow": lambda t: (
+        t.ticks * np.where(t.goal == 4, 0.3, 1)
+    ),
     "goal 1 takes .* is a reaction time in it": lambda t: t.ticks + 400 * (t.goal == 1),
-    "times fit the hits of the row .* do they belong to other rows": lambda t: np.roll(t.ticks, 1),
+    "times hardly follow .* with the row above or below.: do they belong to other rows": lambda t: (
+        np.roll(t.ticks, 1)
+    ),
 }
 
 
@@ -230,6 +256,18 @@ def filled(t):
     return t.assign(**{name: t[name].mask(every, first[name]) for name in ARM_AND_BASE})
 
 
+def times_of(trials, copies):
+    """A change: some trials have the times of others."""
+    number = dict(zip(copies, trials, strict=True))
+
+    def change(t):
+        times = t.set_index(["trial", "goal"]).ticks
+        keys = zip(t.trial.replace(number), t.goal, strict=True)
+        return t.assign(ticks=[times[key] for key in keys])
+
+    return change
+
+
 def elsewhere(task):
     """The second goal is lower by two radii."""
     one, (x, y), *others = task.goals
@@ -237,6 +275,9 @@ def elsewhere(task):
 
 
 SHOWN = {
+    "% of the hits of a at goal 1 in trials 21 to 40 .* Did a sensor .*zeroed again": lambda t: (
+        t.assign(base_x=t.base_x - 0.06 * ((t.trial > 20) & (t.goal == 1)))
+    ),
     r"row 0: rows of the trial are in no order of goals.*also row 3, .*35 more": in_order(1, 3, 2),
     r"a: right_1 has \d values, 0.1 rad apart or more: is it rounded": angles(
         lambda x: (10 * x).round() / 10
@@ -252,6 +293,24 @@ SHOWN = {
         t.assign(ticks=t.ticks.where(t.trial < 25, t.groupby("trial").ticks.cumsum()))
     ),
     r"% of the hits of goal 2 are more than 1.25 radii .* is the goal elsewhere": elsewhere,
+    "% of the hits of a's right hand in trials (1[5-9]|2[0-4]) to 40 .* sensor drift": (
+        lambda t: t.assign(right_2=t.right_2 + 0.05 * t.trial / 40)
+    ),
+    "% of the hits of a's right hand in trials 25 to 40 .* Did a sensor .*slip": lambda t: t.assign(
+        right_2=t.right_2 + 0.06 * (t.trial >= 25)
+    ),
+    "a: right_3 is the same in all 120 hits: was it measured": lambda t: t.assign(
+        right_3=t.right_3.median()
+    ),
+    "a: the posture is the same in 40 of 40 hits of goal 2: is it filled in, computed": lambda t: (
+        t.assign(
+            **t[ARM_AND_BASE].where(t.goal != 2, t.groupby("goal")[ARM_AND_BASE].transform("last"))
+        )
+    ),
+    "Trials 5 and 20 of a, and others, have the same times at all goals": times_of(
+        range(5, 15), range(20, 30)
+    ),
+    "Trials 3 and 7 of a, and others, have the same times": times_of([3] * 5, [7, 15, 22, 30, 33]),
     "three of four hits are within 0.4. radii .* a diameter": lambda task: task.model_copy(
         update={"radius": 2 * task.radius}
     ),
@@ -268,6 +327,11 @@ def test_values_that_no_recording_has_by_chance_are_said(practised, sentence):
     assert len(said) == 1
 
 
+def turned(t, arm, sign, first):
+    """A change: angles have a sign, and the first angle of an arm is from another line."""
+    return t.assign(**sign * t[arm]).assign(**{arm[0]: first + sign * t[arm[0]]})
+
+
 REMEDIES = {
     "with each posture a row lower": lambda t: t.assign(**t[ARM_AND_BASE].shift(-1).ffill()),
     "with the other sign of right_2": lambda t: t.assign(right_2=-t.right_2),
@@ -275,6 +339,21 @@ REMEDIES = {
         **dict(zip(RIGHT_ARM, t[RIGHT_ARM[::-1]].to_numpy().T, strict=True))
     ),
     "in which turns are made rad": angles(lambda x: x / (2 * np.pi)),
+    "in which gradians are made rad": angles(lambda x: np.degrees(x) / 0.9),
+    "in which degrees are made rad, axes are turned by 90 degrees": lambda t: t.assign(
+        **np.degrees(turned(t, RIGHT_ARM, 1, -np.pi / 2)[RIGHT_ARM])
+    ),
+    "in which axes are turned by 180 degrees": lambda t: turned(t, RIGHT_ARM, 1, -np.pi),
+    "in which x is the other way, as if mirrored": lambda t: turned(t, RIGHT_ARM, -1, np.pi),
+    "in which x and y are swapped": lambda t: turned(t, RIGHT_ARM, -1, np.pi / 2),
+    "with a turn by π of right_2 .arctan2, not arctan": lambda t: t.assign(
+        right_2=t.right_2 - np.pi * (t.goal > 1)
+    ),
+    "with a turn by π of right_1 .arctan2, not arctan., and back in the next": lambda t: t.assign(
+        right_1=t.right_1 + np.pi, right_2=t.right_2 - np.pi
+    ),
+    "in which a straight joint has angle 0, not π": angles(lambda x: np.pi + x),
+    "with all angles a row lower": lambda t: t.assign(**t[RIGHT_ARM].shift(-1).ffill()),
 }
 
 
@@ -282,6 +361,79 @@ REMEDIES = {
 def test_the_change_that_mends_most_hits_is_named(practised, remedy):
     with pytest.raises(CoarticError, match=f"would be at their goals in a recording {remedy}"):
         checked_hits(REMEDIES[remedy](practised), ONE_ARM)
+
+
+LEFT_ARM = [f"left_{joint}" for joint in (1, 2, 3, 4)]
+
+
+def arms_exchanged(t):
+    """The columns of the arms are swapped in some trials."""
+    both = t[LEFT_ARM + RIGHT_ARM]
+    other = pd.DataFrame(t[RIGHT_ARM + LEFT_ARM].to_numpy(), columns=both.columns)
+    return t.assign(**both.where(~t.trial.between(4, 6), other))
+
+
+OF_ARMS = {
+    "x is the other way, as if mirrored .the left arm": lambda t: turned(t, LEFT_ARM, -1, np.pi),
+    "angles are anticlockwise, .* .the left arm": lambda t: t.assign(**-t[LEFT_ARM]),
+    "gradians are made rad .the left arm": lambda t: t.assign(**np.degrees(t[LEFT_ARM]) / 0.9),
+    "all angles a row higher .the left arm": lambda t: t.assign(**t[LEFT_ARM].shift(1).bfill()),
+    "all angles a row lower .the right arm": lambda t: t.assign(**t[RIGHT_ARM].shift(-1).ffill()),
+    "which the columns of the arms are swapped": arms_exchanged,
+    "the start: is it of the next trial": lambda t: t.assign(
+        **{name: t[name].mask(t.goal == 4, TASK.q0[n]) for n, name in enumerate(ARM_AND_BASE)}
+    ),
+}
+
+
+@pytest.mark.parametrize("cause", OF_ARMS)
+def test_a_fault_of_one_arm_or_of_some_trials_is_named(people, cause):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of times in what is left
+        with pytest.raises(CoarticError, match=cause):
+            checked_hits(OF_ARMS[cause](people), TASK)
+
+
+def test_an_arm_that_is_never_used_is_no_fault():
+    one_hand = TASK.model_copy(update={"hands": ("right",)})
+    hits = reference.hits_of(one_hand, CONDITIONS["EC1"], trials=8, seed=1, subject="a")
+    assert len(checked_hits(hits, TASK)) == 32
+
+
+def means(t, rows, step):
+    """Postures of some rows are the means of the rows ``step`` above and below."""
+    u = t.copy()
+    for row in rows:
+        u.loc[row, ARM_AND_BASE] = (t.loc[row - step, ARM_AND_BASE] + t.loc[row + step]) / 2
+    return u
+
+
+NOT_MEASURED = {
+    "row 15: the angles of the arm are means of the hits around it.* row 31": lambda t: means(
+        t, [15, 31, 50, 82], step=3
+    ),
+    "row 31: the angles of the arm are means .*row 52": lambda t: means(t, [31, 52, 77], step=1),
+    "Consecutive hits of a have equal times, first in trial 5": lambda t: t.assign(
+        ticks=t.ticks.mask(
+            t.trial.isin([5, 9, 20]), t.groupby("trial").ticks.transform("mean").round()
+        )
+    ),
+    "Consecutive hits of a have equal times, first in trial 14": lambda t: t.assign(
+        ticks=t.ticks.mask(t.index.isin(range(40, 47)), 60)
+    ),
+    "of the hits of a's right hand in trials (19|20) to (27|28) .* change its scale": lambda t: (
+        t.assign(right_1=t.right_1 * np.where(t.trial.between(20, 27), 1.2, 1))
+    ),
+    "% of the hits of a's right hand in trials 25 to 40 .* sensor .*slip": lambda t: t.assign(
+        right_2=t.right_2 + 0.2 * (t.trial >= 25)
+    ),
+}
+
+
+@pytest.mark.parametrize("cause", NOT_MEASURED)
+def test_a_refusal_names_values_that_are_filled_in_or_change_at_a_trial(practised, cause):
+    with pytest.raises(CoarticError, match=cause):
+        checked_hits(NOT_MEASURED[cause](practised), ONE_ARM)
 
 
 @pytest.mark.parametrize("decimals", [6, 3])
@@ -315,11 +467,12 @@ OF_UNITS = {
     "Are times in ms .ticks_per_unit=0.1": ("duration", 1e3, 100.0),
     "Are times in s .ticks_per_unit=100": ("duration", 2.0, None),
     "Are times in min .ticks_per_unit=6000": ("duration", 1 / 60, 100.0),
-    "line 2: duration is 0.6; it is less than a tick with 1 ticks per unit": (
+    "median hit takes .* with 1 ticks per unit.* Are times in s .ticks_per_unit=100": (
         "duration",
         1,
         None,
     ),
+    "with 1 ticks per unit.* Are times in min .ticks_per_unit=6000": ("duration", 1 / 60, None),
 }
 
 
@@ -384,6 +537,14 @@ def test_two_spellings_of_a_name_are_one_and_said(people, read):
     with pytest.warns(UserWarning, match="differ in capitals alone: A, a"):
         read(people.assign(subject=people.subject.map({"a": "a", "b": "A"})))
     assert read(one).subject.unique().tolist() == ["Jos\u00e9 K", "p-1"]
+
+
+def test_values_that_repeat_are_said_also_where_hits_are_refused(practised):
+    with (
+        pytest.raises(CoarticError, match="row 60: the hand is"),
+        pytest.warns(UserWarning, match="the posture is the same in 14 of 40 hits of goal 2"),
+    ):
+        checked_hits(put("right_2", 60, 1.5)(filled(practised)), ONE_ARM)
 
 
 def test_the_first_five_of_a_kind_are_named_and_the_others_counted(people, read):

@@ -182,6 +182,29 @@ WRONG = {
 }
 
 
+def placed(change):
+    """A change of the x and y of all markers."""
+
+    def changed(t):
+        xs, ys = ([name for name in t if name.endswith(f"_{axis}")] for axis in "xy")
+        x, y = change(t[xs].to_numpy(), t[ys].to_numpy())
+        return t.assign(**dict(zip(xs + ys, np.hstack([x, y]).T, strict=True)))
+
+    return changed
+
+
+WRONG |= {
+    "They are finished in a recording in which angles are anticlockwise, as y is upwards": placed(
+        lambda x, y: (x, -y)
+    ),
+    "They are finished in a recording in which axes are turned by 90 degrees": placed(
+        lambda x, y: (y, -x)
+    ),
+    "They are finished in a recording in which x and y are swapped": placed(lambda x, y: (y, x)),
+    "They are finished in a recording in which x is the other way": placed(lambda x, y: (-x, y)),
+}
+
+
 def from_trial_3(column, change):
     """A change of columns of the second session, trials 3 and 4."""
 
@@ -259,7 +282,7 @@ def test_a_recording_that_is_wrong_is_refused(sentence):
 
 def noisy(t, share=0.001, seed=0):
     """Places with noise, as a share of the length of the arm."""
-    noise = share * 0.69 * np.random.default_rng(seed).standard_normal((len(t), 8))
+    noise = share * 0.69 * np.random.default_rng(seed).standard_normal((len(t), t.shape[1] - 3))
     return t.assign(**dict(zip(t.columns[3:], (t.iloc[:, 3:] + noise).to_numpy().T, strict=True)))
 
 
@@ -354,6 +377,22 @@ def test_what_counts_as_movement_or_is_cut_from_it_is_said(sentence):
         assert len(hits_from_markers(SAID[sentence](noisy(recorded(RIGHT))), RIGHT)) == 16
 
 
+@pytest.mark.parametrize("order", [(2, 1, 3, 4), (4, 3, 2, 1)])
+def test_goals_in_another_order_are_named(order):
+    goals = tuple(RIGHT.goals[k - 1] for k in order)
+    markers = recorded(RIGHT.model_copy(update={"goals": goals}))
+    words = f"finished in a recording with goals in the order {', '.join(map(str, order))}"
+    with pytest.raises(CoarticError, match=words):
+        hits_from_markers(markers, RIGHT)
+
+
+def test_a_second_hit_of_a_goal_that_the_tip_does_not_leave_is_said():
+    first, *others = RIGHT.goals
+    task = RIGHT.model_copy(update={"goals": (first, first, *others), "initial_hands": "R" * 5})
+    with pytest.warns(UserWarning, match="the hand is in the next goal already where it hits"):
+        assert len(hits_from_markers(recorded(RIGHT), task)) == 20
+
+
 def test_starts_far_in_varied_directions_are_said():
     parts = []
     for trial, sign in enumerate([1, -1, 1, -1, -1, 1], 1):
@@ -385,6 +424,23 @@ def test_arms_that_contradict_each_other_or_the_task_are_refused():
     assert base[1] - base[0] == pytest.approx(0.02, abs=0.01)
     with pytest.raises(CoarticError, match="side is 'left', but task 'metres' has the right hand"):
         hits_from_markers(markers, RIGHT, "left")
+
+
+def late_left(t):
+    """The places of the left arm are of 120 ms before, with noise of cameras."""
+    left = [name for name in t if name.startswith("left")]
+    late = t.groupby("trial")[left].shift(12)
+    rest = t.groupby("trial")[left].transform("first")
+    return t.assign(**late.fillna(rest))
+
+
+def test_an_arm_whose_system_lags_behind_is_said():
+    reached = {"goals": ((0.5, 3.5), (-0.5, 3.4)), "initial_hands": "RR"}
+    task = BOTH.model_copy(update={"locked_base": ("x", "y"), **reached})
+    markers = recorded(task, trials=40)
+    assert len(hits_from_markers(noisy(markers), task, "both")) == 80
+    with pytest.warns(UserWarning, match="the left arm rests for at least 1[0-4]0 ms more than"):
+        hits_from_markers(noisy(late_left(markers)), task, "both")
 
 
 def test_unfinished_trials_are_named_and_counted():

@@ -3,6 +3,7 @@
 import math
 import re
 import sys
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -126,10 +127,12 @@ def test_degenerate_trials_are_left_out_with_the_reason(people):
         "take 2000 ticks, as by a met": people.assign(ticks=495 + 2 * people.goal),
     }
     every = pd.concat([of.assign(subject=why) for why, of in degenerate.items()])
-    with pytest.warns(UserWarning, match="is left out: ") as warned:
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")  # also of trials that are copied
         assert not len(FIT.fit(every, TASK))
-    for why, warning in zip(degenerate, warned, strict=True):
-        assert str(warning.message).count(why) == 2  # as the subject's name, and as the reason
+    left_out = [words for each in said if "is left out: " in (words := str(each.message))]
+    for why, words in zip(degenerate, left_out, strict=True):
+        assert words.count(why) == 2  # as the subject's name, and as the reason
 
 
 def test_what_cannot_be_fitted_is_refused(people):
