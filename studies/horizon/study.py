@@ -81,8 +81,9 @@ def tabulate(study, plans):
 def tabulate_movements(gains):
     """Tabulate the gain of the last goal in view, in per cent of a movement that has it ahead, over
     all tasks that have it, by number of goals, and over tasks with five goals or more."""
-    h = gains.h[(gains.h > 0) & (gains.h <= 4)]
-    gains = gains.loc[h.index].assign(gain=100 * gains.gain * gains.goals / (gains.goals - h))
+    h = gains.h[(gains.h > 0) & (gains.h <= 4)].astype(int)
+    gain = 100 * gains.gain * gains.goals / (gains.goals - h)
+    gains = gains.loc[h.index].assign(h=h, gain=gain)
     count = gains.goals.map(lambda goals: str(goals) if goals <= 5 else "6 or more")
     many = gains[gains.goals >= 5].assign(goals="5 or more")
     parts = [gains.assign(goals="all"), gains.assign(goals=count), many]
