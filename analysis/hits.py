@@ -139,7 +139,7 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
         kind = "in UTF-16, as Excel and Notepad write 'Unicode'" if wide else "not in UTF-8"
         kind = f"damaged from byte {content.find(0)} on" if len(text) > 1 and not wide else kind
         raise CoarticError(f"{path} is {kind}: save it as CSV in UTF-8")
-    frame, lines = _table(path, text)
+    frame, lines = _plain_table(text) or _odd_table(path, text)
     again = np.flatnonzero(frame.iloc[:, :1] == frame.columns[:1]).tolist()
     if again:
         others = also([lines[row] for row in again])
@@ -147,10 +147,37 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
     return frame, lines
 
 
-def _table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return frame and names of rows as :func:`read_table`. Raises CoarticError for another
-    separator, a row with another number of values than the headings, and a repeated heading. Warns
-    of rows that are left out because they begin with #."""
+def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
+    """Return frame and names of rows as :func:`read_table`, by a fast parser; None for a text with
+    quotes, comments, blank lines, rows that differ in length, or empty, equal or single
+    headings."""
+    head, _, body = text.replace("\r\n", "\n").removesuffix("\n").partition("\n")
+    headings, rows = [*map(_written, head.split(","))], body.count("\n") + 1
+    if (
+        any(odd in text for odd in '"#')
+        or "\r" in body
+        or not all(headings)
+        or not 1 < len({*headings}) == len(headings)
+        or body.count(",") != rows * (len(headings) - 1)
+    ):
+        return None
+    try:
+        frame = pd.read_csv(
+            io.StringIO(body), names=headings, dtype={"subject": str, "hand": str}, na_values=[""],
+            keep_default_na=False, skipinitialspace=True, low_memory=False,
+        )  # fmt: skip
+    except ValueError:  # of rows with more values
+        return None
+    if len(frame) != rows or frame.isna().all(axis=1).any():
+        return None
+    return frame, [f"line {row}" for row in range(2, rows + 2)]
+
+
+def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
+    """Return frame and names of rows as :func:`read_table`, by a parser that goes line by line, at
+    a fifth of the speed. Raises CoarticError for another separator, a row with another number of
+    values than the headings, and a repeated heading. Warns of rows that are left out because they
+    begin with #."""
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
     rows, lines, wrong, hidden = [], [], [], []

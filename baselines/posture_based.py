@@ -298,9 +298,9 @@ def _linearise_far(
     ys: Any,
 ) -> int:
     """Keep at the beginning of ``far``, indices of rows of ``postures``, the indices of postures
-    whose hand is farther than ``tolerance`` from (x, y); return their number. For each fill a row of ``wanted``,
-    the hand's step towards (x, y), shortened, and of ``jacobian``, the columns of the arm's joints.
-    ``xs`` and ``ys`` are space for the points of an arm."""
+    whose hand is farther than ``tolerance`` from (x, y); return their number. For each fill a row
+    of ``wanted``, the hand's step towards (x, y), shortened, and of ``jacobian``, the columns of
+    the arm's joints. ``xs`` and ``ys`` are space for the points of an arm."""
     tip = len(arm.links)
     left = 0
     for row in far:  # with the C library's cosine and sine, as in the robot's own kinematics
