@@ -21,11 +21,13 @@ import logging
 import math
 import multiprocessing
 import os
+import shutil
 import signal
 import sys
 import tempfile
 import threading
 import time
+import weakref
 from collections import defaultdict, deque
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -104,14 +106,16 @@ class Workers:
 
     def __init__(self, local: Local, *, stays: bool = False) -> None:
         self.local, self.stays = local, stays
-        self.folder = tempfile.TemporaryDirectory(prefix="coartic-", ignore_cleanup_errors=True)
+        self.folder = tempfile.mkdtemp(prefix="coartic-")
+        # Removed in silence also where an interrupted command drops its workers.
+        self._remove = weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
         self._idle: Worker | None = None
 
     def close(self) -> None:
         """End the worker that waits for jobs, if there is one, and remove the folder of answers."""
         if self._idle is not None:
             self._idle.end()
-        self.folder.cleanup()
+        self._remove()
 
     def perform(
         self, jobs: Sequence[Job], *, in_order: bool = False
@@ -157,7 +161,7 @@ class Workers:
                     worker.end()
                     if not worker.jobs:
                         continue
-                    room = Path(self.folder.name, "room")  # without room an answer can be lost
+                    room = Path(self.folder, "room")  # without room an answer can be lost
                     room.write_bytes(bytes(_ROOM))
                     room.unlink()
                     job = worker.jobs[0]
@@ -198,7 +202,7 @@ class Workers:
             if waits.method == method:
                 return waits
             waits.end()
-        return Worker(self.folder.name, method, self.local)
+        return Worker(self.folder, method, self.local)
 
 
 class Worker:

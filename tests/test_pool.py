@@ -13,7 +13,7 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.pool import Local
+from coartic.benchmarks.pool import Local, Workers
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
 from coartic.runs.store import writing
@@ -405,3 +405,12 @@ def test_workers_end_with_their_parent(script):
         assert process.poll() is None
     process.kill()
     assert comes(lambda: not folders_of_session(process.pid))
+
+
+def test_workers_that_are_dropped_leave_no_folder():
+    """As where a command is interrupted. A warning would fail the test."""
+    workers = Workers(Local(1))
+    folder = Path(workers.folder)
+    assert folder.is_dir()
+    del workers
+    assert not folder.exists()
