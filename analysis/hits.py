@@ -438,7 +438,7 @@ def checked_hits(
     if reasons:
         warn(f"{source}: {len(reasons)} of {counted(counts.sum(), 'hit')} are left out as "
              f"implausible, {reasons[0]}{also(reasons)}")  # fmt: skip
-    for words in _odd_groups(frame, task) + _copies(frame):
+    for words in _odd_groups(frame, task) + _cut_trials(frame, last) + _copies(frame):
         warn(f"{source}: {words}")
     if mixed:
         warn(f"{source}, {mixed[0]}: rows of the trial are in no order of goals, up or down; times "
@@ -830,6 +830,26 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
                 warn(f"{source}: {values.name} is the same in {most} of {n} hits of goal {goal:g}: "
                      "is it filled in, computed, out of range, or stuck?")  # fmt: skip
                 return
+
+
+def _cut_trials(frame: pd.DataFrame, goals: int) -> list[str]:
+    """Return a sentence for two or more trials that end where the next trial begins, in the order
+    of all ``goals``, if half of the trials that lack hits do."""
+    numbers = frame.groupby(["subject", "trial"]).goal.agg(["min", "max", "count"])
+    one, other = numbers[:-1], numbers[1:]
+    trials = one.index.get_level_values("trial").to_numpy()
+    follows = (one.index.get_level_values(0) == other.index.get_level_values(0)) & (
+        other.index.get_level_values("trial") == trials + 1
+    )
+    lacks = (numbers["max"] - numbers["min"] + 1 == numbers["count"]).to_numpy()
+    cut = follows & lacks[:-1] & lacks[1:] & (one["min"] == 1).to_numpy()
+    cut &= (other["min"].to_numpy() == one["max"].to_numpy() + 1) & (
+        other["max"] == goals
+    ).to_numpy()
+    if cut.sum() < 2 or 4 * cut.sum() < (numbers["count"] < goals).sum():
+        return []
+    return [f"{cut.sum()} trials end where the next one begins, first trial {trials[cut][0]:g}: "
+            "are trials cut in two, and later ones numbered on?"]  # fmt: skip
 
 
 def _copies(frame: pd.DataFrame) -> list[str]:

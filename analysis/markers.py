@@ -221,7 +221,7 @@ def hits_from_markers(
         for link in range(len(links)):
             culprit[jumped[:, link] & (missing_for == 0)] = f"{hand}_{link + 1}: "
             agree(f"the length of {hand} link {link + 1}", each[:, link], 0.1, np.inf,
-                  _TOLERANCE / 2 * links[link], "did a marker move?")  # fmt: skip
+                  _TOLERANCE / 4 * links[link], "did a marker move, or the scale?")  # fmt: skip
     shoulders = {hand: np.array(task.robot.arm(hand)[2:]) for hand in hands}
     bases = [places[hand][:, 0] - shoulders[hand] for hand in hands]
     apart = np.linalg.norm(np.ptp(bases, axis=0), axis=1)
@@ -301,6 +301,8 @@ def hits_from_markers(
             rows.append([people[0], trial[first], goal, hands[arm], round(ticks, 6), *posture])
             before = when
     lost = used & (missing_for > _LONGEST_GAP + 1e-9)
+    refuse(lost & leap, f"time jumps by more than {1000 * _LONGEST_GAP:.0f} ms: are samples "
+           "missing, or was the clock set? Fill the gap, or leave the trial out")  # fmt: skip
     refuse(lost, f"{culprit[lost.argmax()]}a marker is missing for more than "
            f"{1000 * _LONGEST_GAP:.0f} ms; fill the gap, or leave the trial out")  # fmt: skip
     swaps &= used
@@ -362,8 +364,8 @@ def hits_from_markers(
         for words in _stretches(lengths[hand][used], q[used, task.robot.joints(hand)])
     ]
     if stretched:
-        warn(f"{source}: the length of {stretched[0]}: does a marker slide over a joint?"
-             f"{also(stretched)}")  # fmt: skip
+        warn(f"{source}: the length of {stretched[0]}: does a marker slide over a joint, "
+             f"or is it late?{also(stretched)}")  # fmt: skip
     if absent := [hand for hand in task.hands if hand not in hands]:
         warn(f"{source}: the {absent[0]} arm has no markers and keeps its start")
     for words, samples in counted_in.items():
@@ -416,7 +418,7 @@ def _odd_steps(ways: Array, least: float) -> str:
 
 def _stretches(lengths: Array, angles: Array) -> list[str]:
     """Return in words each link whose length, ``(n, links)``, follows the angle, rad, of a joint
-    at one of its ends (except the first joint of the arm), and by how much."""
+    at one of its ends (except the first joint of the arm), or varies by over 5 %."""
     changes = []
     for link, length in enumerate(lengths.T):
         for joint in range(max(link, 1), min(link + 2, angles.shape[1])):
@@ -428,6 +430,10 @@ def _stretches(lengths: Array, angles: Array) -> list[str]:
                 changes.append(f"link {link + 1} follows joint {joint + 1}, by {100 * share:.1g} %"
                                " (SD)")  # fmt: skip
                 break
+        else:
+            slow = length.std() > 2 * np.diff(length).std()  # unlike noise
+            if slow and (share := length.std() / length.mean()) > 0.05:
+                changes.append(f"link {link + 1} varies by {100 * share:.0f} % (SD)")
     return changes
 
 

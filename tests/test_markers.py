@@ -158,7 +158,7 @@ def scaled(factor):
 WRONG = {
     "row 40: right_2: a marker is missing for more than 50 ms": lose(6),
     "row 0: right_2: a marker is missing": lose(8, first=0),
-    "row 46: a marker is missing": lambda t: t.drop(index=range(40, 46)),
+    "row 46: time jumps by more than 50 ms": lambda t: t.drop(index=range(40, 46)),
     "row 50: right_.: the length of a link jumps.*swap": swap(50, 60),
     "row 0: in trial 1 the links.*0.09. Markers 2 and 3 may be swapped": swap(0, 10**4 // 40),
     "row 50: .*the length of a link .*flag": lose(1, first=50, value=9999.0),
@@ -361,7 +361,14 @@ def soft(t):
                     right_2_y=t.right_2_y + slides.map(np.imag))  # fmt: skip
 
 
+def late(t):
+    """The tip is sampled 50 ms later than the other markers."""
+    return t.assign(right_tip_x=t.right_tip_x.shift(5).bfill(),
+                    right_tip_y=t.right_tip_y.shift(5).bfill())  # fmt: skip
+
+
 SAID |= {
+    r"the length of right link 3 varies by 1\d % .SD.: .*or is it late": each_trial(late),
     "most samples have the places of the one before": each_trial(twice),
     "right_._. is rounded to 0.003, the radius of goals is 0.01": lambda t: t.assign(
         **(t.iloc[:, 3:] / 0.003).round() * 0.003
@@ -375,6 +382,17 @@ SAID |= {
 def test_what_counts_as_movement_or_is_cut_from_it_is_said(sentence):
     with pytest.warns(UserWarning, match=sentence):
         assert len(hits_from_markers(SAID[sentence](noisy(recorded(RIGHT))), RIGHT)) == 16
+
+
+def test_a_scale_that_changes_by_three_per_cent_is_said():
+    markers = recorded(RIGHT)
+    places = markers.columns[3:]
+    larger = markers.assign(**markers[places].where(markers.trial < 3, 1.03 * markers[places]))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        hits_from_markers(larger, RIGHT)
+    words = "link 1 is 0.34 in trial 3, but 0.33 in trial 1; did a marker move, or the scale?"
+    assert words in str(said[0].message)
 
 
 @pytest.mark.parametrize("order", [(2, 1, 3, 4), (4, 3, 2, 1)])
