@@ -452,6 +452,15 @@ SENTENCES = {
     "ranking: a run of an own method failed": lambda: study(
         LEARNER | {("ascending", "mine"): [-490, None], ("two-armed-1", "mine"): [-490, -491]}
     ),
+    "ranking: methods between those that are named": lambda: study(
+        LEARNER
+        | CMA
+        | {
+            (task, method): [cost + better for cost in costs]
+            for (task, _), costs in CMA.items()
+            for better, method in ((-2, "cma-es/goal-by-goal"), (-4, "hill-climbing"))
+        }
+    ),
     "cost: the learner and CMA-ES": lambda: study(LEARNER | CMA),
 }
 GOLDEN = (ROOT / "tests" / "golden.md").read_text("utf-8")

@@ -66,14 +66,18 @@ if next.p_holm >= 0 else ", too few runs to test" }}.
 {% else %}
 {% set complete = rows[rows.missing == 0].dropna(subset=["gap"]) %}
 {% for use in uses %}
-{% for row in leading(complete[complete.information == use]) %}
+{% set of_use = complete[complete.information == use] %}
+{% for row in leading(of_use) %}
+{% set place = of_use.method.tolist().index(row.method) + 1 %}
 {% if loop.first %}
 {{ use | capitalize }}{{ ", not with equal trials" if use in unequal }}, {{ row.title }} leaves \
 {{ "a" if loop.last else "the smallest" }} gap to the {{ reference }}\
 {{ " of" if loop.last else "," }} \
 {% else %}
 {{ row.title }} leaves {% endif %}
-{{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
+{{ interval(row, "gap", scale=100, unit=" %") }}\
+{{ " (place %d of %d)" % (place, of_use | length) if place > loop.index }}\
+{{ "." if loop.last else "; " }}
 {%- endfor %}
 
 {% endfor %}

@@ -131,7 +131,7 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
     pairs += [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)
-    unlike = [f"{counted(what['few'], 'run')}, not {RUNS}"] * bool(what["few"])
+    unlike = [f"{counted(what['few'], 'run')} of a task, not {RUNS}"] * bool(what["few"])
     unlike += [f"{number(n)} trials a run, not {number(TRIALS)}" for n in what["trials"]]
     if unlike:
         pairs.append(("Unlike the paper", "; ".join(unlike)))

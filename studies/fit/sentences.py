@@ -53,7 +53,7 @@ def sentence(row):
         doubts += ["Motor noise is more than half of σ"] * bool(row.noise > row.sigma / 2)
         doubt = f" {'. '.join(doubts)}: intervals can be too narrow, and the model wrong."
         held = (
-            " Such profile intervals held the true σ and κ of {:.0f} and {:.0f} % of {:d} "
+            " Such 95 % profile intervals held the true σ and κ of {:.0f} and {:.0f} % of {:d} "
             "simulated people{}.".format(*coverage(row))
         )
         return f"{text}. {', '.join(numbers)}.{held}{doubt if doubts else ''}"
