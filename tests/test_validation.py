@@ -590,6 +590,7 @@ def test_only_findings_are_joined(wrong):
             lambda: learn(TASK, "EC1", seed=10**5000, trials=1),
             "seed is a value of type int; it must",
         ),
+        (lambda: analysis.number(np.timedelta64(3)), "value is '3 generic time units'; it should"),
         (lambda: judge(), "judge: claims is missing"),
         (lambda: analysis.all_of(), "one finding at least"),
         (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),

@@ -50,6 +50,8 @@ def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Co
 
 
 def plain_scalar(value: Any) -> Any:
-    """Return a NumPy scalar as a Python scalar; return any other value itself, a NumPy span of time
-    (``timedelta64``) among them."""
-    return value.item() if isinstance(value, np.generic) and not is_span(value) else value
+    """Return a NumPy scalar as a Python scalar, a span of time (``timedelta64``), which passes for
+    a number if it has no unit, as a text, and any other value itself."""
+    if is_span(value):
+        return str(value)
+    return value.item() if isinstance(value, np.generic) else value
