@@ -490,8 +490,10 @@ def test_a_value_that_no_run_can_have(copied, tmp_path, change):
         "cells SET trial_budget = 5",
         "environments SET content = json_set(content, '$.packages', 1)",
         "environments SET content = 'x'",
-        "movements SET path = path || hex(zeroblob(3000000))",
-        "movements SET path = path || hex(zeroblob(26000000))",
+        *(
+            f"movements SET path = path || hex(zeroblob({size})) WHERE result_id = 1 AND goal = 1"
+            for size in (3_000_000, 26_000_000)
+        ),
         "results SET environment = 99",
         "suite SET name = NULL",
         "suite SET date = NULL",
