@@ -160,6 +160,7 @@ LACKING = pd.DataFrame({"best_known": [-292]})
               for by in (["method", "method"], ["reward"], ["rows"], ["reward_low"])),
         )),
         ("trials has 0.0 in row 0", frames.ecdf, {"trials": [0, 9]}, ([0.1],)),
+        ("trials has True in row 0", frames.ecdf, {"trials": [True, 9]}, ([0.1],)),
         ("trials has nan in row 0", frames.ecdf, {"trials": [np.nan, 9]}, ([0.1],)),
         ("run has nan in row 1", frames.ecdf, {"run": [0, None]}, ([0.1],)),
         *(("targets are", frames.ecdf, {}, (gaps,))
