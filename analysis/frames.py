@@ -84,8 +84,9 @@ def checked(
     for name in numbers:
         kind = infer_dtype(columns[name], skipna=True)
         if kind not in ("integer", "floating", "mixed-integer-float", "empty"):
-            is_number = columns[name].map(lambda value: isinstance(value, (int, float)))
-            is_number &= ~columns[name].map(lambda value: isinstance(value, bool))
+            is_number = columns[name].map(
+                lambda value: isinstance(value, (int, float)) and not isinstance(value, bool)
+            )
             _refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
         try:
             columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)

@@ -833,23 +833,21 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
 
 
 def _cut_trials(frame: pd.DataFrame, goals: int) -> list[str]:
-    """Return a sentence for two or more trials that end where the next trial begins, in the order
-    of all ``goals``, if half of the trials that lack hits do."""
-    numbers = frame.groupby(["subject", "trial"]).goal.agg(["min", "max", "count"])
-    one, other = numbers[:-1], numbers[1:]
-    trials = one.index.get_level_values("trial").to_numpy()
-    follows = (one.index.get_level_values(0) == other.index.get_level_values(0)) & (
-        other.index.get_level_values("trial") == trials + 1
-    )
-    lacks = (numbers["max"] - numbers["min"] + 1 == numbers["count"]).to_numpy()
-    cut = follows & lacks[:-1] & lacks[1:] & (one["min"] == 1).to_numpy()
-    cut &= (other["min"].to_numpy() == one["max"].to_numpy() + 1) & (
-        other["max"] == goals
-    ).to_numpy()
-    if cut.sum() < 2 or 4 * cut.sum() < (numbers["count"] < goals).sum():
-        return []
-    return [f"{cut.sum()} trials end where the next one begins, first trial {trials[cut][0]:g}: "
-            "are trials cut in two, and later ones numbered on?"]  # fmt: skip
+    """Return a sentence for each subject of whom two or more trials end where the next trial
+    begins, in the order of all ``goals``, if half of the trials that lack hits do."""
+    sentences = []
+    for subject, of_subject in frame.groupby("subject", sort=False):
+        trials = of_subject.groupby("trial", as_index=False).goal.agg(["min", "max", "count"])
+        trials["gapless"] = trials["max"] - trials["min"] + 1 == trials["count"]
+        after = trials.shift(-1)
+        cut = trials.gapless & trials.gapless.shift(-1, fill_value=False) & (trials["min"] == 1)
+        cut &= (after.trial == trials.trial + 1) & (after["min"] == trials["max"] + 1)
+        cut &= after["max"] == goals
+        if cut.sum() >= max(2, (trials["count"] < goals).sum() / 4):
+            first = trials.trial[cut].iloc[0]
+            sentences.append(f"{cut.sum()} trials of {subject} end where the next one begins, "
+                             f"first trial {first:g}: are trials cut in two?")  # fmt: skip
+    return sentences
 
 
 def _copies(frame: pd.DataFrame) -> list[str]:

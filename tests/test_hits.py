@@ -281,7 +281,7 @@ def cut(t):
 
 
 SHOWN = {
-    "3 trials end where the next one begins, first trial 5: are trials cut in two": cut,
+    "3 trials of a end where the next one begins, first trial 5: are trials cut in two": cut,
     "% of the hits of a at goal 1 in trials 21 to 40 .* Did a sensor .*zeroed again": lambda t: (
         t.assign(base_x=t.base_x - 0.06 * ((t.trial > 20) & (t.goal == 1)))
     ),
