@@ -187,9 +187,12 @@ def measure(folder):
     runs, others, shifts, named = (pd.read_csv(Path(folder) / f"{name}.csv")
                                    for name in ("runs", "others", "shifts", "named"))  # fmt: skip
     is_first = ~others.family.isin(FAMILIES) | (others.task.str[-3:] < "010")
-    runs = measure_runs(pd.concat([runs, others[is_first]], ignore_index=True))
+    stored = pd.concat([runs, others[is_first]], ignore_index=True)
+    runs, moved = measure_runs(stored), shifts.set_index("task")
     shifts = measure_shifts(shifts)
     return {
+        "runs": stored.set_index("task").sort_index(kind="stable"),
+        "moved": moved.sort_index(kind="stable"),
         "results": tabulate(runs),
         "named": named.sort_values("task", kind="stable").set_index("row"),
         "claims": judge_claims(runs),

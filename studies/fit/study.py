@@ -158,7 +158,9 @@ def draw(table):
 def measure(folder):
     """Return the tables by name; each becomes a CSV file."""
     people = measure_people(pd.read_csv(Path(folder) / "recovery.csv"))
+    by = ["task", "trials", "data", "repeat", "person"]
     return {
+        "runs": people.sort_values(by).set_index("task"),
         "results": tabulate(people), "confusion": confuse(people),
         "answers": answer(people), "outliers": outliers(people),
         "people": scatter(people).reset_index(drop=True),
