@@ -10,7 +10,7 @@ class CoarticError(Exception):
 
 
 class TaskError(CoarticError):
-    """A task or a family of tasks, or its name or file, that cannot be used."""
+    """A task or a family of tasks that is missing or cannot be used."""
 
 
 class SolutionError(CoarticError):

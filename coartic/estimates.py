@@ -101,16 +101,16 @@ def varies(values: Array) -> Array:
 
 
 def centred(values: Array) -> Array:
-    """Return values less their mean over the first axis; 0 where :func:`varies` is False: without
-    spread, or with NaN or infinity."""
+    """Return values less their mean over the first axis; 0 without spread (:func:`varies`) and with
+    NaN or infinity."""
     return np.where(varies(values), values - np.mean(values, axis=0), 0.0)
 
 
 @checked_arguments
 def mean(values: Numbers, *, resamples: Resamples = RESAMPLES) -> Estimate:
     """Return the mean of a sample ``(n,)`` with its 95 % bootstrap interval
-    (:func:`mean_of_means`), which needs three values. Raises ValueError for a sample that is empty
-    or not finite."""
+    (:func:`mean_of_means`), NaN for fewer than three values. Raises ValueError for a sample that is
+    empty or not finite."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
 
 
@@ -124,8 +124,8 @@ def difference_of_means(
     first: Numbers, second: Numbers, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
-    and ``(m,)``, with its 95 % bootstrap interval (:func:`mean_of_means`), which needs three values
-    in each sample. Raises ValueError for a sample that is empty or not finite."""
+    and ``(m,)``, with its 95 % bootstrap interval (:func:`mean_of_means`), NaN for fewer than three
+    values in a sample. Raises ValueError for a sample that is empty or not finite."""
     return mean_of_means([first, second], [1.0, -1.0], resamples)
 
 

@@ -307,7 +307,7 @@ class Robot:
         derivatives, SX expressions of ``dof`` entries.
 
         Written out, because CasADi's third derivatives make Hessians of twice as many operations.
-        Raises ValueError for an unknown hand, and if ``q`` has not four entries.
+        Raises ValueError for an unknown hand.
         """
         import casadi
 

@@ -16,7 +16,7 @@ from coartic.tasks.task import Task, shipped_tasks
 
 FOLDER = Path(__file__).parent
 UP_OR_DOWN = ("ascending", "descending")
-"""Tasks that share the start and the first goal: with them the page begins."""
+"""Tasks that share start and first goal: with them the page begins by default."""
 
 
 def play_page(task: Task | None = None) -> str:
