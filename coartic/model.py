@@ -22,9 +22,9 @@ class MotionModel(NamedTuple):
     as much as a rad of a joint (published); the last step may be shorter."""
 
     arrival_tolerance: float | None = None
-    """θ^a: a hand has arrived at this distance from where its target puts it, length unit; None for
-    a tenth of the goals' radius, 0.01 in the paper's tasks (inferred; the extracted text has 0.1,
-    which does not give the published rewards)."""
+    """θ^a: a hand has arrived within this distance of where its target puts it, length unit; None
+    for a tenth of the goals' radius, 0.01 in the paper's tasks (inferred; the extracted text has
+    0.1, which does not give the published rewards)."""
 
     gain: float = 0.05
     """α: step size of the corrective process, ``q += α Jᵀ e`` (published). For the base it has no

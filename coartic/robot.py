@@ -66,9 +66,9 @@ class Arm(NamedTuple):
 def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
     """Fill ``xs`` and ``ys``, in place, with x and y of an arm's shoulder, joints and hand.
 
-    Length unit. Entry 0 is the shoulder, entry ``n`` (the number of links) the hand. ``q`` is one
-    configuration or several, shape ``(dof, ...)``, of numbers or symbols; ``cos`` and ``sin`` fit
-    their type. Source: Craig (2004).
+    In length unit. Entry 0 is the shoulder, entry ``n`` (the number of links) the hand. ``q`` is
+    one configuration or several, shape ``(dof, ...)``, of numbers or symbols; ``cos`` and ``sin``
+    fit their type. Source: Craig (2004).
     """
     x = q[0] + arm.shoulder_x
     y = q[1] + arm.shoulder_y
@@ -86,9 +86,9 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
 def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     """Return the derivatives of x and of y of point ``tip`` of an arm by the angle of ``joint``.
 
-    In length unit per rad: a column of the geometric Jacobian. ``joint`` and ``tip``, which is not
-    nearer to the shoulder, are indices in ``xs`` and ``ys``, x and y of shoulder (0), joints and
-    hand (:func:`chain`). A rotation about a joint moves the tip at right angles to the line between
+    In length unit per rad: a column of the geometric Jacobian. ``joint`` and ``tip`` (``joint <=
+    tip``) are indices in ``xs`` and ``ys``, x and y of shoulder (0), joints and hand
+    (:func:`chain`). A rotation about a joint moves the tip at right angles to the line between
     them.
     """
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
@@ -167,7 +167,7 @@ class Robot:
         return arms
 
     def arm(self, hand: Hand) -> Arm:
-        """Return the :class:`Arm` of a hand: its first joint, its links and its shoulder. Raises
+        """Return the :class:`Arm` of a hand: index of its first joint, links and shoulder. Raises
         ValueError for an unknown hand."""
         try:
             return self._arms[hand]

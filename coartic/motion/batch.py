@@ -267,8 +267,8 @@ def winding(q: Any, slot: int) -> float:
 @inner
 def are_near(at: SlotArrays, count: int) -> bool:
     """Return whether the angle from +x of every link in the first ``count`` columns of ``at``, and
-    in columns that pad them (:func:`padded_count`), is certain to be below 1e5 rad, the range of
-    the fast cosine (:func:`winding`)."""
+    in columns that pad them (:func:`padded_count`), is certain to be below 1e5 rad
+    (:func:`winding`)."""
     far = 0
     for i in range(padded_count(count)):
         far += 0 if winding(at.q, i) < LARGEST else 1

@@ -309,8 +309,8 @@ def _log_once(message: str) -> None:
 class _MachineCode:
     """Machine code of a function on disk, as Numba's dispatchers ask for it.
 
-    Of processes that lack the same code one compiles the code and the others wait, at most 120 s.
-    Code that is damaged, such as by a full disk, or cannot be kept is compiled again.
+    Of processes that lack the same code one compiles the code and the others wait, at most 120 s,
+    if files can be locked. Code that is damaged or cannot be kept is compiled again.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:

@@ -358,9 +358,9 @@ def descend(
     at: SlotArrays, count: int, robot: RobotRecord, runs: Any, pull: Any
 ) -> tuple[int, bool]:
     """Make an iteration of the corrective process **A** in each of the first ``count`` columns of
-    ``at`` that goes on, in place, with ``pull`` as in :func:`descend_to_goals`; its status becomes
-    stuck if nothing changes. Return how many columns have ended, and whether all link angles are
-    then certain to be below 1e5 rad."""
+    ``at`` that goes on, in place, with ``pull`` as in :func:`descend_to_goals`; the status of a
+    column that it does not change becomes stuck. Return how many columns have ended, and whether
+    all link angles are then certain to be below 1e5 rad."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -433,8 +433,8 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
 
 @inner
 def project(v: Any, x: Any, y: Any) -> None:
-    """Project joint changes ``v``, in place, onto the null space of the Jacobian with rows ``x``,
-    ``y``.
+    """Project ``v``, a change of base and joints, in place, onto the null space of a Jacobian with
+    rows ``x`` and ``y``.
 
     v −= J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺; ``v``, ``x`` and ``y`` have shape ``(n,)``. A singular value
     of at most a millionth of the larger counts as 0.
@@ -614,7 +614,7 @@ def follow(
     *,
     model: MotionModel = PAPER,
 ) -> MoveResult:
-    """Move from ``q`` in steps along a path through ``waypoints``, shape ``(W, dof)``
+    """Move from ``q`` in steps along a path through W > 0 ``waypoints``, ``(W, dof)``
     (:func:`path_points`), to the first point with the hand within ``radius``, length unit, of the
     goal's centre, or to the last waypoint; k steps take k + 1 ticks. Raises ValueError for a wrong
     shape, an unknown hand, and a figure that is not finite or out of bounds."""
@@ -640,7 +640,7 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
-    """Return the points of the n steps of a path from ``q`` straight through ``waypoints``, shape
+    """Return the points of the n steps of a path from ``q`` straight through W > 0 ``waypoints``,
     ``(W, dof)``, in joint space, as an array ``(n + 1, dof)``, length unit and rad. Point k < n
     lies k times ``model.step`` along the path; point n is the last waypoint. Raises ValueError for
     a wrong shape or a figure that is not finite or beyond 100,000."""

@@ -97,7 +97,7 @@ class Execution:
     ticks: int
     """Control ticks spent in all."""
     corrections: int
-    """Corrective movements made, without movements of 0 ticks."""
+    """Corrective movements made, of a tick or more."""
     iterations: int = 0
     """Iterations of the corrective process, one Jacobian each."""
     evaluations: int = 0

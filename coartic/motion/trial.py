@@ -155,7 +155,7 @@ def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Move each of the first ``count`` runs of a batch for which **A** converged, in place, towards
     its ``target``, the configuration that **A** found. The movement ends as soon as the hand is in
-    the goal, mostly before the target."""
+    the goal, or at the target."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -165,7 +165,7 @@ def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
 def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
     """Write the result of a run for its goal into the record ``goal``, in place: phase 5,
     *account*. ``moved``: ticks of the run's movements to targets. If the run missed its goal, its
-    trial ends; its count of evaluations becomes 0."""
+    trial ends. The run's count of evaluations becomes 0."""
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
     goal.ticks = moved + run.ticks
@@ -206,8 +206,7 @@ def _move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> N
 def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
     """Have the corrective process **A**, kernel ``descend``, find a ``target`` that hits the goal
     for each of the first ``count`` runs of ``batch`` that missed it, whose trial goes on and that
-    may be corrected. ``converged`` is True where **A** did, else False; ``ticks`` become 0. No run
-    moves."""
+    may be corrected. ``converged`` is True where **A** did, else False; ``ticks`` become 0."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -360,8 +359,8 @@ def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Acco
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
-    """Let N arms reach for G goals each, in turn; an arm that misses a goal makes no further
-    movement. Return the accounts of N trials. ``parameters`` come from :func:`robot_parameters`.
+    """Let N arms reach for G goals each, in turn, and return their accounts; an arm that misses a
+    goal makes no further movement. ``parameters`` come from :func:`robot_parameters`.
 
     A trial with a target beyond :data:`LARGEST_ENTRY` fails without a movement; nothing else is
     checked. Many arms are shared among threads.
@@ -449,7 +448,7 @@ def reach_goals(
     Raises
     ------
     ValueError
-        A shape is wrong, a number that is no target is not finite or is out of bounds, a hand is
+        A shape is wrong, a number outside ``targets`` is not finite or out of bounds, a hand is
         neither 0 nor 1, or the model does not fit the radius. An arm with a target beyond 1e5 does
         not move or hit.
 
@@ -535,7 +534,7 @@ def count_trials(count: int) -> None:
 
 
 def trials_outside() -> int:
-    """Return the number of trials that this process has made outside the sessions of runs."""
+    """Return the number of trials that :func:`count_trials` has counted in this process."""
     return _outside
 
 
