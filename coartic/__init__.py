@@ -1,7 +1,7 @@
 """coartic: computational motor control, from one kinematic robot to scored solutions.
 
 The dual-process learner of Shah, Barto & Fagg (2013), *A Dual Process Account of
-Coarticulation in Motor Skill Acquisition*, and everything its alternatives share
+Coarticulation in Motor Skill Acquisition*, and everything that other methods share
 with it: robot, tasks, movement, corrective process, execution and scoring.
 """
 
@@ -98,6 +98,6 @@ _HOMES = {
     "pictures.trajectories": ("Trajectory", "trajectory"),
 }
 HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
-"""Module of each name of the API."""
+"""Module of each public name of ``coartic``, by name."""
 
 __getattr__, __dir__ = import_lazily(__name__, HOME)

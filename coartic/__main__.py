@@ -6,8 +6,8 @@ from coartic.internal.interruption import catch_signals, end_if_interrupted
 
 
 def main() -> None:
-    """Run the command that the command line asks for; after Ctrl-C or SIGTERM, clean up and exit
-    with code 130 or 143."""
+    """Run the command that the command line asks for; exit with code 130 after Ctrl-C, 143 after
+    SIGTERM or SIGHUP."""
     catch_signals()
     try:
         from coartic.cli import main as run_command

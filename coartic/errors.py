@@ -1,7 +1,7 @@
 """Errors meant for the person at the keyboard.
 
-Every message says what was wrong, where, and what would be right. The command
-line prints it as it stands and exits with code 2.
+Messages say what is wrong and, mostly, where and what would be right. A command that
+fails by such an error prints its message and exits with code 2.
 """
 
 
@@ -10,12 +10,12 @@ class CoarticError(Exception):
 
 
 class TaskError(CoarticError):
-    """A task file or task definition that cannot be used."""
+    """A task or a family of tasks that is missing or cannot be used."""
 
 
 class SolutionError(CoarticError):
-    """A solution that breaks the rules of its task."""
+    """A solution that cannot be used, mostly because it breaks the rules of its task."""
 
 
 class NotApplicableError(CoarticError):
-    """A method, a condition or a search for hands does not apply to a task."""
+    """A method, a condition or a search for hands cannot be used for a task or first solution."""

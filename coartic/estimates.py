@@ -1,7 +1,7 @@
 """Estimates with their intervals: means and differences.
 
 Samples are rewards (or any score) of independent runs. Intervals are of the BCa bootstrap, except
-in the cases that :func:`mean_of_means` names. All resampling has the same seed, :data:`SEED`.
+in the cases that :func:`mean_of_means` names. All resampling here has the same seed, :data:`SEED`.
 
 Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
@@ -24,9 +24,9 @@ from coartic.internal.limits import real_array
 from coartic.robot import Array
 
 CONFIDENCE = 0.95
-"""Nominal coverage of every interval."""
+"""Nominal coverage of intervals."""
 TAILS = (1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2
-"""Quantiles at the ends of such an interval."""
+"""Quantiles at the ends of such intervals."""
 LEVEL = 0.05
 """Level of a test."""
 Resamples = Annotated[int, Field(ge=1, le=10_000_000)]
@@ -34,30 +34,30 @@ Resamples = Annotated[int, Field(ge=1, le=10_000_000)]
 RESAMPLES = 9_999
 """Number of resamples unless stated otherwise: 0.05 and 0.01 of 9,999 + 1 are whole numbers."""
 SEED = 0
-"""Seed of every resampling."""
+"""Seed of resampling."""
 FEWEST = 3
-"""Least number of values for a bootstrap interval."""
+"""Least number of values in each sample for a bootstrap interval."""
 FEWER_RESAMPLES = 1_999
 """Number of resamples for intervals of many values and over instances, which take long."""
 LARGE = 500
-"""Beyond so many values an interval is the percentiles of at most :data:`FEWER_RESAMPLES`: BCa
-corrects next to nothing there."""
+"""Size of a sample beyond which an interval is the percentiles of at most :data:`FEWER_RESAMPLES`
+resamples: BCa corrects next to nothing there."""
 HUGE = 50_000
-"""Beyond so many values an interval is the interval of a normal distribution."""
+"""Size of a sample beyond which an interval is of a normal distribution."""
 IN_CACHE = 1 << 18
-"""Values that are drawn at once: few enough for the processor's cache."""
+"""Number of values that are drawn at once: few enough for the processor's cache."""
 NEGLIGIBLE = 1e-9
-"""Values that differ by less than this share of their size do not differ: it is rounding."""
+"""Share of the largest value up to which a difference of values counts as rounding."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its interval and p-value, NaN where there is none."""
+    """Estimated number with its interval and p-value, which are NaN where they are not computed."""
 
     value: float
     """The mean, the difference or another number that is estimated."""
     low: float = math.nan
-    """Lower end of the interval, of coverage :data:`CONFIDENCE`."""
+    """Lower end of the interval, mostly of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
     """Upper end of the interval."""
     p: float = math.nan
@@ -65,19 +65,20 @@ class Estimate:
     n: tuple[int, ...] = ()
     """Number of values in each sample."""
     resamples: int = 0
-    """Number of resamples in which p was counted; 0 for an exact test."""
+    """Number of resamples in which p was counted; 0 for an exact test or none."""
     least_p: float = math.nan
     """Smallest p that the test can give for so many values: above 5 % it cannot reject."""
 
     def columns(self, name: str) -> dict[str, float]:
-        """Return three entries of a table: ``name``, the value, and ``name_low`` and ``name_high``,
-        the ends of its interval."""
+        """Return three entries of a table's row: ``name``, the value, and ``name_low`` and
+        ``name_high``, the ends of its interval."""
         return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
 
 
 def vector(values: ArrayLike) -> Array:
-    """Return a sample as a float vector ``(n,)``. Raises ValueError if it is no vector or empty, or
-    holds NaN, masked values, or numbers that are neither 0 nor from 1e-100 to 1e100 in size."""
+    """Return a sample of real numbers as a float vector ``(n,)``. Raises ValueError if it is no
+    vector or empty, or holds NaN, masked values, or numbers that are neither 0 nor from 1e-100 to
+    1e100 in size."""
     sample = real_array("a sample", values)
     size = np.abs(sample)
     usable = (size <= 1e100) & ((size >= 1e-100) | (size == 0))
@@ -88,27 +89,28 @@ def vector(values: ArrayLike) -> Array:
 
 
 def slices(count: int, most: int) -> Iterator[slice]:
-    """Yield slices of at most ``most`` indices, which in their order cover 0 to ``count`` - 1."""
+    """Yield slices of at most ``most`` indices, which in this order cover 0 to ``count`` - 1."""
     for start in range(0, count, most):
         yield slice(start, min(start + most, count))
 
 
 def varies(values: Array) -> Array:
     """Return whether values differ along the first axis by more than rounding (:data:`NEGLIGIBLE`),
-    a bool for each entry of the other axes."""
+    a bool for each entry of the other axes; False with NaN or infinity."""
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
 
 def centred(values: Array) -> Array:
-    """Return values less their mean over the first axis; 0 where they do not differ
-    (:func:`varies`)."""
+    """Return values less their mean over the first axis; 0 without spread (:func:`varies`) and with
+    NaN or infinity."""
     return np.where(varies(values), values - np.mean(values, axis=0), 0.0)
 
 
 @checked_arguments
 def mean(values: Numbers, *, resamples: Resamples = RESAMPLES) -> Estimate:
-    """Return the mean of a sample ``(n,)`` with its 95 % BCa bootstrap interval, which needs three
-    values (:func:`mean_of_means`). Raises ValueError for a sample that is empty or not finite."""
+    """Return the mean of a sample ``(n,)`` with its 95 % bootstrap interval
+    (:func:`mean_of_means`), NaN for fewer than three values. Raises ValueError for a sample that is
+    empty or not finite."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
 
 
@@ -122,8 +124,8 @@ def difference_of_means(
     first: Numbers, second: Numbers, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
-    and ``(m,)``, with its 95 % BCa bootstrap interval, which needs three values in each. Raises
-    ValueError for a sample that is empty or not finite."""
+    and ``(m,)``, with its 95 % bootstrap interval (:func:`mean_of_means`), NaN for fewer than three
+    values in a sample. Raises ValueError for a sample that is empty or not finite."""
     return mean_of_means([first, second], [1.0, -1.0], resamples)
 
 
@@ -133,15 +135,14 @@ def mean_of_means(
     """Return the weighted sum of the means of independent samples, with its 95 % BCa interval.
 
     Samples have shapes ``(n,)``; ``weights`` has a factor for each. Each sample is resampled within
-    itself. Raises ValueError without a sample, and for a sample that is empty or not finite. The
-    edge cases:
+    itself. Raises ValueError without a sample, without a weight for each, and for a sample that is
+    empty or not finite. The edge cases, in this order:
 
     - a sample of fewer than :data:`FEWEST` values: no interval;
     - no spread in any sample: the interval is that point, which says that the samples have no
       spread, not that the populations have none;
-    - a sample of more than :data:`LARGE` values, or one for which BCa is not defined: the
-      percentile interval;
-    - a sample of more than :data:`HUGE` values: the normal interval.
+    - a sample of more than :data:`HUGE` values: the normal interval;
+    - a sample of more than :data:`LARGE` values, or BCa is not defined: the percentile interval.
     """
     if not samples:
         raise ValueError("needed is a sample at least")
@@ -182,8 +183,8 @@ def mean_of_means(
 
 
 def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
-    """Yield batches of at most 1,000 resamples, each a list with an array of indices of the values
-    drawn, shape ``(batch, size)``, for each of ``sizes``, the numbers of values in the samples.
+    """Yield batches of at most 1,000 resamples, each a list with an array for each of ``sizes``,
+    the numbers of values in the samples: the indices of the values drawn, shape ``(batch, size)``.
     Equal arguments give equal indices."""
     rng, batch = np.random.default_rng(SEED), 1_000
     if max(sizes) > LARGE:
@@ -194,12 +195,12 @@ def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int6
 
 @lru_cache(maxsize=8)  # most samples have as many values as another
 def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.uint16]]]:
-    """Return a list of all batches of :func:`drawn`, in a quarter of the memory. It is cached: do
-    not change it."""
+    """Return a list of all batches of :func:`drawn`, in a quarter of the memory. The list is
+    cached: do not change it."""
     return [[places.astype(np.uint16) for places in batch] for batch in drawn(sizes, resamples)]
 
 
 def standard_deviation(values: Array) -> float:
-    """Return the SD of values ``(n,)``, with n - 1 degrees of freedom; 0 without spread, NaN for
-    fewer than two values."""
+    """Return the SD of values ``(n,)``, with n - 1 degrees of freedom: NaN for fewer than two
+    values, else 0 without spread or with NaN or infinity."""
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan

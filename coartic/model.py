@@ -8,34 +8,34 @@ from coartic.internal.limits import brief_value, check_limits
 
 MODEL_VERSION = 1
 """Version of the code that all results come from: robot, movement, session, objective, optimisers,
-scoring. Raised with every change of results: runs of two versions are not compared."""
+scoring. It is raised with every change of results."""
 PAPER_RADIUS = 0.1
 """θ^g of the paper's tasks, length unit."""
 
 
 class MotionModel(NamedTuple):
-    """Constants of the paper's model, by default the paper's; docs/model.md says where each comes
-    from. ``MotionModel(gain=0.1)`` has another gain, as has ``PAPER._replace(gain=0.1)``."""
+    """Constants of the paper's model; docs/model.md says where each default comes from.
+    ``MotionModel(gain=0.1)`` has another gain, as has ``PAPER._replace(gain=0.1)``."""
 
     step: float = 0.01
-    """m: length of one movement step in joint space, in which a length unit of the base counts as
-    much as a rad of a joint (published)."""
+    """m: length of a step of a movement in joint space, in which a length unit of the base counts
+    as much as a rad of a joint (published); the last step may be shorter."""
 
     arrival_tolerance: float | None = None
-    """θ^a: distance at which a hand has arrived, length unit; None for a tenth of the goals'
-    radius, 0.01 in the paper's tasks (inferred; the extracted text has 0.1, which does not give the
-    published rewards)."""
+    """θ^a: a hand has arrived within this distance of where its target puts it, length unit; None
+    for a tenth of the goals' radius, 0.01 in the paper's tasks (inferred; the extracted text has
+    0.1, which does not give the published rewards)."""
 
     gain: float = 0.05
     """α: step size of the corrective process, ``q += α Jᵀ e`` (published). For the base it has no
-    unit; for the joints it is rad per squared length unit, which cancels the unit of ``Jᵀ e``."""
+    unit; for the joints its unit is rad² per squared length unit."""
 
     correction_tolerance: float | None = None
     """Distance to the goal's centre at which the corrective process ends, length unit; None for a
     tenth of the goals' radius (inferred to be θ^a; the caption of Figure 2 has θ^g)."""
 
     max_iterations: int = 20_000
-    """Corrective iterations after which a trial has failed (our bound)."""
+    """Corrective iterations for a goal after which the trial has failed (our bound)."""
 
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
         """Return a copy of the model for goals of ``radius``, length unit: a tolerance of None (of
@@ -65,8 +65,8 @@ _BOUNDS = {
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
     """Return the model itself. Raises TypeError if it is no MotionModel, and ValueError if one of
-    its constants is out of bounds or ``correction_tolerance`` is not below ``radius``, if given,
-    the radius of the goals, length unit."""
+    its constants is out of bounds or if ``radius``, the radius of the goals, length unit, is given
+    and ``correction_tolerance`` is not below it."""
     if not isinstance(model, MotionModel):
         raise TypeError(f"model is {brief_value(model)}; it must be a MotionModel")
     for name, (least, most) in _BOUNDS.items():

@@ -1,14 +1,13 @@
-"""The robot: the one kinematic module of the project.
+"""The robot and its kinematics.
 
 A planar, kinematic robot of a mobile base and two serial arms (paper, Figure 1).
 A configuration is the vector ``q = (base_x, base_y, left_1 .. left_n, right_1 ..
-right_n)``; lengths are in the model's length unit, angles in rad. Angles are
+right_m)``; lengths are in the model's length unit, angles in rad. Angles are
 relative: each joint is measured from the previous link, the first one from +x.
 
-The formulas stand once, in :func:`chain` and :func:`lever`, and are written so
-that one source serves three worlds: NumPy arrays (vectorised over leading axes),
-CasADi symbols, and the compiled kernels. The caller passes the cosine and sine of
-its world.
+The formulas of positions, in :func:`chain`, and of the Jacobian, in :func:`lever`, are
+written so that one source serves NumPy arrays, CasADi symbols and the compiled
+kernels. The caller of :func:`chain` passes a cosine and a sine for its type.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ Array = NDArray[np.float64]
 Configs = NDArray[np.float64]
 """Configurations, shape ``(..., dof)``: base x and y (length unit), then joint angles (rad)."""
 Points = NDArray[np.float64]
-"""Places, shape ``(..., 2)``: x and y, length unit."""
+"""Points in the plane, shape ``(..., 2)``: x and y, length unit."""
 Hands = NDArray[np.int64]
-"""Hands as places in :data:`HANDS`: 0 left, 1 right."""
+"""Hands as indices in :data:`HANDS`: 0 left, 1 right."""
 LARGEST_FIGURE = 1e4  # of a task or a robot, length unit or rad
 MOST_LINKS = 100  # of an arm
 Finite = Annotated[
@@ -67,9 +66,9 @@ class Arm(NamedTuple):
 def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
     """Fill ``xs`` and ``ys``, in place, with x and y of an arm's shoulder, joints and hand.
 
-    Entry 0 is the shoulder, entry ``n`` (the number of links) the hand. ``q`` is a configuration,
-    or several with the entry as first index, of numbers or symbols; ``cos`` and ``sin`` fit their
-    type. Source: Craig (2004).
+    In length unit. Entry 0 is the shoulder, entry ``n`` (the number of links) the hand. ``q`` is
+    one configuration or several, shape ``(dof, ...)``, of numbers or symbols; ``cos`` and ``sin``
+    fit their type. Source: Craig (2004).
     """
     x = q[0] + arm.shoulder_x
     y = q[1] + arm.shoulder_y
@@ -87,9 +86,10 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
 def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     """Return the derivatives of x and of y of point ``tip`` of an arm by the angle of ``joint``.
 
-    In length unit per rad: a column of the geometric Jacobian. ``tip`` and ``joint`` are indices
-    in ``xs`` and ``ys``, x and y of shoulder (0), joints and hand (:func:`chain`). A rotation about
-    a joint moves the tip at right angles to the line between them.
+    In length unit per rad: a column of the geometric Jacobian. ``joint`` and ``tip`` (``joint <=
+    tip``) are indices in ``xs`` and ``ys``, x and y of shoulder (0), joints and hand
+    (:func:`chain`). A rotation about a joint moves the tip at right angles to the line between
+    them.
     """
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
 
@@ -105,21 +105,21 @@ class Robot:
 
     A configuration ``q`` has shape ``(dof,)``: the base's x and y (length unit), the joint angles
     of the left arm and the joint angles of the right arm (rad, each from the link before). Methods
-    take one or many, shape ``(..., dof)``, and raise ValueError for a ``q`` of another shape or
-    that is not finite, and for a hand that is neither ``"left"`` nor ``"right"``.
+    for arrays take one or many, shape ``(..., dof)``, and raise ValueError for a ``q`` of another
+    shape or that is not finite, and for a hand that is neither ``"left"`` nor ``"right"``.
     """
 
     left_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
     """Lengths of the links of the left arm, from the shoulder outwards, length unit."""
     right_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
-    """Lengths of the links of the right arm."""
+    """Lengths of the links of the right arm, likewise."""
     left_shoulder: tuple[Finite, Finite] = (-0.5, 0.1)
     """Left shoulder, x and y from the centre of the base, length unit."""
     right_shoulder: tuple[Finite, Finite] = (0.5, 0.1)
-    """Right shoulder."""
+    """Right shoulder, likewise."""
     base_size: tuple[Length, Length] = (1.0, 0.2)
-    """Width and height of the base, for drawings only. The default is for arms of length 4 and is
-    drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
+    """Width and height of the base, length unit, for drawings only. The default is for arms of
+    length 4 and is drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
 
     def __repr__(self) -> str:
         links = {"left_links": self.left_links, "right_links": self.right_links}
@@ -167,7 +167,7 @@ class Robot:
         return arms
 
     def arm(self, hand: Hand) -> Arm:
-        """Return the :class:`Arm` of a hand: its first joint, its links and its shoulder. Raises
+        """Return the :class:`Arm` of a hand: index of its first joint, links and shoulder. Raises
         ValueError for an unknown hand."""
         try:
             return self._arms[hand]
@@ -302,9 +302,9 @@ class Robot:
         return casadi.vertcat(xs[-1], ys[-1])
 
     def symbolic_hand_jerk(self, q: Sequence[Any], hand: Hand) -> Any:
-        """Return the third time derivative of a hand's position as a CasADi expression, 2 x 1.
-        ``q`` lists the configuration and its first three time derivatives, CasADi expressions of
-        ``dof`` entries.
+        """Return the third time derivative of a hand's position as a CasADi expression (SX), 2 x 1,
+        length unit per cubed unit of time. ``q`` lists the configuration and its first three time
+        derivatives, SX expressions of ``dof`` entries.
 
         Written out, because CasADi's third derivatives make Hessians of twice as many operations.
         Raises ValueError for an unknown hand.
@@ -338,8 +338,8 @@ class Robot:
 
     @staticmethod
     def _hand(xs: list[Any], ys: list[Any], q: Array) -> Array:
-        """Return the last entries of ``xs`` and ``ys`` as an array ``(..., 2)``, by the shape of
-        ``q``, ``(..., dof)``."""
+        """Return positions of a hand, the last entries of ``xs`` and ``ys``, as an array ``(...,
+        2)`` for configurations ``q``, ``(..., dof)``."""
         position = np.empty((*q.shape[:-1], 2))
         position[..., 0], position[..., 1] = xs[-1], ys[-1]
         return position
@@ -347,7 +347,7 @@ class Robot:
 
 def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[Any]]:
     """Return two lists, x and y, length unit, of shoulder, joints and hand of an arm with n links
-    in ``q``, n + 1 entries each; ``cos`` and ``sin`` fit the type of ``q``."""
+    in ``q`` (:func:`chain`), n + 1 entries each; ``cos`` and ``sin`` fit the type of ``q``."""
     xs: list[Any] = [None] * (len(arm.links) + 1)
     ys = [*xs]
     chain(q, arm, xs, ys, cos, sin)

@@ -37,7 +37,8 @@ SlotArrays = Any
 
 def _links_for(robot: Robot) -> int:
     """Return the number of links per arm for which the kernels of a robot are compiled, so that
-    most robots share machine code: 4 or 8 if no arm has more, else the links of the longer arm."""
+    most robots share machine code: 4 or 8 if no arm has more links, else :attr:`Robot.most_links`.
+    """
     return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
 
 
@@ -113,20 +114,19 @@ class Batch(NamedTuple):
     """Runs side by side, and the slots in which their arms are moved and corrected."""
 
     runs: Any
-    """A record each, shape ``(N,)``."""
+    """Records of the N runs, shape ``(N,)``."""
     at: Any
     """The rows of the slots, by name (:func:`layout`): a record in an array of shape ``(1,)``."""
     corrected: Any
-    """The rows in ``at`` that a correction needs, in the same memory, shape ``(rows, SLOTS)``. Only
-    to be copied: some rows are integers."""
+    """The rows in ``at`` with all that a correction needs, in the same memory, shape ``(rows,
+    SLOTS)``. Only to be copied: some rows are integers."""
     moved: Any
-    """The rows in ``at`` that a movement needs, in the same memory, shape ``(rows, SLOTS)``. Only
-    to be copied: some rows are integers."""
+    """The rows in ``at`` with all that a movement needs, likewise."""
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
     """Return a new batch for kernels: ``count`` records of runs, with room for the links of
-    ``robot``, and the arrays of 72 slots (:data:`SLOTS`), all numbers 0. Each run needs a slot, so
+    ``robot``, and the arrays of 72 slots (:data:`SLOTS`), all entries 0. Each run needs a slot, so
     kernels take at most 72 runs."""
     width = width_of(robot)
     fields = {
@@ -156,8 +156,8 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
 @cache
 def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     """Return the NumPy type of :data:`SlotArrays` for arms with ``links`` links, and two slices of
-    its rows (a row has a number for each slot): the rows that a correction needs, and the rows that
-    a movement needs. Shorter arms end in links of length 0."""
+    its rows (a row has a number for each slot): rows with all that a correction needs, and rows
+    with all that a movement needs. Shorter arms end in links of length 0."""
     joints = (BASE_DOF + links,)
     shapes = {
         "q": joints,  # base x and y, then the joints of the arm
@@ -190,8 +190,8 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
 
 @inlined
 def _copy_arm(row: Any, slot: int, q: Any, arm: Arm) -> None:
-    """Copy base and joints of ``arm`` from configuration ``q``, shape ``(dof,)``, into column
-    ``slot`` of ``row``, shape ``(joints, slots)``, in place; further entries become 0."""
+    """Copy base and joints of ``arm`` from configuration ``q`` into column ``slot`` of ``row``,
+    shape ``(2 + links, slots)``, in place; entries of links that the arm lacks become 0."""
     row[0, slot] = q[0]
     row[1, slot] = q[1]
     for k in range(len(row) - BASE_DOF):
@@ -200,8 +200,8 @@ def _copy_arm(row: Any, slot: int, q: Any, arm: Arm) -> None:
 
 @inlined
 def load(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
-    """Copy goal, base and joints of ``run``, record ``number`` (from 0) of its batch, and shoulder
-    and links of its ``arm`` into column ``slot`` of the arrays ``at``, in place."""
+    """Copy ``number``, goal, base and joints of ``run``, record ``number`` (from 0) of its batch,
+    and shoulder and links of its ``arm`` into column ``slot`` of the arrays ``at``, in place."""
     at.run[slot], at.first[slot], at.links[slot] = number, arm.first, len(arm.links)
     at.shoulder[0, slot] = arm.shoulder_x
     at.shoulder[1, slot] = arm.shoulder_y
@@ -228,7 +228,7 @@ def start(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> N
 @inlined
 def store(at: SlotArrays, slot: int, q: Any) -> None:
     """Copy the base and the joints of the arm in column ``slot`` of ``at`` into configuration
-    ``q``, shape ``(dof,)``, in place; entries of the other arm stay."""
+    ``q``, in place; entries of the other arm stay."""
     q[0] = at.q[0, slot]
     q[1] = at.q[1, slot]
     for k in range(at.links[slot]):
@@ -247,7 +247,7 @@ def compact(rows: Any, slot: int, last: int) -> None:
 @inner
 def padded_count(count: int) -> int:
     """Return the number of slots to work on if ``count`` are in use: ``count`` itself for 0 and 1,
-    else ``count`` rounded up to whole vectors of 8 slots, the last of which may hold no run."""
+    else ``count`` rounded up to whole vectors of 8 slots, whose last slots may hold no run."""
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
@@ -266,8 +266,8 @@ def winding(q: Any, slot: int) -> float:
 
 @inner
 def are_near(at: SlotArrays, count: int) -> bool:
-    """Return True only if the angle from +x of every link in the first ``count`` columns of ``at``,
-    and in columns that pad them, is certain to be below 1e5 rad, the range of the fast cosine
+    """Return whether the angle from +x of every link in the first ``count`` columns of ``at``, and
+    in columns that pad them (:func:`padded_count`), is certain to be below 1e5 rad
     (:func:`winding`)."""
     far = 0
     for i in range(padded_count(count)):
@@ -276,8 +276,8 @@ def are_near(at: SlotArrays, count: int) -> bool:
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Return a kernel ``chains(at, count)`` that does what :func:`place` does, by functions ``cos``
-    and ``sin``."""
+    """Return a kernel ``chains(at, count)`` that fills ``at.x`` and ``at.y`` in ``count`` columns
+    as :func:`place` does, by the functions ``cos`` and ``sin``."""
 
     @inner
     def chains(at: SlotArrays, count: int) -> None:
@@ -294,9 +294,9 @@ _far_chains = _chains_by(cosine, sine)
 
 @inner
 def place(at: SlotArrays, count: int, near: bool) -> None:
-    """Fill the arrays ``x`` and ``y`` in the first ``count`` columns of ``at``, in place, with the
-    places of shoulder, joints and hand, length unit, for the configurations ``at.q``. With ``near``
-    all link angles are below 1e5 rad (:func:`are_near`)."""
+    """Fill the arrays ``x`` and ``y`` in the first ``count`` columns of ``at``, and in columns that
+    pad them, in place, with the places of shoulder, joints and hand, length unit, for the
+    configurations ``at.q``. ``near`` promises link angles below 1e5 rad (:func:`are_near`)."""
     if near:
         _near_chains(at, padded_count(count))
     else:

@@ -3,7 +3,7 @@
 Numba is imported with the first call: a command that lists names needs no compiler. Machine code is
 kept on disk. Numba keys it by the file of the cached function alone, so that a change in a function
 from another file would go unnoticed. Here the folder of the machine code is named after a hash of
-the package's sources: changed sources, fresh code.
+the model's sources: changed sources, fresh code.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _hash_of_sources() -> str:
-    """Return the version of the model's code: the first 16 hex digits of a hash (SHA-256) of the
-    source files of this package that compute results."""
+    """Return the first 16 hex digits of a hash (SHA-256) of the model's sources: ``robot.py``,
+    ``model.py``, ``tasks/task.py`` and the modules of ``motion``, ``learner`` and ``method``."""
     single = (PACKAGE / name for name in ("robot.py", "model.py", "tasks/task.py"))
     folders = ((PACKAGE / folder).glob("*.py") for folder in ("motion", "learner", "method"))
     files = sorted([*single, *(path for folder in folders for path in folder)])
@@ -50,11 +50,11 @@ def _hash_of_sources() -> str:
 
 
 FINGERPRINT = _hash_of_sources()
-"""The version of the model's code when the package was imported."""
+"""Hash of the model's sources when this module was imported."""
 
 
 class _Kernel:
-    """A function that is compiled when it is first called (:func:`_compile_kernel`)."""
+    """Function that Numba compiles when it is first called (:func:`_compile_kernel`)."""
 
     def __init__(self, kind: str, function: Callable[..., Any]) -> None:
         self.kind, self.function = kind, function
@@ -62,8 +62,8 @@ class _Kernel:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """The compiled function: a dispatcher of Numba, which compiles it when it is first called,
-        or an intrinsic. Raises CoarticError where Numba cannot compile."""
+        """Compiled function: a dispatcher of Numba, which compiles it when it is first called, or
+        an intrinsic. Raises CoarticError as :func:`_compile_kernel` does."""
         return _compile_kernel(self.function, self.kind)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -74,8 +74,8 @@ class _Kernel:
         return self.dispatcher(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the compiled dispatcher that Numba asks for when a kernel calls
-        this one; raise AttributeError for others."""
+        """Return an attribute of the compiled dispatcher that Numba asks for when another kernel
+        calls this kernel; raise AttributeError for other attributes."""
         if name in ("_numba_type_", "py_func", "targetoptions"):
             return getattr(self.dispatcher, name)
         raise AttributeError(f"a kernel has no attribute {name!r}")
@@ -96,7 +96,7 @@ inlined = _decorator("inlined")
 """An inner kernel that becomes a part of its callers, with their error model: passing whole tables
 would cost, and loops over a shape are unrolled where it is known."""
 scalar = _decorator("scalar")
-"""A kernel of numbers, which compiled functions of others may call, too."""
+"""A kernel of numbers, which Python and compiled functions of others may call, too."""
 intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
 """A function that gives the type of a call in a kernel and builds its machine code."""
 
@@ -134,9 +134,9 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 
 @intrinsic
 def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
-    """Build, in a kernel, NumPy's generator whose state and drawing functions are at addresses
-    (:func:`addresses`): an intrinsic, which gets the types of its arguments and returns signature
-    and builder."""
+    """Return signature and builder of a call that makes, in a kernel, NumPy's generator from the
+    addresses of its state and drawing functions (:func:`addresses`): an intrinsic, whose arguments
+    are types of Numba."""
     from numba.core import cgutils, types
 
     kind = types.NumPyRandomGeneratorType("generator")
@@ -162,7 +162,7 @@ def generator_at(addresses: Any, run: int) -> Any:
 
 
 def import_numba() -> Any:
-    """Import Numba with the settings that kernels need, and return it."""
+    """Import Numba with the settings that kernels need, and return the module."""
     with _IMPORTING:
         return _set_up_numba()
 
@@ -219,8 +219,8 @@ def _set_up_numba() -> Any:
 
 
 def _compile_kernel(function: Callable[..., Any], kind: str) -> Any:
-    """Return what Numba makes of a function, with the options of the decorator called ``kind``.
-    Raises CoarticError if variables of Numba keep it from compiling."""
+    """Return the dispatcher or intrinsic that Numba makes of a function, by the decorator called
+    ``kind``. Raises CoarticError if environment variables keep Numba from compiling."""
     try:
         numba = import_numba()
     except ValueError as error:
@@ -302,15 +302,15 @@ def _remove_old(root: Path, current: Path) -> None:
 
 @cache
 def _log_once(message: str) -> None:
-    """Log a message (logger ``coartic``), once a process."""
+    """Log a message (logger ``coartic``, level info), each text once a process."""
     logging.getLogger("coartic").info(message)
 
 
 class _MachineCode:
     """Machine code of a function on disk, as Numba's dispatchers ask for it.
 
-    Of processes that lack the same code one compiles the code and all others wait. Code that is
-    damaged, such as by a full disk, or cannot be kept is compiled again.
+    Of processes that lack the same code one compiles the code and the others wait, at most 120 s,
+    if files can be locked. Code that is damaged or cannot be kept is compiled again.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -322,9 +322,9 @@ class _MachineCode:
         self.lock: IO[bytes] | None = None  # held while this process compiles
 
     def load_overload(self, *wanted: Any) -> Any:
-        """Return the machine code of a signature from disk, waiting for a process that compiles it;
-        None, after a log message, if this process is to compile it. ``wanted``: as Numba passes it.
-        """
+        """Return the machine code of a signature (``wanted``, as Numba passes it) from disk,
+        waiting for a process that compiles it (:meth:`wait_for_lock`); None, with a log message the
+        first time, if this process is to compile it."""
         self.unlock()
         code = self.load(*wanted)
         if code is None and self.wait_for_lock():

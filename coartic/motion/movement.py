@@ -69,14 +69,13 @@ class MoveResult(NamedTuple):
     """Result of one movement (:func:`move`)."""
 
     q: Array
-    """Configuration in which the movement stopped, shape ``(dof,)``, length unit (base) and rad
-    (joints)."""
+    """Configuration in which the movement stopped, shape ``(dof,)``, length unit and rad."""
     ticks: int
     """Control ticks spent; the reward of the movement is ``-ticks``."""
     hit: bool
     """True if the hand is within the goal's radius."""
     evaluations: int
-    """Forward-kinematics evaluations made."""
+    """Forward-kinematics evaluations: on a path (:func:`follow`) as many as ticks."""
 
     def __repr__(self) -> str:
         return short_repr(self, ticks=self.ticks, hit=self.hit, q=self.q)
@@ -86,8 +85,8 @@ class Correction(NamedTuple):
     """Result of the corrective process (:func:`correct`)."""
 
     q: Array
-    """Configuration found, shape ``(dof,)``, length unit (base) and rad (joints); the last
-    iterate if not converged."""
+    """Configuration found, shape ``(dof,)``, length unit and rad; the last iterate if not
+    converged."""
     converged: bool
     """True if the hand is at the goal, as near as ``MotionModel.correction_tolerance``."""
     iterations: int
@@ -110,7 +109,7 @@ def largest_square(length: float) -> float:
 
 @inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
-    """Return a number of steps, not a whole one, for which the hand certainly stays out of a disc.
+    """Return a number of steps, rarely whole, for which the hand certainly stays out of a disc.
 
     Along the line of a movement every absolute link angle turns at a constant rate. So per step the
     hand moves by at most ``s = |Δbase| + Σ length |Δangle|``, and its velocity changes by at most
@@ -120,9 +119,8 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
         max((d - r) / s, (sqrt(u² + 2 c (d - r)) - u) / c)
 
-    steps. Here ``square`` is d², ``rim`` r, ``closing`` d u, ``slowness`` 1 / s and ``bend`` c. The
-    root is taken of d² times its content, its difference from u without cancellation, and all in
-    single precision, in which roots and quotients, most of the work, cost a third.
+    steps. Here ``square`` is d², ``rim`` r, ``closing`` d u, ``slowness`` 1 / s and ``bend`` c. All
+    is in single precision, in which roots and quotients, most of the work, cost a third.
     """
     distance = np.sqrt(_single(square))
     gap = distance * _LESS - _single(rim)
@@ -139,9 +137,9 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 @inner
 def divide_steps(at: SlotArrays, count: int, step: float) -> bool:
-    """Set rates, bounds and number of steps of ``step`` in joint space of the movements in the
-    first ``count`` columns of ``at`` (:func:`start`), in place; ``distance`` becomes its root.
-    Return True if all link angles are certain to stay below 1e5 rad (:func:`winding`)."""
+    """Set rates, bounds and numbers of steps, of length ``step`` in joint space, of the movements
+    in the first ``count`` columns of ``at`` (:func:`start`), in place; ``distance`` becomes its
+    root. Return whether all link angles are certain to stay below 1e5 rad (:func:`winding`)."""
     far = 0
     for i in range(padded_count(count)):
         distance = math.sqrt(at.distance[i])
@@ -185,11 +183,11 @@ def _place_between(at: SlotArrays, count: int, step: float) -> None:
 
 @inner
 def check(at: SlotArrays, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -> int:
-    """Evaluate the stopping rule of movements in the first ``count`` columns of ``at``; set
-    ``status`` and, where a movement goes on, the next ``step`` that can end it; return how many
+    """Evaluate the stopping rule of movements in the first ``count`` columns of ``at``, in place:
+    set ``status`` and, where a movement goes on, the next ``step`` that can end it; return how many
     have ended.
 
-    A movement ends at its last step, with the hand at most ``rims[0]``, length unit, from the
+    A movement ends at its last step, or with the hand at most ``rims[0]``, length unit, from the
     goal's centre, or, with ``stop_on_arrival``, at most ``rims[1]`` from where the target puts the
     hand. ``squares`` are the squares of ``rims`` (:func:`largest_square`).
     """
@@ -317,8 +315,8 @@ def move(
     Raises
     ------
     ValueError
-        A shape is wrong, a figure is not finite or beyond 100,000, there is no such hand, or a
-        constant of the model is out of bounds.
+        A shape is wrong, a figure is not finite or beyond 100,000, the radius is below 0, there is
+        no such hand, or a constant of the model is out of bounds.
     TypeError
         ``robot``, ``model`` or ``stop_on_arrival`` has another type.
 
@@ -345,7 +343,7 @@ def move(
 def _find_statuses(at: SlotArrays, count: int, square: float) -> None:
     """Set the status of each of the first ``count`` columns of ``at``, in place: at the goal if the
     squared distance of the hand from the goal's centre is at most ``square``, squared length unit;
-    failed if the distance is not finite; else going on."""
+    failed if it is not finite; else going on."""
     tip = len(at.length)
     for i in range(padded_count(count)):
         error_x = at.goal[0, i] - at.x[tip, i]
@@ -360,8 +358,9 @@ def descend(
     at: SlotArrays, count: int, robot: RobotRecord, runs: Any, pull: Any
 ) -> tuple[int, bool]:
     """Make an iteration of the corrective process **A** in each of the first ``count`` columns of
-    ``at`` that goes on, with ``pull`` as in :func:`descend_to_goals`. Return how many of them have
-    ended, and whether all link angles are then certain to be below 1e5 rad."""
+    ``at`` that goes on, in place, with ``pull`` as in :func:`descend_to_goals`; the status of a
+    column that it does not change becomes stuck. Return how many columns have ended, and whether
+    all link angles are then certain to be below 1e5 rad."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -401,7 +400,7 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
     each has converged or failed: is not finite, no longer moves, or has made ``max_iterations``.
     The record of each run in ``batch.runs`` gets ``converged``, ``iterations`` and, in ``target``,
     base and arm of the last iterate (the entries of the other arm stay), and its ``evaluations``
-    grow. Afterwards the slots, which :func:`load` filled, are free.
+    grow by ``iterations`` + 1. Afterwards the slots, which :func:`load` filled, are free.
 
     ``pull``: None, or a kernel ``pull(at, count, robot, runs)`` that sets ``at.pull``, what the
     next iteration adds to ``at.q`` besides α Jᵀ e: 0 for locked coordinates of the base.
@@ -434,11 +433,11 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
 
 @inner
 def project(v: Any, x: Any, y: Any) -> None:
-    """Project joint changes ``v``, in place, onto the null space of the Jacobian with rows ``x``,
-    ``y``.
+    """Project ``v``, a change of base and joints, in place, onto the null space of a Jacobian with
+    rows ``x`` and ``y``.
 
     v −= J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺; ``v``, ``x`` and ``y`` have shape ``(n,)``. A singular value
-    below a millionth of the larger counts as 0.
+    of at most a millionth of the larger counts as 0.
     """
     a, b, c, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(v)):
@@ -615,11 +614,10 @@ def follow(
     *,
     model: MotionModel = PAPER,
 ) -> MoveResult:
-    """Move from ``q`` in steps along a path through ``waypoints``, shape ``(W, dof)``
+    """Move from ``q`` in steps along a path through W > 0 ``waypoints``, ``(W, dof)``
     (:func:`path_points`), to the first point with the hand within ``radius``, length unit, of the
     goal's centre, or to the last waypoint; k steps take k + 1 ticks. Raises ValueError for a wrong
-    shape, a figure that is not finite or beyond 100,000, an unknown hand, or a model out of bounds.
-    """
+    shape, an unknown hand, and a figure that is not finite or out of bounds."""
     check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)
     last = len(points) - 1
@@ -642,10 +640,10 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
-    """Return the points of the n steps of a path from ``q`` straight through ``waypoints``, shape
-    ``(W, dof)``, in joint space, as an array ``(n + 1, dof)``, length unit and rad. Point k lies
-    k times ``model.step`` along the path; the last point is the last waypoint. Raises ValueError
-    for a wrong shape or a figure that is not finite or beyond 100,000."""
+    """Return the points of the n steps of a path from ``q`` straight through W > 0 ``waypoints``,
+    ``(W, dof)``, in joint space, as an array ``(n + 1, dof)``, length unit and rad. Point k < n
+    lies k times ``model.step`` along the path; point n is the last waypoint. Raises ValueError for
+    a wrong shape or a figure that is not finite or beyond 100,000."""
     corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
     lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -663,7 +661,8 @@ def configuration(robot: Robot, q: Any) -> Array:
 
 def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     """Return numbers as a new contiguous array of float64. Raises ValueError, which calls the value
-    ``name``, for another shape and for a number that is not finite or beyond ±100,000."""
+    ``name``, for a shape other than ``shape`` and a number that is not finite or beyond ±100,000.
+    """
     array = np.array(real_array(name, value), order="C")
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}; needed is {shape}")

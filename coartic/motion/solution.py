@@ -57,24 +57,23 @@ class Movement:
     """
 
     goal: int
-    """Number of the goal it is made for, from 1 as in the paper."""
+    """Number of the goal that the movement is made for, from 1 as in the paper."""
     hand: Hand
     """The hand that is to hit the goal, ``"left"`` or ``"right"``."""
     kind: Kind
     """``"learned"``, ``"planned"``, ``"corrective"`` or ``"path"``. Learned and planned movements
     are straight in joint space and end on a hit or on arrival; a path follows its waypoints and
-    ends on a hit or at the last of them; a corrective movement is straight and ends on a hit or at
+    ends on a hit or at the last waypoint; a corrective movement is straight and ends on a hit or at
     its target. The first movement for a goal, unless corrective, is always made; all others are
     made only while the goal is not hit."""
     target: Array | None = None
-    """Target configuration q^t, shape ``(dof,)``, length unit (base) and rad (joints); the last
-    waypoint of a path. None in a corrective movement has the corrective process find it when the
-    time comes."""
+    """Target configuration q^t, shape ``(dof,)``, length unit and rad; the last waypoint of a path.
+    None in a corrective movement has the corrective process find it when the time comes."""
     ticks: int | None = None
-    """Control ticks it took; None before it is executed."""
+    """Control ticks of the movement; None before it is executed."""
     waypoints: Array | None = None
     """Configurations that a path passes through in turn from where the robot stands, shape ``(k,
-    dof)``, length unit (base) and rad (joints); None for the other kinds."""
+    dof)``, length unit and rad; None for the other kinds."""
     __eq__ = equal_contents
 
     def __post_init__(self) -> None:
@@ -93,16 +92,17 @@ class Execution:
     movements: tuple[Movement, ...]
     """The movements as made, with targets and ticks, in order."""
     configurations: Array
-    """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, length unit
-    (base) and rad (joints)."""
+    """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, length unit and
+    rad."""
     ticks: int
     """Control ticks spent in all."""
     corrections: int
-    """Corrective movements made."""
+    """Corrective movements made, of a tick or more."""
     iterations: int = 0
     """Iterations of the corrective process, one Jacobian each."""
     evaluations: int = 0
-    """Forward-kinematics evaluations made."""
+    """Forward-kinematics evaluations, of a correction its iterations + 1; a further evaluation for
+    each goal tried, or two unless its first movement is corrective."""
     reason: str = ""
     """Sentence on why the task was not completed; empty if it was."""
     __eq__ = equal_contents
@@ -174,8 +174,8 @@ def execute(
     TaskError, TypeError
         The task cannot be used, or ``task`` or ``model`` has another type.
     SolutionError
-        The solution breaks the task's rules: goals are missing or out of order, the robot does
-        not have a hand, a target has the wrong shape or is not finite, a locked base moves by more
+        The solution breaks the task's rules: goals are missing or out of order, a hand is not the
+        task's, a target has the wrong shape or is not finite, a locked base moves by more
         than 1e-6.
     ValueError
         A constant of the model is out of bounds.
@@ -193,8 +193,8 @@ def execute(
 
 
 def hint_of(movements: Iterable[Movement]) -> str:
-    """Return a question on the first movement, unless corrective, whose target has a joint angle
-    beyond 20 rad, as if it were meant in degrees; an empty text without such a movement."""
+    """Return a question on the first movement that is not corrective and whose target has a joint
+    angle beyond 20 rad, as if it were meant in degrees; an empty text without such a movement."""
     for movement in movements:
         if movement.kind != "corrective" and movement.target is not None:
             angle = max(movement.target[BASE_DOF:].tolist(), key=abs)
@@ -215,10 +215,10 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 def execute_many(
     compiled: CompiledTask, solutions: Iterable[Iterable[Movement]], *, outside: bool = True
 ) -> list[Execution | Refused]:
-    """Execute and score solutions of one task: solutions without paths side by side, in a fraction
-    of the time, solutions with a path one by one. Return a list with, for each solution in order,
-    its execution, or, in its place, the error that :func:`execute` would raise for the solution.
-    Trials are counted as made outside the session of a run if ``outside``."""
+    """Execute and score solutions of one task: solutions without paths side by side, solutions with
+    a path one by one. Return a list with, for each solution in order, its execution, or, in its
+    place, the error that :func:`execute` would raise for the solution. Trials are counted as made
+    outside the session of a run if ``outside``."""
     executions: list[Execution | Plan | Refused] = []
     for solution in solutions:
         try:
@@ -240,7 +240,7 @@ Plan = list[list[Movement]]
 
 
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
-    """Return the ``movements`` for a goal before the first one without a target, for which the
+    """Return the ``movements`` for a goal before the first movement without a target, for which the
     corrective process acts; before them None, a check of the hand, if the first is corrective."""
     given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
@@ -275,10 +275,11 @@ def _make_straight(compiled: CompiledTask, plans: Sequence[Plan], outside: bool)
 def movements_in(
     accounts: NDArray[np.void], dof: int, given: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
-    """Return a list of the movements made in each of N trials, up to the first goal missed, from
-    the accounts of goals, shape ``(N, G, M)``; ``dof`` is the length of a configuration. ``given``
-    has the movements to be made by trial and goal (:func:`_with_targets`), from which the kinds
-    come. A goal hit without a movement has a corrective movement of 0 ticks."""
+    """Return a list for each of N trials, of the movements made for goals up to the first goal
+    missed, from the accounts of goals, shape ``(N, G, M)``; ``dof`` is the length of a
+    configuration. ``given`` has the movements to be made by trial and goal (:func:`_with_targets`),
+    from which the kinds come. A goal hit without a movement has a corrective movement of 0 ticks.
+    """
     names = ("hand", "hit", "ticks", "corrections")
     first = accounts[..., 0]
     columns = [first[name].tolist() for name in names] + [accounts["moved"].tolist()]
@@ -350,7 +351,7 @@ def _execution_of(
     compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
 ) -> Execution:
     """Return the execution of a plan, the movements as given, from the ``movements`` as made, up to
-    a goal that failed, and the accounts of the ``goals``, shape ``(G,)``."""
+    the first goal missed, and the accounts of the ``goals``, shape ``(G,)``."""
     hits = sum(goals["hit"].tolist())
     # The place of the hand is known before the first movement, and where that leads.
     checked = [2 - (of_goal[0].kind == "corrective") for of_goal in plan[: hits + 1]]
@@ -444,9 +445,9 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
 
 
 def _check_point(task: Task, point: Any) -> Array:
-    """Return a configuration as an array ``(dof,)``: the array given, or a copy in which locked
-    base coordinates are as at the start. Raises ValueError if ``point`` is no configuration of the
-    robot, or moves a locked base coordinate by more than 1e-6."""
+    """Return a configuration as an array ``(dof,)``: the array given, or a new array in which
+    locked base coordinates are as at the start. Raises ValueError if ``point`` is no configuration
+    of the robot, or moves a locked base coordinate by more than 1e-6."""
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # A length is quick to compute, and not below a limit where an entry is NaN.
     if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
@@ -511,7 +512,7 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
     Raises
     ------
     ValueError
-        The hands are no text of L and R, or there is not a row for each.
+        The hands are not letters L and R, or there is not a row for each.
     """
     chosen, targets = hands_of(hands), real_array("targets", targets)
     if targets.ndim != 2 or len(targets) != len(chosen):
@@ -572,7 +573,7 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
     ----------
     task : Task, str or pathlib.Path
     hands : iterable of {"left", "right"}, optional
-        The hands that may be used; all that the robot has by default.
+        The hands that may be used; the task's by default.
 
     Returns
     -------
@@ -587,7 +588,7 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
     NotApplicableError
         There are more than 4096 sequences.
     ValueError
-        ``hands`` is empty, or names a hand that the robot does not have.
+        ``hands`` is empty, or names a hand that is not the task's.
     """
     task = as_task(task)
     return sequences_with(hands_among(task, hands), len(task.goals), task.name)
@@ -606,7 +607,7 @@ def initial_hands(
     ----------
     task : Task, str or pathlib.Path
     hands : tuple of {"left", "right"}, optional
-        The hands among which a policy chooses; all that the robot has by default.
+        The hands among which a policy chooses; the task's by default.
     model : MotionModel
 
     Returns
@@ -621,8 +622,8 @@ def initial_hands(
     NotApplicableError
         No candidate completes the task, or there are more than 4096.
     ValueError
-        ``hands`` is empty or names a hand that the robot does not have, or a constant of the model
-        is out of bounds.
+        ``hands`` is empty or names a hand that is not the task's, or a constant of the model is out
+        of bounds.
 
     Notes
     -----
@@ -634,8 +635,8 @@ def initial_hands(
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
     """Return the reward, minus the ticks, of a trial by the corrective process alone with a task's
-    initial hands; None if the trial fails, or if the hands are to be found by a policy and no
-    sequence completes the task or more than 4096 would have to be tried."""
+    initial hands; None if the trial fails, or if a policy is to find the hands and finds none
+    (:func:`initial_hands`)."""
     try:
         hands = initial_hands(task, model=model)
     except NotApplicableError:

@@ -4,9 +4,9 @@ A goal has five phases. A run, one of many side by side,
 
 1. *begins*: its next goal is set;
 2. *aims*: a hand and, perhaps, a target are chosen, which is what callers differ in;
-3. *moves* to the target, or, without a target, finds that its hand is in the goal already;
+3. *moves* to the target, or, without a target, checks whether its hand is in the goal already;
 4. *corrects*: where the goal is missed, the corrective process **A** looks for a configuration that
-   hits it, and the arm moves there;
+   hits it, and the robot moves there;
 5. *accounts*: what happened is noted, and the trial goes on where the goal is hit
 
 (paper, sections *Generating Movement for Each Goal* and *The Corrective Process*). Three loops are
@@ -60,8 +60,8 @@ from coartic.robot import HANDS, Array, Configs, Hand, Hands, Points, Robot
 from coartic.tasks.task import WITHOUT_REACH, Task, check_hands, hands_of, letters_of
 
 IDLE, CHECK, MOVE, REPEAT = range(4)
-"""Next action of a run: none; it checks whether its hand is in the goal; it moves to its target and
-ends on arrival, too; it repeats a corrective movement, which ends on a hit or at the target."""
+"""Next action of a run: none; a check whether its hand is in the goal; a movement to its target,
+which ends on arrival, too; a corrective movement, which ends on a hit or at the target."""
 COUNTED = (
     *("movement_ticks", "forward_kinematics", "corrective_iterations"),
     *("corrections", "failed_trials"),
@@ -75,7 +75,7 @@ GoalAccount = Any
 @cache
 def account_type(width: int) -> np.dtype[np.void]:
     """Return the NumPy type of the account of a goal in a trial; configurations have ``width``
-    entries. Of several movements to targets for a goal each has a record with its ``target`` and
+    entries. A goal with several movements to targets has a record for each, with its ``target`` and
     ``moved``; the first record has all else."""
     fields = {
         "q": (np.float64, width),  # where the robot is in the end, length unit and rad
@@ -100,16 +100,16 @@ def account_type(width: int) -> np.dtype[np.void]:
 def set_off(run: RunRecord, q: Any) -> None:
     """Start the trial of a run, in place: the robot stands at configuration ``q``, shape
     ``(dof,)``, the trial has not ended (``going``), and the count of evaluations is 0. Other fields
-    stay: :func:`begin` sets them."""
+    stay."""
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
 
 
 @inlined
 def begin(run: RunRecord, goal: Any) -> None:
-    """Set the next goal of a run, x and y, in place: phase 1, *begin*. Unless *aim* sets a target,
-    the run only checks whether its hand is in the goal; a run whose trial has ended does nothing.
-    """
+    """Set the next goal of a run, x and y, in place: phase 1, *begin*. The next action, unless
+    *aim* sets a target, is to check whether the hand is in the goal, or none if the trial has
+    ended."""
     fill_row(run.goal, goal)
     fill_row(run.target, run.q)
     run.action = CHECK if run.going else IDLE
@@ -118,8 +118,8 @@ def begin(run: RunRecord, goal: Any) -> None:
 
 @inlined
 def aim(run: RunRecord, target: Any) -> None:
-    """Set the target of a run, in place: phase 2, *aim*. A joint whose entry of ``target``, shape
-    ``(dof,)``, is NaN stays where it is; if all are NaN, no movement is made."""
+    """Set the target of a run, in place: phase 2, *aim*. Where an entry of ``target``, shape
+    ``(dof,)``, is NaN, base or joint stays; if all are NaN, no movement is made."""
     for j in range(len(target)):
         if not math.isnan(target[j]):
             run.target[j] = target[j]
@@ -145,8 +145,8 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 @inlined
 def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Correct missed goals of the first ``count`` runs of a batch, in place: phase 4, *correct*.
-    ``target`` and ``ticks`` of a run become the target and the ticks of its corrective movement, 0
-    ticks if none is made."""
+    ``target`` of a corrected run becomes the configuration that **A** finds; ``ticks`` of each run
+    become the ticks of its corrective movement, 0 if none is made."""
     find_corrections(count, robot, batch)
     make_corrections(count, robot, batch)
 
@@ -155,7 +155,7 @@ def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Move each of the first ``count`` runs of a batch for which **A** converged, in place, towards
     its ``target``, the configuration that **A** found. The movement ends as soon as the hand is in
-    the goal, mostly before the target."""
+    the goal, or at the target."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -165,7 +165,7 @@ def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
 def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
     """Write the result of a run for its goal into the record ``goal``, in place: phase 5,
     *account*. ``moved``: ticks of the run's movements to targets. If the run missed its goal, its
-    trial ends."""
+    trial ends. The run's count of evaluations becomes 0."""
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
     goal.ticks = moved + run.ticks
@@ -205,8 +205,8 @@ def _move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> N
 @inlined
 def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
     """Have the corrective process **A**, kernel ``descend``, find a ``target`` that hits the goal
-    for each of the first ``count`` runs of ``batch`` that missed it, goes on and may be corrected.
-    ``converged`` is True where **A** did, else False; ``ticks`` become 0. No run moves."""
+    for each of the first ``count`` runs of ``batch`` that missed it, whose trial goes on and that
+    may be corrected. ``converged`` is True where **A** did, else False; ``ticks`` become 0."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -244,7 +244,7 @@ class Requests(NamedTuple):
     hands: Hands
     """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
     targets: Configs
-    """Targets, shape ``(N, G, M, dof)``, length unit and rad; NaN for joints that stay. The first
+    """Targets, shape ``(N, G, M, dof)``, length unit and rad; NaN for entries that stay. The first
     movement for a goal is made, further ones where the goal is still missed."""
     stops: NDArray[np.bool_]
     """True where the movement to a target ends on arrival, shape ``(N, G, M)``; empty if all do."""
@@ -333,7 +333,7 @@ def _reach_lot(
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any) -> None:
     """Let every arm reach for its goals, as many arms at a time as a batch has runs; fill
     ``goals``, ``counts`` and ``rewards``, the entries of :class:`Accounts`, in place. ``others``:
-    entries of :class:`Requests`, then of a batch: tuples with names take Numba longer."""
+    entries of :class:`Requests`, then of a batch."""
     arms, batch = Requests(*others[:5]), Batch(*others[5:])
     count, room = len(arms.targets), len(batch.runs)
     for first in range(0, count, room):
@@ -359,8 +359,8 @@ def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Acco
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
-    """Let N arms reach for G goals each, in turn; an arm that misses a goal makes no further
-    movement. Return the accounts of N trials. ``parameters`` come from :func:`robot_parameters`.
+    """Let N arms reach for G goals each, in turn, and return their accounts; an arm that misses a
+    goal makes no further movement. ``parameters`` come from :func:`robot_parameters`.
 
     A trial with a target beyond :data:`LARGEST_ENTRY` fails without a movement; nothing else is
     checked. Many arms are shared among threads.
@@ -396,11 +396,11 @@ class Reached(NamedTuple):
     corrected: Configs
     """Target of each arm's corrective movement, shape ``(N, dof)``; NaN where none was made."""
     corrections: NDArray[np.int64]
-    """Corrective movements made, 0 or 1, shape ``(N,)``: 0 also where **A** did not converge."""
+    """Corrective movements made, 0 or 1, shape ``(N,)``."""
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Number of forward-kinematics evaluations, shape ``(N,)``."""
+    """Forward-kinematics evaluations, of a correction its iterations + 1, shape ``(N,)``."""
 
 
 @checked_arguments
@@ -431,7 +431,7 @@ def reach_goals(
     radius : float
         Radius of all goals, length unit.
     targets : ndarray, shape (N, dof), optional
-        Targets of the first movements. A joint whose target is NaN keeps its value, and an arm
+        Targets of the first movements. An entry whose target is NaN keeps its value, and an arm
         whose row is NaN has no target, as all arms by default: the corrective process acts alone.
     checks : bool
         True if an arm without a target stays if its hand is in its goal already; False if the
@@ -448,8 +448,9 @@ def reach_goals(
     Raises
     ------
     ValueError
-        A shape is wrong, a number is not finite, a hand is neither 0 nor 1, or the model is out of
-        bounds or does not fit the radius. An arm with a target beyond 1e5 does not move or hit.
+        A shape is wrong, a number outside ``targets`` is not finite or out of bounds, a hand is
+        neither 0 nor 1, or the model does not fit the radius. An arm with a target beyond 1e5 does
+        not move or hit.
 
     Notes
     -----
@@ -499,8 +500,9 @@ _last_compiled: CompiledTask | None = None
 
 def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
     """Return a task with a model as arrays for the kernels, which are cached: do not change them.
-    Raises ValueError for a model out of bounds, or an unchecked copy of a task (``model_copy``)
-    whose start or goals are wrong; TypeError if the model is no MotionModel."""
+    Raises ValueError for a model that is out of bounds or unfit for the radius, or an unchecked
+    copy of a task (``model_copy``) whose start or goals are wrong; TypeError if the model is no
+    MotionModel."""
     global _last_compiled
     last = _last_compiled  # another thread may replace it
     if last is not None and last.task is task and last.model is model:
@@ -526,14 +528,13 @@ _outside = 0
 
 def count_trials(count: int) -> None:
     """Add ``count`` to the number of trials made outside the sessions of runs
-    (:func:`trials_outside`). Functions that make trials call it, unless their argument ``outside``
-    is False because the session of a run makes the trials."""
+    (:func:`trials_outside`)."""
     global _outside
     _outside += count
 
 
 def trials_outside() -> int:
-    """Return the number of trials that this process has made outside the sessions of runs."""
+    """Return the number of trials that :func:`count_trials` has counted in this process."""
     return _outside
 
 
@@ -580,10 +581,10 @@ class Trials(NamedTuple):
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations made, shape ``(N,)``."""
+    """Forward-kinematics evaluations, of a correction its iterations + 1, shape ``(N,)``."""
     targets: Configs
-    """Targets as moved to, shape ``(N, G, dof)``, length unit (base) and rad (joints); a row of NaN
-    where **A** alone acted, and in the goals after a failure what was given."""
+    """Targets as moved to, shape ``(N, G, dof)``, length unit and rad; a row of NaN where no target
+    was given, and in the goals after a failure what was given."""
     reached: Configs
     """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN where it was not hit."""
 
@@ -596,8 +597,8 @@ class Trials(NamedTuple):
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
     """Return the results of trials from their accounts, with the first ``dof`` entries of each
-    configuration. They share memory with ``accounts``, whose ``q`` becomes NaN where a goal is not
-    hit."""
+    configuration. Arrays other than ``completed`` share memory with ``accounts``, whose ``q``
+    becomes NaN where a goal is not hit."""
     goals, counts = accounts.goals[..., 0], accounts.counts
     reached = goals["q"][..., :dof]
     if counts[:, FAILURES].any():
@@ -614,7 +615,7 @@ def trials_of(accounts: Accounts, dof: int) -> Trials:
 
 
 HandSequences = str | Sequence[str]
-"""Hand sequences of N trials: one for all (``"RRLR"``), or one each."""
+"""Hand sequences of N trials: one for all (``"RRLR"``), or a list of N."""
 
 
 def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
@@ -648,7 +649,8 @@ def ranked_sequences(
     highest reward first and failed trials last, of equals the sequence with the fewest changes of
     hand first, then the sequence given first. An entry has the sequence, the reward (None if the
     trial failed), the reason of the failure (or an empty text), and the counts of the trial by name
-    (:data:`COUNTED`). ``outside`` as in :func:`make_trials`."""
+    (:data:`COUNTED`), with a further evaluation for each goal tried. ``outside`` as in
+    :func:`make_trials`."""
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets, outside=outside)

@@ -2,11 +2,12 @@
 
 The C library's versions differ between systems in the last bit, and a last bit can
 end a movement one step earlier. These use only +, -, * and rounding, so kinematics
-in the kernels is the same wherever the code runs; without a branch, they are also made of
-vector instructions. Reduction by multiples of π/2 in three parts (Cody & Waite
-1980, *Software Manual for the Elementary Functions*), then the Taylor series, whose
-truncation on [-π/4, π/4] is below 3e-18. Error against the exact value: below 2e-16
-for |angle| <= 1e5 rad (tested); beyond that the C library answers.
+in the kernels is the same wherever the code runs; :func:`near_cosine` and
+:func:`near_sine`, without a branch, also become vector instructions. Reduction by
+multiples of π/2 in three parts (Cody & Waite 1980, *Software Manual for the Elementary
+Functions*), then the Taylor series, whose truncation on [-π/4, π/4] is below 3e-18.
+Error against the exact value: below 2e-16 for |angle| < 1e5 rad (tested); from there on
+the C library answers.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n
 
 @scalar
 def _reduced(angle: float) -> tuple[float, float, int]:
-    """Return sine and cosine of ``angle``, rad, less its nearest whole number k of quarter turns,
-    and k modulo 4. Only for angles below 1e5 rad."""
+    """Return sine and cosine of ``angle``, rad, less k quarter turns, and k modulo 4, where k is
+    the nearest whole number of quarter turns. Only for |angle| below 1e5 rad."""
     quarters = np.rint(angle * _PER_QUARTER)
     x = ((angle - quarters * _HIGH) - quarters * _MIDDLE) - quarters * _LOW
     # Estrin's order: short chains of dependent operations.
@@ -53,7 +54,7 @@ def _reduced(angle: float) -> tuple[float, float, int]:
 
 @scalar
 def near_cosine(angle: float) -> float:
-    """Return cos(angle), the same bits on every system, for |angle| < :data:`LARGEST` (1e5 rad)."""
+    """Return cos(angle), the same bits on every system, for |angle| < 1e5 rad (:data:`LARGEST`)."""
     sin, cos, quarter = _reduced(angle)
     value: float = sin if quarter & 1 else cos
     return -value if (quarter + 1) & 2 else value
@@ -61,7 +62,7 @@ def near_cosine(angle: float) -> float:
 
 @scalar
 def near_sine(angle: float) -> float:
-    """Return sin(angle), the same bits on every system, for |angle| < :data:`LARGEST` (1e5 rad)."""
+    """Return sin(angle), the same bits on every system, for |angle| < 1e5 rad (:data:`LARGEST`)."""
     sin, cos, quarter = _reduced(angle)
     value: float = cos if quarter & 1 else sin
     return -value if quarter & 2 else value
@@ -69,18 +70,18 @@ def near_sine(angle: float) -> float:
 
 @scalar
 def cosine(angle: float) -> float:
-    """Return cos(angle), angle in rad; the same bits on every system below 1e5 rad."""
+    """Return cos(angle), angle in rad; the same bits on every system for |angle| < 1e5 rad."""
     return near_cosine(angle) if abs(angle) < LARGEST else math.cos(angle)
 
 
 @scalar
 def sine(angle: float) -> float:
-    """Return sin(angle), angle in rad; the same bits on every system below 1e5 rad."""
+    """Return sin(angle), angle in rad; the same bits on every system for |angle| < 1e5 rad."""
     return near_sine(angle) if abs(angle) < LARGEST else math.sin(angle)
 
 
 @inner
 def joint_chain(q: Any, arm: Any, xs: Any, ys: Any) -> None:
     """Fill ``xs`` and ``ys``, in place, with x and y of an arm's shoulder, joints and hand in
-    configuration ``q``: :func:`coartic.robot.chain` with this module's cosine and sine."""
+    configuration ``q``: :func:`coartic.robot.chain` with :func:`cosine` and :func:`sine`."""
     chain_by(q, arm, xs, ys, cosine, sine)

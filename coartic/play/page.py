@@ -16,7 +16,7 @@ from coartic.tasks.task import Task, shipped_tasks
 
 FOLDER = Path(__file__).parent
 UP_OR_DOWN = ("ascending", "descending")
-"""Tasks that share the start and the first goal: with them the page begins."""
+"""Tasks that share start and first goal: with them the page begins by default."""
 
 
 def play_page(task: Task | None = None) -> str:
@@ -44,7 +44,7 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
     colours that these name.
 
     ``presets`` are the tasks that the figure offers (:func:`preset_of`). ``more`` is data for the
-    scripts: ``page``, the address to which links lead, or None; ``first``, what is shown at first;
+    scripts: ``page``, the address to which links lead, None for no link; ``first``, shown at first;
     ``folder``, the folder with the stored runs, quoted for a shell; ``cells``, the fields of table
     ``ranking`` that start films, each with row, column and the film.
     """
@@ -77,8 +77,7 @@ def preset_of(task: Task) -> dict[str, Any]:
 
 def up_or_down() -> dict[str, Any]:
     """Return a preset (:func:`preset_of`) for two tasks with the same first goal: ``task`` is
-    ``ascending``, ``others`` are the later goals of ``descending``, and ``optimum`` has no
-    value."""
+    ``ascending``, ``others`` are the later goals of ``descending``, and ``optimum`` is None."""
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}
 
