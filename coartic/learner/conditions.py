@@ -2,7 +2,6 @@
 
 A condition says which hands the learner uses, which joints are perturbed (AModChosen:
 base and chosen arm; AModOther: the other arm) and how hands are explored (DASel).
-The learner reads these fields; it has no code of its own for any condition.
 
 Informed conditions join informed and uninformed search, which the paper leaves to "future research"
 (section *Integrating Informed and Uninformed Search*). With the preferred posture p, fixed when a
@@ -43,8 +42,7 @@ if TYPE_CHECKING:
 METHOD_PREFIX = "dual-process/"
 """Beginning of the name of a method that is the learner under a condition; its id follows."""
 MOST_NOISE = 100.0
-"""Largest standard deviation of noise, length unit and rad, beyond what any arm can use: movements
-to targets still farther away would take too many steps."""
+"""Largest standard deviation of noise, length unit and rad, beyond what any arm can use."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Drift = Annotated[float, Field(ge=0, le=10)]
 
@@ -205,8 +203,7 @@ for the next goal because the shortest path is straight: they use the form of th
 
 The drift was chosen among 0.1, 0.3 and 1 by the mean gap after 10,000 trials on development
 instances d000 to d009 of five families, three runs each (``studies/dial/development.toml``): 6.8,
-4.2 and 4.0 %. A drift of 0.3 is ahead in three of the five families, 1 on long and redundant
-tasks."""
+4.2 and 4.0 %."""
 EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 """All conditions by id."""
 

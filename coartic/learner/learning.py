@@ -78,7 +78,7 @@ def learn(
 ) -> LearningRun:
     """Run the learner on a task under an exploration condition.
 
-    The result depends on the arguments alone.
+    Equal arguments give equal runs.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def learn_many(
 ) -> list[LearningRun]:
     """Run the learner once for each of many seeds, as :func:`learn` does.
 
-    Runs go on side by side, which changes nothing but the time.
+    Runs go on side by side, which changes only the time.
 
     Parameters
     ----------

@@ -1,8 +1,7 @@
 """The dual-process learner as methods, one per exploration condition.
 
-Variants that use more information than the paper's learner are methods of their own, with the
-parameter that makes the difference; the others do not have it, so that what a method
-declares holds under all its parameters.
+Variants that use more information than the paper's learner are methods of their own, so that what a
+method declares holds under all its parameters.
 """
 
 from __future__ import annotations
@@ -191,8 +190,8 @@ _optional: Any = {name: (kind | None, None) for name, kind in _FIELDS.items()}
 class CustomDualProcess(DualProcess):
     """The learner under any exploration condition, with all information that a condition may use.
 
-    Its parameters are trials, a condition of the paper and the fields of a condition, except id and
-    hands, so that a suite can change one assumption.
+    Its parameters are ``trials``, ``base`` and the fields of a condition except ``id`` and
+    ``hands``.
     """
 
     name = f"{METHOD_PREFIX}custom"
