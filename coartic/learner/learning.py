@@ -91,9 +91,9 @@ def learn(
         Number of trials, the initial one included.
     model : MotionModel
     start : sequence of Movement
-        A first solution, such as a planner's or an earlier run's. Trial 0 moves with its hands
-        straight to the target of its first movement for each goal, length unit (base) and rad
-        (joints); the corrective process acts where that misses the goal, or there is no target.
+        A first solution, such as a planner's or an earlier run's. Trial 0 moves straight to the
+        target of the first of these movements for each goal, with its hand, length unit (base) and
+        rad (joints); the corrective process acts where that misses the goal, or there is no target.
         Without a first solution that process acts alone.
 
     Returns
@@ -168,7 +168,7 @@ def learn_many(
     Returns
     -------
     list of LearningRun
-        A run for each seed, in their order.
+        A run for each seed, in the order of seeds.
 
     Raises
     ------

@@ -124,8 +124,8 @@ class Objective:
     target is made even then, and takes a tick at least.
 
     The first trials are made at once: the corrective process alone, with ``hands`` or with those of
-    :func:`sequences_of` that the budget allows; the best sequence is kept. A point has these hands,
-    unless others are given with it.
+    :func:`sequences_of` that the budget allows; the best sequence is kept. A point has its hands,
+    unless others are given with the point.
 
     Threads can share an objective, which answers their calls one after the other. Copies, and
     trials in a forked process, raise CoarticError: they would not count for the budget.
@@ -438,8 +438,8 @@ class Objective:
         self._better.append((evaluations, cost))
 
     def _targets_in(self, made: Accounts, trial: int) -> Configs:
-        """Return a copy of the targets to which trial ``trial`` (from 0) of ``made`` moved, shape
-        ``(G, dof)``, length unit and rad."""
+        """Return a copy of the targets of trial ``trial`` (from 0) of ``made``, shape ``(G, dof)``,
+        length unit and rad."""
         return made.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:

@@ -163,13 +163,13 @@ def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
 class Session:
     """The task, the seed and the meter with which a method works.
 
-    The declaration is enforced: a call that uses information which ``information`` lacks raises
-    UndeclaredError. Trials and evaluations are counted. This is no sandbox. ``trusted`` methods,
-    this project's own, may also take the task to their compiled kernels and state the counts
-    themselves. ``of_run`` marks the session of a run: trials that a process makes outside such
-    sessions are counted apart (:func:`coartic.motion.trial.trials_outside`). ``trial_budget`` is
-    the most trials, None for any number. Threads can share a session: they make trials one after
-    the other, of one budget.
+    The declaration is enforced: a call that uses information of :data:`METERED` which
+    ``information`` lacks raises UndeclaredError. Trials and evaluations are counted. This is no
+    sandbox. ``trusted`` methods, this project's own, may also take the task to their compiled
+    kernels and state the counts themselves. ``of_run`` marks the session of a run: trials that a
+    process makes outside such sessions are counted apart
+    (:func:`coartic.motion.trial.trials_outside`). ``trial_budget`` is the most trials, None for any
+    number. Threads can share a session: they make trials one after the other, of one budget.
     """
 
     def __init__(
@@ -371,7 +371,7 @@ class Session:
         )
 
     def trials(self, hands: HandSequences, targets: Any, *, until: Any = None) -> Trials:
-        """Make N physical trials at once, which takes less time than N calls of :meth:`trial`.
+        """Make N physical trials at once.
 
         ``hands`` is one hand sequence for all (``"RRLR"``), or a sequence each. ``targets`` has
         shape ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
@@ -525,11 +525,11 @@ class Session:
         self._meter.add(**counts)
 
     def building(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block, s, to ``build_s``, the set-up."""
+        """Return a context that adds the wall time of its block, s, to counter ``build_s``."""
         return self._timing("build_s")
 
     def solving(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block, s, to ``solve_s``, the search."""
+        """Return a context that adds the wall time of its block, s, to counter ``solve_s``."""
         return self._timing("solve_s")
 
     @contextmanager

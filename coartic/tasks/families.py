@@ -110,7 +110,7 @@ class _Region(FileData):
 
 
 class _Alignment(FileData):
-    """Goals on a horizontal or vertical line, with one goal between first and last, if any, off."""
+    """Goals on a horizontal or vertical line, except one, not first or last, of three or more."""
 
     steps: Span
     """Distance from goal to goal along the line, length unit, from, to."""

@@ -124,7 +124,7 @@ class Start(FileData):
 class Task(FileData):
     """A sequence of spatial goals to be hit in turn, each with one of the robot's hands.
 
-    :func:`load_task` reads one from a file, or finds it by its name. It cannot be changed. In
+    :func:`load_task` reads a task from a file, or finds it by its name. Fields cannot be set. In
     Python ``q0=``, a configuration ``(dof,)``, can stand for ``start``:
     ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
 
@@ -215,7 +215,7 @@ class Task(FileData):
     def _with_start(cls, content: Any) -> Any:
         """Return the content of a task with ``q0``, ``(dof,)``, as ``start``, or, without either,
         with the base at (0, 0) and both arms along +x; what is no dictionary comes back unchanged.
-        Raises a validation error for both, for a wrong ``q0`` and for the key ``penalty``."""
+        Raises a validation error for both keys, a wrong ``q0`` and the key ``penalty``."""
         if not isinstance(content, dict):
             return content
         if "penalty" in content:
@@ -388,7 +388,7 @@ def check_task(task: Task) -> Task:
 
 def read_task(path: Path) -> Task:
     """Read a task from its TOML file; a task without the key ``name`` has the file's name, without
-    the ending. Raises TaskError, which names the file and the key, for a file that is no task."""
+    the ending. Raises TaskError, which names the file, for a file that is no task."""
     return parse_task({"name": path.stem, **read_toml(path, error=TaskError)}, str(path))
 
 
