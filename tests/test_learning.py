@@ -334,7 +334,13 @@ def test_runs_that_cannot_be_are_refused(error, words, options):
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("epsilon", 1.5), ("noise_sd", -1.0), ("noise_sd", 1e20), ("discount", 0.5)],
+    [
+        ("epsilon", 1.5),
+        ("noise_sd", -1.0),
+        ("noise_sd", 1e20),
+        ("discount", 0.5),
+        ("hands", ("right", "right")),
+    ],
 )
 def test_a_condition_keeps_its_limits(field, value):
     with pytest.raises(ValueError, match=field):

@@ -12,7 +12,7 @@ the paper's distance does.
 
 Ablations go beyond the paper, too. One does not correct movements to stored targets that miss, one
 learns from the reward of each subtask in place of the overall reward, which the paper calls
-crucial. Suite ablations measures what each does to learning.
+crucial.
 """
 
 from __future__ import annotations
@@ -120,6 +120,8 @@ class ExplorationCondition:
     trial began (``"start"``, wrong information)."""
 
     def __post_init__(self) -> None:
+        if len({*self.hands}) < len(self.hands):
+            raise ValueError(f"hands names the same hand twice: {', '.join(self.hands)}")
         if self.discount and self.credit == "overall":
             raise ValueError(
                 f"discount is {self.discount}, but only rewards of subtasks can be discounted: set "

@@ -66,7 +66,7 @@ _NEXT_GOAL, _STAY = 0, 1
 _DIRECTION = {"next-goal": _NEXT_GOAL, "stay": _STAY, "start": 2}
 _EQUALLY_NEAR = 1e-9  # hands at the same place up to rounding, length unit
 TENTHS = 10
-"""Number of equal parts of the trials after trial 0, whose corrections are counted apart."""
+"""Number of parts of the trials after trial 0, whose corrections are counted apart."""
 Flags = NDArray[np.bool_]
 
 

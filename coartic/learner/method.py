@@ -1,4 +1,4 @@
-"""The dual-process learner as methods, one per exploration condition.
+"""The dual-process learner as methods, one per exploration condition and one for any.
 
 Variants that use more information than the paper's learner are methods of their own, so that what a
 method declares holds under all its parameters.

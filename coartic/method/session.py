@@ -509,9 +509,8 @@ class Session:
     # Counts that the method adds itself.
 
     def spend(self, **counts: int) -> None:
-        """Add counts to the counters of these names: evaluations of a solver, and iterations of a
-        corrective process that the method runs itself, which are Jacobians, too. A method may name
-        counters of :attr:`Meter.SOLVER`, a trusted method all of :attr:`Meter.COUNTS`.
+        """Add counts to the counters of these names. A method may name counters of
+        :attr:`Meter.SOLVER`, a trusted method all of :attr:`Meter.COUNTS`.
 
         Raises ValueError for another counter, for a count that is no whole number from 0, and for a
         sum beyond 2^63 - 1.
