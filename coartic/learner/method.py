@@ -155,6 +155,7 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
         _condition_of(condition, parameters)
         return parameters
 
+    checks: Any = {"check": model_validator(mode="after")(check)}
     number, _, ablation = condition.id[2:].partition("-")
     return type(
         f"DualProcess{condition.id.replace('-', '')}",
@@ -170,7 +171,7 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
             "Parameters": create_model(
                 "DualProcessParameters",
                 __base__=DualProcessParameters,
-                __validators__={"check": model_validator(mode="after")(check)},
+                __validators__=checks,
                 **fields,
             ),
             "condition": condition,
