@@ -26,7 +26,7 @@ from coartic import (
 )
 from coartic.benchmarks.planning import plan_suite
 from coartic.learner.method import METHODS
-from coartic.method import Information, Session
+from coartic.method import Information, MethodError, Session
 from coartic.motion.batch import SLOTS
 from coartic.robot import HANDS, Robot
 from tests.support import reference
@@ -334,7 +334,13 @@ def test_runs_that_cannot_be_are_refused(error, words, options):
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("epsilon", 1.5), ("noise_sd", -1.0), ("noise_sd", 1e20), ("discount", 0.5)],
+    [
+        ("epsilon", 1.5),
+        ("noise_sd", -1.0),
+        ("noise_sd", 1e20),
+        ("discount", 0.5),
+        ("hands", ("right", "right")),
+    ],
 )
 def test_a_condition_keeps_its_limits(field, value):
     with pytest.raises(ValueError, match=field):
@@ -409,6 +415,7 @@ def test_any_condition_is_a_setting_of_a_method(tmp_path):
     [
         ('direction = "stay"', "nothing goes by: set drift or pull above 0"),
         ('credit = "subtask"', "set learned to 'replay'"),
+        ('counted = "all"', "set credit to 'subtask'"),
         ("drift = -1", "drift is -1; it should be a number from 0 to 10"),
         ("drift = []", "list of finite numbers"),
         ('base = "EC9"', "'EC1', 'EC2', 'EC3' or 'EC4'"),
@@ -417,6 +424,21 @@ def test_any_condition_is_a_setting_of_a_method(tmp_path):
 def test_conditions_that_cannot_be_are_refused_in_a_sentence(fields, sentence, tmp_path):
     with pytest.raises(CoarticError, match=re.escape(sentence)):
         plan_suite(own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}'))
+
+
+def test_parameters_of_an_informed_learner_are_refused_where_nothing_goes_by_them():
+    (method,) = (each for each in METHODS if each.name == "dual-process/EC4-informed")
+    assert method.Parameters(drift=0.0, pull=0.1, direction="stay").direction == "stay"
+    with pytest.raises(ValueError, match="direction is 'stay', which nothing goes by"):
+        method.Parameters(drift=0.0, direction="stay")
+
+
+def test_a_learner_without_a_trial_left_says_so():
+    (method,) = (each for each in METHODS if each.name == "dual-process/EC1")
+    task = load_task("ascending")
+    session = Session(task, 0, method.information, trial_budget=0, trusted=True)
+    with pytest.raises(MethodError, match="the trial budget leaves no trial to make"):
+        method().solve(session)
 
 
 FAILED_AT_ONCE = MotionModel(max_iterations=60)

@@ -411,6 +411,12 @@ def test_an_optimiser_that_evaluates_nothing_has_no_solution():
     assert execute(FOUR, result.solution).reward == max(session.rewards)
 
 
+def test_a_trial_that_fails_is_not_the_best_where_others_take_longer():
+    cost = objective("ascending", model=coartic.MotionModel(step=1e-6))
+    assert cost.best_cost == cost(cost.x0 + 1e6) == FAILED
+    assert np.isnan(cost.best_x).all()
+
+
 def test_instances_of_a_family():
     test, tuned = (
         coartic.problems("one-armed/v1", split=split, count=3) for split in ("test", "development")

@@ -1,1 +1,1 @@
-"""The dual-process learner. It knows motion and the base of methods, and no other method."""
+"""The dual-process learner. It imports tasks, motion and the base of methods, no other method."""

@@ -1,19 +1,18 @@
 """The paper's exploration conditions, and ablations of the learner, as data.
 
-A condition says which hands the robot has, which joints are perturbed (AModChosen:
+A condition says which hands the learner uses, which joints are perturbed (AModChosen:
 base and chosen arm; AModOther: the other arm) and how hands are explored (DASel).
-The learner reads these fields; it has no code of its own for any condition.
 
 Informed conditions join informed and uninformed search, which the paper leaves to "future research"
 (section *Integrating Informed and Uninformed Search*). With the preferred posture p, fixed when a
 goal becomes current, the stored target t and the projection N(x) = I − J⁺J onto the null space of
 the chosen hand's Jacobian, exploration has the mean ``t + κ N(t) (p − t)``, and an iteration of the
-corrective process adds ``β N(x) (p − x)``. N mixes lengths and angles, as the paper's distance
-does.
+corrective process adds ``β N(x) (p − x)`` to base and chosen arm. N mixes lengths and angles, as
+the paper's distance does.
 
-Variants go beyond the paper. One takes the corrective process away, one learns from the reward
-of each subtask in place of the overall one, which the paper calls crucial. Suite ablations
-measures what each does to learning.
+Ablations go beyond the paper, too. One does not correct movements to stored targets that miss, one
+learns from the reward of each subtask in place of the overall reward, which the paper calls
+crucial.
 """
 
 from __future__ import annotations
@@ -43,15 +42,14 @@ if TYPE_CHECKING:
 METHOD_PREFIX = "dual-process/"
 """Beginning of the name of a method that is the learner under a condition; its id follows."""
 MOST_NOISE = 100.0
-"""Largest noise, length unit and rad, beyond what any arm can use: movements to targets still
-farther away would take too many steps."""
+"""Largest standard deviation of noise, length unit and rad, beyond what any arm can use."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Drift = Annotated[float, Field(ge=0, le=10)]
 
 
 def _one_or_several(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
     """Return a valid drift, a number, or drifts, a tuple of numbers. Raises one validation error
-    for any other value, not one for each of these forms."""
+    for any other value, not an error for each of these forms."""
     try:
         return validate(value)
     except ValidationError:
@@ -72,19 +70,20 @@ Drifts = Annotated[
 class ExplorationCondition:
     """Exploration of the learner. Source: paper, section *Experiments*.
 
-    ``CONDITIONS`` has the paper's four conditions, ``ABLATIONS`` conditions without a part of the
-    learner, ``INFORMED`` conditions with more information; ``dataclasses.replace`` changes fields.
-    Raises ValueError for fields that are out of range or contradict each other.
+    ``CONDITIONS`` has the paper's four conditions, ``ABLATIONS`` conditions that change a part of
+    the learner, ``INFORMED`` conditions with more information; ``dataclasses.replace`` returns a
+    copy with other fields. Raises ValueError for fields that are out of range or contradict each
+    other.
     """
 
     id: str
-    """Its name, such as ``"EC4"``."""
+    """Name of the condition, such as ``"EC4"``."""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1)]
     """Hands that the learner uses."""
     modify_chosen: bool
-    """True if noise moves the targets of the base and of the arm that is to hit (AModChosen)."""
+    """True if noise moves the targets of a free base and of the arm that is to hit (AModChosen)."""
     modify_other: bool
-    """True if noise moves the targets of the other arm (AModOther)."""
+    """True if noise moves the targets of the other arm (AModOther); else this arm keeps still."""
     hand_exploration: Literal["none", "closest", "random", "nearest-posture"]
     """Exploration of the hand for a goal: none (``"none"``), the hand closest to the goal
     (``"closest"``), a random hand (``"random"``, DASel), or the hand whose corrective posture for
@@ -95,35 +94,43 @@ class ExplorationCondition:
     """Standard deviation of the noise η, length unit (base) and rad (joints) (published)."""
     corrects: bool = True
     """True if **A** corrects a goal that a movement to a stored target misses. If False, such a
-    trial fails, and **A** acts only for pairs (s, a) without a stored target, as in trial 0."""
+    trial fails, and **A** acts only in trial 0 and for states and hands without stored target."""
     learned: Literal["best", "replay"] = "best"
-    """Solution of a run: the best trial (``"best"``), or the noiseless trial after the last one
-    (``"replay"``)."""
+    """Solution of a run: the best trial (``"best"``), or the noiseless greedy trial after the last
+    trial (``"replay"``)."""
     credit: Literal["overall", "subtask"] = "overall"
     """Meaning of Q(s, a) of a goal: the reward R of the whole trial (``"overall"``), or the return
     of that goal (``"subtask"``, see ``discount``)."""
     discount: Share = 0.0
     """γ: the return of goal g is Σ γ^|h − g| r_h, with r_h the reward of the movements to goal h. 0
-    is the reward of the subtask alone. With credit "subtask" only."""
+    is the reward of the subtask alone. Above 0 with credit "subtask" only."""
     counted: Literal["later", "all"] = "later"
     """Goals h in the sum of the return of goal g: g and later goals (``"later"``), or all goals
-    (``"all"``), with which γ = 1 makes every return R."""
+    (``"all"``, with credit "subtask" only), with which γ = 1 makes every return R."""
     drift: Drifts = 0.0
     """κ of informed exploration: the share of the way to the preferred posture, in the null space
-    of the hand, by which the mean of exploration moves. Of several numbers each trial draws one."""
+    of the hand, by which the mean of exploration moves. Of several numbers each trial
+    after trial 0 draws one."""
     pull: Share = 0.0
     """β of informed correction: the share of the way to the preferred posture, in the null space of
-    the hand, that each iteration of the corrective process adds."""
+    the hand, that each iteration of the corrective process adds after trial 0."""
     direction: Literal["next-goal", "stay", "start"] = "next-goal"
-    """The preferred posture: halfway to the stored target of the next goal (``"next-goal"``), where
-    the robot is when the goal becomes current (``"stay"``), or where the trial began (``"start"``,
-    wrong information)."""
+    """The preferred posture: halfway to the stored target of the next goal, if any
+    (``"next-goal"``), where the robot is when the goal becomes current (``"stay"``), or where the
+    trial began (``"start"``, wrong information)."""
 
     def __post_init__(self) -> None:
+        if len({*self.hands}) < len(self.hands):
+            raise ValueError(f"hands names the same hand twice: {', '.join(self.hands)}")
         if self.discount and self.credit == "overall":
             raise ValueError(
                 f"discount is {self.discount}, but only rewards of subtasks can be discounted: set "
                 "credit to 'subtask'"
+            )
+        if self.counted == "all" and self.credit == "overall":
+            raise ValueError(
+                "counted is 'all', but only returns of subtasks count rewards of goals: set credit "
+                "to 'subtask'"
             )
         if self.direction != "next-goal" and not self.is_informed:
             raise ValueError(
@@ -153,8 +160,8 @@ class ExplorationCondition:
         return short_repr(self, brief_value(facts.pop("id")), *positional, **facts)
 
     def why_not(self, task: Task | Outline) -> str | None:
-        """Return a sentence on why the condition does not apply to a task (its hands do not fit);
-        None if it applies."""
+        """Return a sentence on the hands for which the condition does not apply to a task; None if
+        it applies."""
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:
             return (
@@ -193,13 +200,12 @@ INFORMED = {
     f"{base}-informed": replace(CONDITIONS[base], id=f"{base}-informed", drift=1.0)
     for base in ("EC1", "EC4")
 }
-"""Informed conditions, which differ from the paper's in their drift alone. The preferred posture is
-halfway to the next goal's because the shortest path is straight: they use the form of the reward.
+"""Informed conditions: EC1 and EC4 with a drift. The preferred posture is halfway to the posture
+for the next goal because the shortest path is straight: they use the form of the reward.
 
 The drift was chosen among 0.1, 0.3 and 1 by the mean gap after 10,000 trials on development
 instances d000 to d009 of five families, three runs each (``studies/dial/development.toml``): 6.8,
-4.2 and 4.0 %. A drift of 0.3 is ahead in three of the five families, 1 on long and redundant
-tasks."""
+4.2 and 4.0 %."""
 EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 """All conditions by id."""
 

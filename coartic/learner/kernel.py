@@ -7,11 +7,11 @@ the same state and hand replaces what is stored there; better by its whole rewar
 ablation, by the return of that goal.
 
 One call of a compiled kernel performs many runs side by side, goal by goal and trial by
-trial (:mod:`coartic.learner.learning` makes it). Each draws from a NumPy generator of its own
-(``default_rng(seed)``, PCG64), per trial and goal in this order: a uniform number against
-ε, where hands are explored; a second one that picks a hand, where the first fell below ε
-and the pick is random; one standard normal per explored joint, in the order of ``q``, where a
-target is stored. Where each trial draws its drift, that is its first draw. Runs share nothing: the
+trial (:mod:`coartic.learner.learning` makes it). Each run draws from a NumPy generator of its own
+(``default_rng(seed)``, PCG64), per goal of each trial after trial 0, in this order: a uniform
+number against ε, where hands are explored; a second number that picks a hand, where the first fell
+below ε and the pick is random; one standard normal per explored joint, in the order of ``q``, where
+a target is stored. Of several drifts a trial draws its own before all else. Runs share nothing: the
 result of one depends neither on the others nor on their number.
 """
 
@@ -66,7 +66,7 @@ _NEXT_GOAL, _STAY = 0, 1
 _DIRECTION = {"next-goal": _NEXT_GOAL, "stay": _STAY, "start": 2}
 _EQUALLY_NEAR = 1e-9  # hands at the same place up to rounding, length unit
 TENTHS = 10
-"""Number of equal parts of the trials after trial 0, whose corrections are counted apart."""
+"""Number of parts of the trials after trial 0, whose corrections are counted apart."""
 Flags = NDArray[np.bool_]
 
 
@@ -80,7 +80,7 @@ class LearnerParameters(NamedTuple):
     first_hands: Hands
     """Hands of trial 0, shape ``(G,)``."""
     first_targets: Configs
-    """Targets of trial 0, shape ``(G, width)``; NaN where **A** acts."""
+    """Targets of trial 0, shape ``(G, width)``; NaN beyond ``dof``, and where **A** acts alone."""
     hands: Hands
     """Hands available, shape ``(1,)`` or ``(2,)``."""
     follows: Flags
@@ -113,11 +113,12 @@ class Results(NamedTuple):
     """Results of N runs of T trials on a task with G goals."""
 
     rewards: NDArray[np.int64]
-    """Total rewards, shape ``(N, T)``."""
+    """Minus the ticks of each trial, also of failed trials, shape ``(N, T)``."""
     completed: Flags
     """True where a trial hit every goal, shape ``(N, T)``."""
     best_trial: NDArray[np.int64]
-    """First trial, from 0, with the highest reward, shape ``(N,)``; -1 if none was completed."""
+    """First completed trial, from 0, with the highest reward, shape ``(N,)``; -1 if none was
+    completed."""
     counts: NDArray[np.int64]
     """Counts of all trials but the replay, by :data:`coartic.motion.trial.COUNTED`, shape
     ``(N, 5)``."""
@@ -283,8 +284,8 @@ def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) 
     """Set the preferred posture p of a run, once its hand for goal ``number`` (from 0) is chosen:
     the present posture q (*stay*), the start of the trial (*start*), or (*next goal*) (q + t') / 2
     with the target t' stored for the next goal and the hand of highest value there; q for joints
-    that the movement to t' would not explore, and if no target is stored. ``table``: Q and q* of
-    the run, shape ``(G, 3, 2)``. Nothing changes if drift and pull are 0."""
+    that the movement to t' would not explore, and without a next goal or a target stored there.
+    ``table``: Q and q* of the run, shape ``(G, 3, 2)``. Nothing changes if drift and pull are 0."""
     if run.drift == 0.0 and run.pull == 0.0:
         return
     fill_row(run.preferred, run.q)
@@ -431,7 +432,7 @@ def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
 
 @inlined
 def _copy_accounts(source: Any, destination: Any) -> None:
-    """Copy the accounts of the goals of a trial, shape ``(G,)``, over those in ``destination``, in
+    """Copy the accounts of the goals of a trial, shape ``(G,)``, over accounts ``destination``, in
     place, word by word: LLVM copies records byte by byte, which takes long to compile."""
     words, given = destination.view(np.int64), source.view(np.int64)
     for k in range(len(given)):
@@ -480,10 +481,10 @@ def learn_kernel(
     robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, workspace: Any
 ) -> None:
     """Make all trials of N runs, each with its own generator (``rngs``, :func:`addresses`), and
-    then in each a greedy trial without noise, the replay; fill in new :func:`empty_tables` and
-    ``results`` (:class:`Results`: zeros, ``best_trial`` -1). ``robot``, ``learner`` and
-    ``workspace`` come from :func:`robot_parameters`, :func:`learner_parameters` and
-    :func:`workspace_for`."""
+    then in each a greedy trial without noise, the replay (of 0 trials: trial 0); fill in
+    new :func:`empty_tables` and ``results`` (:class:`Results`: zeros, ``best_trial`` -1).
+    ``robot``, ``learner`` and ``workspace`` come from :func:`robot_parameters`,
+    :func:`learner_parameters` and :func:`workspace_for`."""
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last is the replay, which is not part of the runs
         first, explore, made = number == 0, number < trials, results.last

@@ -62,8 +62,8 @@ _MOST_TOGETHER = 4_000_000  # trials of runs whose rewards fit into one answer o
 
 
 def runs_at_once(trials: int) -> int:
-    """Return the largest number of runs of ``trials`` trials that a process makes together: 72, or
-    fewer if these have more than 4,000,000 trials in all; at least 1."""
+    """Return the largest number of runs of ``trials`` trials for one job of a worker: 72, or fewer
+    if 72 runs have more than 4,000,000 trials in all; at least 1."""
     return max(1, min(SLOTS, _MOST_TOGETHER // trials))
 
 
@@ -78,7 +78,7 @@ def learn(
 ) -> LearningRun:
     """Run the learner on a task under an exploration condition.
 
-    The result depends on the arguments alone.
+    Equal arguments give equal runs.
 
     Parameters
     ----------
@@ -91,10 +91,10 @@ def learn(
         Number of trials, the initial one included.
     model : MotionModel
     start : sequence of Movement
-        A first solution, such as a planner's or an earlier run's. Trial 0 moves with its hands
-        straight to the target of its first movement for each goal, length unit (base) and rad
-        (joints); the corrective process acts where that misses the goal, or there is no target.
-        Without a first solution it acts alone.
+        A first solution, such as a planner's or an earlier run's. Trial 0 moves straight to the
+        target of the first of these movements for each goal, with its hand, length unit (base) and
+        rad (joints); the corrective process acts where that misses the goal, or there is no target.
+        Without a first solution that process acts alone.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def learn(
     TaskError
         The task cannot be used.
     NotApplicableError
-        The condition does not fit the task or the first solution, or no first trial is found.
+        The condition does not fit the task or the first solution, or no initial hands are found.
     CoarticError
         The condition is unknown.
     TypeError
@@ -114,8 +114,9 @@ def learn(
     SolutionError
         The first solution breaks the task's rules.
     ValueError
-        The seed is no whole number from 0, ``trials`` is not from 1 to 10,000,000, a constant of
-        the model is out of bounds, or the task was changed so that it contradicts itself.
+        The seed is no whole number from 0 to 2^128 - 1, ``trials`` is not from 1 to 10,000,000, a
+        constant of the model is out of bounds, or the task was changed so that it contradicts
+        itself.
 
     Notes
     -----
@@ -149,7 +150,7 @@ def learn_many(
 ) -> list[LearningRun]:
     """Run the learner once for each of many seeds, as :func:`learn` does.
 
-    Runs go on side by side, which changes nothing but the time.
+    Runs go on side by side, which changes only the time.
 
     Parameters
     ----------
@@ -167,7 +168,7 @@ def learn_many(
     Returns
     -------
     list of LearningRun
-        A run for each seed, in their order.
+        A run for each seed, in the order of seeds.
 
     Raises
     ------
@@ -175,7 +176,8 @@ def learn_many(
         Task, condition or first solution cannot be used, as in :func:`learn`.
     TypeError, ValueError
         An argument is refused by :func:`learn`, seeds are no list or too many (the rewards of at
-        most 200,000,000 trials are kept), or ``jobs`` is neither -1 nor at least 1.
+        most 1,000,000 runs and 200,000,000 trials are kept), or ``jobs`` is neither -1 nor from 1
+        to 10,000.
     """
     task = as_task(task)
     condition = load_condition(condition)
@@ -232,7 +234,8 @@ def _learn_together(
 ) -> list[LearningRun]:
     """Run the learner side by side, once for each of at most 72 seeds, unchecked; return the runs
     in the order of seeds. ``first`` has the movement of trial 0 for each goal, without a target for
-    the corrective process. With 0 trials only the replay is made, which compiles the kernels."""
+    the corrective process. 0 trials compile the kernels: rewards are empty, the replay is trial 0.
+    """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
     empty = np.zeros_like(empty_accounts(task.robot, runs, len(task.goals)).goals[..., 0])
@@ -291,7 +294,7 @@ Kernels = Literal["learner", "motion", "trials"]
 
 def warm_up(task: Task, *parts: Kernels) -> None:
     """Compile the kernels for the number of links of the task's robot, or load their machine code,
-    so that the time of no run contains it. ``parts`` names the kernels, by default all:
+    which later runs need not do. ``parts`` names the kernels, by default all three:
     ``"learner"``, ``"motion"`` (single movements and corrections), ``"trials"`` (trials and
     executions).
     """

@@ -40,7 +40,7 @@ class LearningRun:
     """Total reward of each trial, shape ``(trials,)``: minus its control ticks; masked where the
     trial failed."""
     best_trial: int | None
-    """First trial, from 0, with the highest total reward; None if none was completed."""
+    """First completed trial, from 0, with the highest total reward; None without such a trial."""
     initial: tuple[Movement, ...]
     """Movements of trial 0; empty if it failed."""
     solution: tuple[Movement, ...]
@@ -50,8 +50,8 @@ class LearningRun:
     replay_reward: int | None
     """Total reward of the replay; None if it failed."""
     values: Array
-    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Minus ticks: total
-    rewards, or returns of the goal where the condition credits subtasks; -inf where nothing was
+    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Highest total
+    reward, or return of the goal where the condition credits subtasks; -inf where nothing was
     learned."""
     targets: Array
     """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is
@@ -59,7 +59,7 @@ class LearningRun:
     corrections: NDArray[np.int64]
     """Corrective movements made in trial 0 and in each tenth of later trials, shape ``(11,)``."""
     counters: Meter
-    """Counts of the run, without its replay."""
+    """Counts of the trials of the run, without its replay."""
     wall_s: float = field(compare=False)
     """Share of this run in the time of the runs made together, s."""
     __eq__ = equal_contents

@@ -1,8 +1,7 @@
-"""The dual-process learner as a method, one per exploration condition and ablation.
+"""The dual-process learner as methods, one per exploration condition and one for any.
 
-Variants that use more information than the paper's learner are methods of their own, with the
-parameter that makes the difference; the others do not have it, so that what a method
-declares holds under all its parameters.
+Variants that use more information than the paper's learner are methods of their own, so that what a
+method declares holds under all its parameters.
 """
 
 from __future__ import annotations
@@ -40,12 +39,12 @@ class DualProcessParameters(Parameters):
     """Parameters of every learner."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run."""
+    """Trials of a run, fewer if the budget has fewer left."""
 
 
 class CustomParameters(DualProcessParameters):
-    """Any exploration condition: a condition of the paper, ``base``, with other values of some
-    fields."""
+    """Parameters of an exploration condition: a condition of the paper, ``base``, with other values
+    of some fields."""
 
     base: Literal["EC1", "EC2", "EC3", "EC4"] = "EC4"
     """The paper's condition that is changed."""
@@ -59,8 +58,8 @@ class CustomParameters(DualProcessParameters):
 
 
 def _condition_of(base: ExplorationCondition, parameters: Parameters) -> ExplorationCondition:
-    """Return a copy of condition ``base`` with the values of those fields of a condition that
-    ``parameters`` have and that are not None."""
+    """Return a copy of condition ``base`` with the values of fields of a condition among
+    ``parameters`` that are not None. Raises ValueError for values that contradict each other."""
     return replace(base, **parameters.model_dump(include={*_FIELDS}, exclude_none=True))
 
 
@@ -79,14 +78,15 @@ class DualProcess(Method):
         return _condition_of(self.condition, self.parameters)
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence on why the learner's exploration condition does not apply to a task
-        (its hands do not fit); None if it applies."""
+        """Return a sentence on the hands for which the learner's exploration condition does not
+        apply to a task; None if it applies."""
         return self.rules().why_not(task)
 
     def solve(self, session: Session) -> Result:
         """Run the learner; return the movements of its best trial, or, if the condition has
         ``learned="replay"``, of the replay, the noiseless trial after learning. Raises MethodError
-        if that trial missed a goal, or no trial hit every goal."""
+        if that trial missed a goal, no trial hit every goal, or the budget has no trial left, and
+        NotApplicableError if no initial hands are found."""
         (result,) = self.solve_together([session])
         if isinstance(result, MethodError):
             raise result
@@ -107,6 +107,9 @@ class DualProcess(Method):
             session.find_initial_hands(condition.hands)  # counts what that takes
         left = sessions[0].trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
+        if trials < 1:
+            reason = "the trial budget leaves no trial to make"
+            return [MethodError("infeasible", reason) for _ in sessions]
         runs = learn_many(
             task,
             condition,
@@ -147,6 +150,12 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
             "Intelligence Research."
         )
     fields: Any = {name: (_FIELDS[name], getattr(condition, name)) for name in names}
+
+    def check(parameters: Parameters) -> Parameters:
+        _condition_of(condition, parameters)
+        return parameters
+
+    checks: Any = {"check": model_validator(mode="after")(check)}
     number, _, ablation = condition.id[2:].partition("-")
     return type(
         f"DualProcess{condition.id.replace('-', '')}",
@@ -160,7 +169,10 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
             "information": frozenset(information),
             "citation": citation,
             "Parameters": create_model(
-                "DualProcessParameters", __base__=DualProcessParameters, **fields
+                "DualProcessParameters",
+                __base__=DualProcessParameters,
+                __validators__=checks,
+                **fields,
             ),
             "condition": condition,
             "tuned_on": _DRIFT_TUNED_ON if condition.drifts[-1] else DualProcess.tuned_on,
@@ -179,7 +191,8 @@ _optional: Any = {name: (kind | None, None) for name, kind in _FIELDS.items()}
 class CustomDualProcess(DualProcess):
     """The learner under any exploration condition, with all information that a condition may use.
 
-    Its parameters are the fields of a condition, so that a suite can change one assumption.
+    Its parameters are ``trials``, ``base`` and the fields of a condition except ``id`` and
+    ``hands``.
     """
 
     name = f"{METHOD_PREFIX}custom"
@@ -191,7 +204,8 @@ class CustomDualProcess(DualProcess):
 
     def rules(self) -> ExplorationCondition:
         """Return a copy of the paper's condition that parameter ``base`` names, with the values of
-        all other parameters that are not None and an id such as ``EC4, changed,``."""
+        the fields of a condition among the parameters that are not None, and an id such as ``EC4,
+        changed,``."""
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
         return _condition_of(base, self.parameters)
 

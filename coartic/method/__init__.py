@@ -2,9 +2,9 @@
 
 A learner, planner or controller is a :class:`Method`. It states its citation, its parameters and
 the **information** that it uses. Given a :class:`Session` (one task, one seed, one meter) it
-returns a solution. The session is the only way to the robot: every call is counted, and a call that
-the method's declaration does not cover is refused. The harness executes, scores and verifies the
-solution itself.
+returns a solution. The session is the only way to the robot: trials and evaluations are counted,
+and a call that the method's declaration does not cover is refused. The harness executes, scores and
+verifies the solution itself.
 """
 
 from coartic.method.base import (

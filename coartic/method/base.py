@@ -66,7 +66,7 @@ class Outline(NamedTuple):
     @property
     def too_many_sequences(self) -> str | None:
         """A sentence that the task has more than 4096 hand sequences, too many to try one by one;
-        None for fewer."""
+        else None."""
         return too_many_sequences(self.name, self.goals_count, len(self.hands))
 
 
@@ -79,7 +79,7 @@ class Method(ABC):
     """Base of every method. A subclass declares itself in its class attributes."""
 
     name: ClassVar[str]
-    """Id, such as ``"dual-process"``; another form of it adds ``/form``."""
+    """Id, such as ``"random-search"``; another form of the method adds ``/form``."""
     title: ClassVar[str]
     citation: ClassVar[str]
     information: ClassVar[frozenset[Information]]
@@ -87,7 +87,7 @@ class Method(ABC):
     """Objectives beyond hitting the goals, such as smoothness, in words."""
     tuned_on: ClassVar[str] = ""
     """Tasks on which its parameters were chosen, and among how many; empty: not said. Readers judge
-    by it whether its results are of new tasks; runs are not known by it."""
+    by it whether results are of new tasks; the identity of a run leaves it out."""
     stochastic: ClassVar[bool] = True
     """True if the seed matters; other methods are run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
@@ -116,13 +116,13 @@ class Method(ABC):
         MethodError if no solution is found."""
 
     def most_together(self) -> int:
-        """Return the largest number of sessions for one call of :meth:`solve_together`; methods
-        that are not this project's own are given one session, whatever they return."""
+        """Return the largest number of sessions for one call of :meth:`solve_together`; a suite
+        gives methods that are not this project's own one session, whatever they return."""
         return 1
 
     def solve_together(self, sessions: Sequence[Session]) -> Sequence[Result | MethodError]:
         """Solve in several sessions that differ in their seeds alone; return for each, in order,
-        the result of :meth:`solve`, or the MethodError that it raises, as an object.
+        the result of :meth:`solve`, or the MethodError that :meth:`solve` raises, as an object.
         """
         results: list[Result | MethodError] = []
         for session in sessions:
@@ -152,17 +152,18 @@ MODULES = (
 def run_method(
     method: Method, task: TaskLike, seed: int = 0, *, model: MotionModel = PAPER
 ) -> tuple[Result, Session]:
-    """Let a method solve a task, as it does in a suite.
+    """Let a method solve a task, in this process.
 
     Methods of this project may see the task and count by themselves; any other method gets only the
     information that it declares. ``task`` is a task, its name or its file; ``seed`` is the seed of
-    the method's random numbers. There is no budget of trials, and the solution is not executed.
+    the method's random numbers; ``model`` has the constants of movement. There is no budget of
+    trials, and the solution is not executed.
 
     Returns the solution with its details, and the session in which it was found, with its counts
     and rewards. Raises MethodError if the method finds no solution, UndeclaredError if it uses
     information that it does not declare, NotApplicableError if it does not apply to the task,
-    SolutionError if its solution is no list, and ValueError for a seed that is no whole number from
-    0.
+    SolutionError if its solution is no sequence, and ValueError for a seed that is no whole number
+    from 0 to 2^128 - 1.
     """
     chosen = as_task(task)
     if (reason := method.why_not(outline_of(chosen))) is not None:

@@ -62,7 +62,7 @@ if TYPE_CHECKING:  # workers do without pandas
 OPTIMISER_INFORMATION = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
 """Information that a method which minimises an :class:`Objective` uses."""
 FAILED = 1_000_000
-"""Cost of a trial that fails, ticks. One that takes so long has failed, too."""
+"""Cost of a trial that fails, ticks, and of a trial that takes longer."""
 HALF_WIDTH = 1.0
 # For type checkers, which take an array of unknown shape for one point.
 Vector = np.ndarray[tuple[int], np.dtype[Any]]
@@ -77,11 +77,11 @@ NO_COPIES = (
 
 
 def explored_joints(session: Session) -> NDArray[np.bool_]:
-    """Return True for the entries of a configuration that methods explore on the session's task,
+    """Return True for the entries of a configuration that optimisers explore on the session's task,
     bool, shape ``(dof,)``.
 
-    These are, at every goal, the coordinates of the base that are not locked and the joints of the
-    arms of all hands of the task, as the learner explores with one hand (EC1) or two (EC4).
+    These are the coordinates of the base that are not locked and the joints of the arms of all
+    hands of the task.
     """
     mask = np.zeros(session.dof, dtype=np.bool_)
     mask[:2] = [coordinate not in session.locked_base for coordinate in "xy"]
@@ -94,7 +94,8 @@ def sequences_of(session: Session) -> list[str]:
     """List all hand sequences of the session's task, such as ``"RRLR"``, in alphabetical order; if
     the task names a sequence, that sequence comes first.
 
-    If there are more than 4096 sequences, list the task's initial hand sequence alone.
+    If there are more than 4096 sequences, list the initial hand sequence alone
+    (:meth:`Session.find_initial_hands`, whose errors are raised).
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
@@ -104,7 +105,7 @@ def sequences_of(session: Session) -> list[str]:
 
 def _entries_of(name: str, points: ArrayLike) -> Array:
     """Return points as an array (:func:`real_array`). Raises ValueError, which calls them ``name``,
-    for other values and for pandas, whose names could say another order."""
+    for other values and for objects of pandas, whose names could say another order."""
     if hasattr(points, "iloc"):
         raise ValueError(f"{name} has names of pandas: give {name}.to_numpy(), in order of entries")
     return real_array(name, points)
@@ -113,23 +114,23 @@ def _entries_of(name: str, points: ArrayLike) -> Array:
 class Objective:
     """Cost of a trial, its ticks, as a function of its target configurations.
 
-    A point holds the targets of all joints that the learner explores (:func:`explored_joints`),
-    goal by goal, length unit (base) and rad (joints). Its cost is minus the reward of the trial, or
-    ``FAILED`` where the trial fails. Goals that a movement misses are corrected, and paid for.
-    A point with an entry beyond 100,000 is a trial that fails.
+    A point holds, goal by goal, the targets of the entries of a configuration that are explored
+    (:func:`explored_joints`), length unit (base) and rad (joints). Its cost is minus the reward of
+    the trial, or ``FAILED`` where the trial fails or takes longer. Goals that a movement misses are
+    corrected, and paid for. A point with an entry beyond 100,000 is a trial that fails.
 
     Where all entries of a goal are NaN, no movement is made to a target: the corrective process
     acts alone at this goal, which costs nothing if the hand is inside already. A movement to a
-    target is always made and takes a tick at least.
+    target is made even then, and takes a tick at least.
 
-    The first trials are made at once: the corrective process alone, with ``hands`` or with every
-    hand sequence; the best sequence is kept. A point has these hands, unless others are given
-    with it; solutions with other hands may cost less.
+    The first trials are made at once: the corrective process alone, with ``hands`` or with those of
+    :func:`sequences_of` that the budget allows; the best sequence is kept. A point has its hands,
+    unless others are given with the point.
 
-    Threads can share an objective, which makes their trials one after the other. A copy is refused,
-    in another process as well: it would not count for the budget.
+    Threads can share an objective, which answers their calls one after the other. Copies, and
+    trials in a forked process, raise CoarticError: they would not count for the budget.
 
-    Raises MethodError where the corrective process completes no sequence.
+    Raises MethodError where the corrective process completes none of these sequences.
     """
 
     __slots__ = (
@@ -165,18 +166,18 @@ class Objective:
             raise MethodError("infeasible", reason)
         self._hands = sequences[best]
         self.joints = np.tile(explored_joints(session), (session.goals_count, 1))
-        """Joints that have a target in a point, shape ``(G, dof)``."""
+        """True for entries that have a target in a point, shape ``(G, dof)``."""
         self.configurations: Array = alone.reached[best].copy()
         """Configurations in which the corrective process alone hits the goals, ``(G, dof)``."""
         self._codes = session.hand_codes(self.hands, 1)
         self._targets = np.full((1, *self.joints.shape), np.nan)
         self._entries = np.flatnonzero(self.joints)
         self.dim = len(self._entries)
-        """Number of parameters."""
+        """Number of entries of a point."""
         self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
         """A box to search in, shape ``(dim, 2)``; points outside of it are evaluated as well."""
         self._evaluations = 0
-        self._best_cost = float(-alone.rewards[best])
+        self._best_cost = float(min(-alone.rewards[best], FAILED))
         self._best_hands = self.hands
         self._best_x: Array = np.full(self.dim, np.nan)
         self._best_targets = alone.targets[best].copy()
@@ -221,8 +222,8 @@ class Objective:
         goals that are hit without a movement. Raises UndeclaredError in a method, as :attr:`task`
         does.
 
-        None where no cost is shipped: for a task of your own, for instances of a family except the
-        first 40 of its test split, and for another model than the paper's.
+        None where no cost is shipped, as for most tasks of your own, for instances of a family
+        except the first 40 of its test split, and for another model than the paper's.
         """
         known = self._known
         return None if known is None else -known.reward
@@ -296,8 +297,7 @@ class Objective:
     @property
     def x0(self) -> Array:
         """A point to begin with, shape ``(dim,)``, length unit and rad, a copy: the postures in
-        which the corrective process alone hits the goals. Straight movements to these postures can
-        cost more or less than the corrective process."""
+        which the corrective process alone hits the goals."""
         return self.configurations[self.joints].copy()
 
     @property
@@ -315,13 +315,13 @@ class Objective:
 
     def movements(self, x: ArrayLike, hands: str | None = None) -> tuple[Movement, ...]:
         """Return the movements of the trial of a point, for :func:`coartic.execute`, which then
-        takes as many ticks as the point costs, unless the trial fails. No trial is counted.
+        takes as many ticks as the point costs, if less than ``FAILED``. No evaluation is counted.
 
         ``x`` is the point, shape ``(dim,)``; ``hands`` is the hand sequence of the trial, by
-        default :attr:`hands` of this objective. A movement has a target of all joints (one that has
-        no entry in the point has the value at which it keeps still), or none where the entries of
-        its goal are NaN. Goals that are missed are corrected by ``execute``. Raises UndeclaredError
-        in a method, which can use :attr:`solution`, and ValueError if point or hands do not fit.
+        default :attr:`hands` of this objective. A movement has a target of all joints (a joint that
+        has no entry in the point keeps its value), or none where the entries of its goal are NaN.
+        Goals that are missed are corrected by ``execute``. Raises UndeclaredError in a method,
+        which can use :attr:`solution`, and ValueError if point or hands do not fit.
         """
         task, point = self.task, _entries_of("x", x)
         if point.shape != (self.dim,):
@@ -354,7 +354,7 @@ class Objective:
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
         """Return the cost, ticks, of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)``,
         columns as scipy has them. Raises ValueError for shape ``(dim, dim)``, in which points may
-        be rows: :meth:`many` takes rows. Other errors are those of :meth:`many`."""
+        be rows: :meth:`many` takes rows. ``hands`` and other errors are as in :meth:`many`."""
         point = _entries_of("x", x)
         if point.ndim == 2 and len(point) == self.dim:
             if point.shape[1] == self.dim:
@@ -420,9 +420,8 @@ class Objective:
         return costs
 
     def _warn_of_degrees(self, cost: float, made: Accounts, trial: int) -> None:
-        """Warn, except in a method, that targets of trial ``trial`` (from 0) of ``made`` may be
-        meant in degrees, if one has an angle beyond 20 rad (:func:`.hint_of`) and ``cost``, ticks,
-        exceeds the number of steps in 20 rad."""
+        """Warn, except in a method, if :func:`.hint_of` has a hint on targets of trial ``trial``
+        (from 0) of ``made``, and ``cost``, ticks, exceeds the number of steps in 20 rad."""
         if self._task is not None and cost > WHOLE_TURNS / self._session.model.step:
             targets = self._targets_in(made, trial)
             if hint := hint_of(movements_of(self.hands, targets)):
@@ -439,8 +438,8 @@ class Objective:
         self._better.append((evaluations, cost))
 
     def _targets_in(self, made: Accounts, trial: int) -> Configs:
-        """Return a copy of the targets to which trial ``trial`` (from 0) of ``made`` moved, shape
-        ``(G, dof)``, length unit and rad."""
+        """Return a copy of the targets of trial ``trial`` (from 0) of ``made``, shape ``(G, dof)``,
+        length unit and rad."""
         return made.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:
@@ -497,8 +496,7 @@ def objective(
     task : Task, str or pathlib.Path
     hands : str, optional
         A hand sequence (``"RRLR"``), by default the sequence with which the corrective process
-        alone gets the highest reward. The optimum can have other hands: in ``two-armed-2`` no point
-        with these hands is known to come within 14 % of the optimum.
+        alone gets the highest reward. The optimum can have other hands, as in ``two-armed-2``.
     half_width : float
         Half the width of the bounds around ``x0``, length unit (base) and rad (joints).
     model : MotionModel
@@ -515,8 +513,9 @@ def objective(
     TaskError
         The task cannot be used.
     ValueError
-        Hands do not fit, the half width is not from 1e-9 to 100, or the budget is not from 1 to
-        10,000,000, or less than the hand sequences to choose among.
+        Hands do not fit, the half width is not from 1e-9 to 100, a constant of the model is out of
+        bounds, or the budget is not from 1 to 10,000,000, or less than the hand sequences to choose
+        among.
     TypeError
         The model is no MotionModel, or the task is neither a Task nor a text nor a path.
     MethodError
@@ -552,7 +551,7 @@ def problems(
     Parameters
     ----------
     family : str
-        Its name with its version, ``"two-armed/v1"``.
+        Its name with its version, ``"two-armed/v1"``, or its file.
     split : {"test", "development"}
         Instances to report on (``"test"``), or to tune on (``"development"``).
     count : int
@@ -565,12 +564,13 @@ def problems(
     Returns
     -------
     list of Objective
-        Instances 0, 1, ... of the split; ``best_known`` of the first 40 test instances is shipped.
+        Instances 0, 1, ... of the split; ``best_known`` of the first 40 test instances of shipped
+        families is known.
 
     Raises
     ------
     TaskError
-        There is no such family.
+        There is no such family, or its file cannot be used.
     ValueError
         The split is neither of these, the count is not from 1 to 10,000, or :func:`objective`
         refuses an option.
@@ -589,7 +589,7 @@ class OptimiserParameters(Parameters):
     """Parameters of every :class:`Optimiser`."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run, with trials of the corrective process alone."""
+    """Most trials of a run, with trials of the corrective process alone."""
     hands: str | None = None
     """Hand sequence, such as ``"RRLR"``; by default the sequence with which the corrective process
     alone gets the highest reward, or the task's initial one where more than 4096 exist."""
@@ -609,7 +609,9 @@ class Optimiser(Method):
     def solve(self, session: Session) -> Result:
         """Call :meth:`optimise` until it returns or the trials are used up; return the movements of
         the best trial. Raises MethodError if there is no trial to make, if the corrective process
-        completes no hand sequence, or if no point is evaluated although trials are left."""
+        completes no hand sequence, or if no point is evaluated although trials are left;
+        NotApplicableError if of more than 4096 sequences no initial one is found; ValueError for
+        ``hands`` that do not fit."""
         parameters: OptimiserParameters = self.parameters
         try:
             cost = Objective(
@@ -629,5 +631,5 @@ class Optimiser(Method):
     @abstractmethod
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
         """Minimise ``objective``, which keeps the best point, so that nothing is returned. Do not
-        catch its BudgetError: it ends the run when no trial is left. ``rng``: random numbers of the
-        session."""
+        catch its BudgetError: it ends the run when no trial is left. ``rng``: the session's
+        generator of random numbers."""

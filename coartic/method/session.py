@@ -38,7 +38,7 @@ from coartic.tasks.task import Task
 
 
 class Information(StrEnum):
-    """Information that a method can use, beyond the start, the hands and the number of goals."""
+    """Information that a method can use, beyond what a session shows to every method."""
 
     GOALS = "goals"
     """Centres of the goals, and their radius."""
@@ -74,15 +74,15 @@ METERED = frozenset(
 
 
 class UndeclaredError(CoarticError):
-    """A method used information that it does not declare."""
+    """A method used information that it does not declare, or a call that is not for it."""
 
 
 class BudgetError(CoarticError):
-    """A method asked for more trials than its budget has."""
+    """More trials were asked for than a budget has."""
 
 
 class MethodError(CoarticError):
-    """Raised by a method that finds no solution: ``infeasible`` or ``solver-failed``."""
+    """No solution was found: ``outcome`` is ``"infeasible"`` or ``"solver-failed"``."""
 
     def __init__(
         self,
@@ -110,7 +110,7 @@ class Meter:
     """Control ticks of all trials."""
     forward_kinematics: int = 0
     """Forward-kinematics evaluations, one per configuration. Compiled kernels skip steps that
-    cannot end a movement; a robot would sense its hand on every one of the ticks."""
+    cannot end a movement."""
     jacobians: int = 0
     """Jacobian evaluations; the corrective process makes one per iteration."""
     corrective_iterations: int = 0
@@ -131,7 +131,7 @@ class Meter:
     """Wall time of solving them."""
 
     COUNTS: ClassVar[tuple[str, ...]]
-    """Names of all counters but the times."""
+    """Names of all counters, without the times."""
     SOLVER: ClassVar[tuple[str, ...]] = (
         "forward_kinematics",
         "jacobians",
@@ -144,8 +144,8 @@ class Meter:
     that it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
-        """Add each count to the counter of that name (not to times, ``build_s`` and ``solve_s``),
-        in place. Names, signs, sums and budgets are not checked."""
+        """Add each count to the counter of that name, in place. Signs, sums and budgets are not
+        checked."""
         for name, count in counts.items():
             setattr(self, name, getattr(self, name) + int(count))
 
@@ -163,13 +163,13 @@ def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
 class Session:
     """The task, the seed and the meter with which a method works.
 
-    The declaration is enforced, and calls are counted: a call that uses information which
-    ``information`` lacks raises UndeclaredError. This is no sandbox. ``trusted`` methods, this
-    project's own, may also take the task to their compiled kernels and state the counts
-    themselves. ``of_run`` marks the session of a run: trials that a process makes outside such
-    sessions are counted apart (:func:`coartic.motion.trial.trials_outside`). ``trial_budget`` is
-    the most trials, None for any number. Threads can share a session: they make trials one after
-    the other, of one budget.
+    The declaration is enforced: a call that uses information of :data:`METERED` which
+    ``information`` lacks raises UndeclaredError. Trials and evaluations are counted. This is no
+    sandbox. ``trusted`` methods, this project's own, may also take the task to their compiled
+    kernels and state the counts themselves. ``of_run`` marks the session of a run: trials that a
+    process makes outside such sessions are counted apart
+    (:func:`coartic.motion.trial.trials_outside`). ``trial_budget`` is the most trials, None for any
+    number. Threads can share a session: they make trials one after the other, of one budget.
     """
 
     def __init__(
@@ -271,13 +271,13 @@ class Session:
 
     @property
     def used(self) -> frozenset[Information]:
-        """Set of the declared information that the method has used so far."""
+        """Set of the declared information of which the session has seen a use so far."""
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
         """Note a use of the corrective process if a corrective movement of a solution has no
         target: the corrective process finds the target. Raises UndeclaredError if the method does
-        not declare it, and SolutionError if the solution is no sequence."""
+        not declare that process, and SolutionError if the solution is no sequence."""
         if not isinstance(solution, Sequence):
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
         for m in solution:
@@ -317,7 +317,7 @@ class Session:
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
         """Run the corrective process from ``q``, ``(dof,)``, with a hand for a goal (from 1); count
-        its iterations, Jacobians and evaluations. Return the configuration that it finds: the last
+        its iterations, Jacobians and evaluations. Return the configuration found: the last
         iterate, without an error, if the result is not ``converged``. No movement is made.
 
         Raises UndeclaredError without ``Information.CORRECTIVE_PROCESS``, and ValueError for a goal
@@ -371,19 +371,19 @@ class Session:
         )
 
     def trials(self, hands: HandSequences, targets: Any, *, until: Any = None) -> Trials:
-        """Make N physical trials at once, in a fraction of the time of N calls of :meth:`trial`.
+        """Make N physical trials at once.
 
-        ``hands`` is one hand sequence for all (``"RRLR"``), or one each. ``targets`` has shape
-        ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
+        ``hands`` is one hand sequence for all (``"RRLR"``), or a sequence each. ``targets`` has
+        shape ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
         keeps its value, and for a goal without any target the corrective process acts alone, which
         has to be declared. Goals that are missed are corrected, and the ticks count. A trial with a
-        target beyond 100,000 fails without a movement.
+        target beyond 100,000, which :meth:`trial` refuses, fails without a movement.
 
-        Where the budget has fewer trials left, only the first are made: results have a row for each
+        Where the budget has fewer trials left, the first are made: results have a row for each
         trial made. With ``until``, rewards of shape ``(N,)``, trials end after the first whose
         reward exceeds its entry of ``until``; no later trial is counted or returned.
 
-        Rewards and counts are the same as of single trials, except that a single trial spends one
+        Rewards and counts are the same as with :meth:`trial`, except that :meth:`trial` spends one
         or two more evaluations of forward kinematics per goal. Where the corrective process is not
         declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
         Raises UndeclaredError without ``Information.REWARD_BY_TRIAL``, BudgetError where no trial
@@ -452,8 +452,9 @@ class Session:
         one hand (``"best-single-hand"``) or all (``"best-of-all"``).
 
         Trials of this search are counted as ``initial_trials``, not among the method's trials or in
-        its budget. Raises NotApplicableError if no sequence completes the task, or more than 4096
-        exist; UndeclaredError without ``Information.CORRECTIVE_PROCESS`` and ``REWARD_BY_TRIAL``.
+        its budget. Raises NotApplicableError if no such sequence completes the task, or there are
+        more than 4096; UndeclaredError without ``Information.CORRECTIVE_PROCESS`` and
+        ``REWARD_BY_TRIAL``.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
         chosen, spent = search_initial_hands(
@@ -502,17 +503,17 @@ class Session:
 
     @property
     def rewards(self) -> list[int | None]:
-        """Total reward of each of these trials, in order, a new list; None where one failed."""
+        """Total reward of each trial made, in order, a new list; None where a trial failed."""
         return [None if reward == NO_REWARD else reward for reward in self._rewards]
 
     # Counts that the method adds itself.
 
     def spend(self, **counts: int) -> None:
-        """Add counts to the counters of these names: evaluations of a solver, and iterations of a
-        corrective process that the method runs itself, which are Jacobians, too. A method may name
-        counters of :attr:`Meter.SOLVER`, a trusted method all of :attr:`Meter.COUNTS`.
+        """Add counts to the counters of these names. A method may name counters of
+        :attr:`Meter.SOLVER`, a trusted method all of :attr:`Meter.COUNTS`.
 
-        Raises ValueError for another counter, for a negative count, and for a sum beyond 2^63 - 1.
+        Raises ValueError for another counter, for a count that is no whole number from 0, and for a
+        sum beyond 2^63 - 1.
         """
         allowed = Meter.COUNTS if self._trusted else Meter.SOLVER
         for name, count in counts.items():
@@ -523,11 +524,11 @@ class Session:
         self._meter.add(**counts)
 
     def building(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block, s, to ``build_s``, the set-up."""
+        """Return a context that adds the wall time of its block, s, to counter ``build_s``."""
         return self._timing("build_s")
 
     def solving(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block, s, to ``solve_s``, the search."""
+        """Return a context that adds the wall time of its block, s, to counter ``solve_s``."""
         return self._timing("solve_s")
 
     @contextmanager
@@ -544,7 +545,7 @@ class Session:
     def reveal(self, *information: Information) -> Task:
         """Return the task itself, for compiled methods of this project that count by themselves,
         with :meth:`spend`. Note ``information``, at least one item, as used. Raises UndeclaredError
-        for any other method, and without an item or for one that the method does not declare.
+        for any other method, without an item, and for an item that the method does not declare.
         """
         self._needs_trust("reveal")
         if not information:

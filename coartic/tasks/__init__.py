@@ -1,2 +1,2 @@
-"""Tasks: what they are, by which names they go, and families of random ones. They know the robot,
-and nothing that solves them."""
+"""Tasks, the names under which they are found, and families of random tasks. They import the robot
+and its motion, and no method."""

@@ -43,7 +43,7 @@ def load_task(name_or_path: str | Path) -> Task:
     Raises
     ------
     TaskError
-        There is no such task, or the file cannot be used. The message names the file and the key.
+        There is no such task, or the file cannot be used: the message names the file.
     TypeError
         The argument is neither a text nor a path.
     """
@@ -80,7 +80,7 @@ def load_task(name_or_path: str | Path) -> Task:
 
 def as_task(task: TaskLike) -> Task:
     """Return the task itself, or load it by its name or from its file (:func:`load_task`). Raises
-    TaskError if there is no such task, and TypeError for anything else."""
+    TaskError for a task that cannot be loaded, and TypeError for anything else."""
     if isinstance(task, Task):
         return task
     if not isinstance(task, str | Path):

@@ -2,9 +2,9 @@
 
 A family is a file, ``families/NAME.vN.toml``: how many goals, where, for which hands, arms and
 base, from which start; once released, it is not changed, and a change is a new version. An
-instance is a task by the name ``two-armed/v1/i017``, and a function of this name alone: numbers
+instance is a task by the name ``two-armed/v1/i017``, and a function of file and name alone: numbers
 come from a counter-based generator (:mod:`coartic.tasks.philox`) whose key is the hash of family,
-version and stream and whose counter is the number of the instance. Streams are ``d`` (development:
+version and stream and whose counter has the number of the instance. Streams are ``d`` (development:
 to tune on), ``i`` (test: to report on) and years (``2027-``: fresh ones).
 
 What is drawn once is the structure: how many goals and links, the base, the kind of start. Places
@@ -53,7 +53,7 @@ from coartic.tasks.task import (
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
 COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
-"""Number of instances of each split that an agent is given by default, from instance 0."""
+"""Number of instances of each split that are named by default, from instance 0."""
 MOST_ATTEMPTS = 10_000
 """Most drafts of one instance; a family that needs more cannot be used."""
 Base = Literal["free", "rail", "locked"]
@@ -69,7 +69,7 @@ _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
 def _in_thousandths(value: float) -> int:
-    """Return a number in thousandths, 300 for 0.3. Raises a validation error for anything but a
+    """Return a number in thousandths, 300 for 0.3. Raises a validation error for what is no
     finite number with at most three decimals."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not is_number or not abs(value * _PARTS) <= sys.float_info.max:
@@ -99,7 +99,7 @@ _Bases = tuple[Base, ...]
 
 
 class _Region(FileData):
-    """Region of the goals: a box, within which a box with a drawn share of its sides is placed."""
+    """Region of the goals: a box, in which a box with a drawn share of the sides is placed."""
 
     x: Span
     """From, to, length unit; at the start the base is at the origin."""
@@ -110,12 +110,12 @@ class _Region(FileData):
 
 
 class _Alignment(FileData):
-    """Goals on a horizontal or vertical line, but for one that is neither first nor last."""
+    """Goals on a horizontal or vertical line, except one, not first or last, of three or more."""
 
     steps: Span
     """Distance from goal to goal along the line, length unit, from, to."""
     off: Span
-    """Distance of the one goal from the line, to either side, length unit, from, to."""
+    """Distance of that goal from the line, to either side, length unit, from, to."""
 
 
 class Posture(FileData):
@@ -124,15 +124,14 @@ class Posture(FileData):
     first: Span
     """Angle of the first joint from +x, rad, from, to."""
     others: Span
-    """Angle of each other joint from the link before it, rad, from, to. Within ±π/2 an arm is
-    singular only where all these angles are 0."""
+    """Angle of each other joint from the link before it, rad, from, to."""
 
 
 _PARKED = Posture(first=(0, 0), others=(0, 0))
 
 
 class Postures(FileData):
-    """Both arms at the start; an arm whose hand has nothing to do is parked at 0."""
+    """Both arms at the start; an arm without an entry is straight along +x."""
 
     left: Posture = _PARKED
     """The left arm."""
@@ -141,9 +140,9 @@ class Postures(FileData):
 
 
 class Family(FileData):
-    """Distributions of tasks, and what no instance may be.
+    """Distributions of tasks, and rules that each instance keeps.
 
-    Lengths, angles and shares are kept in thousandths of what the file says.
+    Lengths, angles and shares of the file are kept as whole thousandths: 300 for 0.3.
     """
 
     name: str
@@ -170,7 +169,7 @@ class Family(FileData):
     region: _Region
     """Region of the goals: table ``[region]``."""
     line: _Alignment | None = None
-    """Goals on a line: table ``[line]``; scattered over the region where left out."""
+    """Goals on a line: table ``[line]``; scattered in the region where left out."""
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
     """Starting postures; each instance has one: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
@@ -252,10 +251,11 @@ def broken_rule(family: Family, task: Task) -> str | None:
     None if it breaks no rule.
 
     ``outside``: a goal is outside the region. ``overlap``: two goals are too near to each other.
-    ``reach``: a hand cannot come near enough to a goal, with the base of the draft or of a
+    ``reach``: a goal is too far from a shoulder, with the base of the draft or of a
     restriction. ``straight``: an arm is straight at the start, or nearly. ``start-hit``: a hand is
     in a goal at the start, or close by. ``corrective``: the corrective process alone does not
-    complete the task, with the base of the draft or of a restriction.
+    complete the task, with the base of the draft or of a restriction, or has more than 4096 hand
+    sequences to try.
     """
     goals = [(_in_thousandths(x), _in_thousandths(y)) for x, y in task.goals]
     (left, right), (low, high) = family.region.x, family.region.y
@@ -337,8 +337,8 @@ def instance_of(family: Family, address: Address) -> Task:
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
     """Return an instance of a family, a task, by its name, such as ``two-armed/v1/i017``, or
-    ``mine.v1.toml/i017`` of the family of a file; the last 4096 are kept. Raises TaskError for any
-    other name."""
+    ``mine.v1.toml/i017`` of the family of a file; the last 4096 are kept. Raises TaskError if
+    there is no such instance."""
     place, _, short = name.rpartition("/")
     address = address_of(f"{load_family(place).name}/{short}" if is_file(place) else name)
     if address is None:
@@ -350,7 +350,7 @@ def instance(name: str) -> Task:
 
 
 def is_file(family: str) -> bool:
-    """Return whether a family is named by its file, whose name ends in ``.toml``."""
+    """Return whether a family is named by a file: whether its name ends in ``.toml``."""
     return family.endswith(".toml")
 
 
@@ -399,7 +399,7 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 def load_family(name: str) -> Family:
     """Return a shipped family by its name with version, such as ``two-armed/v1``, or a family of
-    your own by the path of its file. Raises TaskError if it does not exist."""
+    your own by the path of its file. Raises TaskError if it does not exist or cannot be used."""
     if is_file(name):
         return read_family(Path(name))
     shipped = shipped_families()
@@ -409,8 +409,8 @@ def load_family(name: str) -> Family:
 
 
 def is_family(name: str) -> bool:
-    """Return whether a text is the name of a shipped family, or of a file that holds a family. A
-    file that cannot be read holds none."""
+    """Return whether a text is the name of a shipped family, or of a ``.toml`` file that can be
+    read and has the key ``region``."""
     with suppress(TaskError):
         return name in shipped_families() or (
             is_file(name) and "region" in read_toml(name, error=TaskError)
@@ -421,9 +421,9 @@ def is_family(name: str) -> bool:
 @cache
 def read_family(path: Path) -> Family:
     """Read a family from its TOML file, which names it: ``two-armed.v1.toml`` has family
-    ``two-armed/v1``. A process reads each path once.
+    ``two-armed/v1``. The family of a path is cached.
 
-    Raises TaskError, with one line per problem, for a file that is no family.
+    Raises TaskError for a file that is no family.
     """
     content, name = read_toml(path, error=TaskError), "/".join(path.stem.rsplit(".", 1))
     if "name" in content:
@@ -447,8 +447,8 @@ def instance_names(
     else 10.
 
     Raises ValueError for another split, for a count that is not from 1 to 10,000, for fresh
-    instances without a year from 1000 to 9999, and for others with a year; TaskError for an unknown
-    family.
+    instances without a year from 1000 to 9999, and for others with a year; TaskError for a family
+    that is unknown or cannot be used.
     """
     load_family(str(family))
     if split not in COUNTS:

@@ -1,8 +1,8 @@
 """The best rewards known, as they are shipped, with what is proven about them.
 
 ``optima.json`` has the best reward that any method found for the paper's tasks, with run ids and
-solutions, ``best_known.csv`` that for test instances of families. ``studies/optima`` takes over
-better rewards from results folders, and proves the bounds.
+solutions, ``best_known.csv`` the best reward for test instances of families. ``studies/optima``
+takes over better rewards from results folders, and proves the bounds.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ KEPT = ("start", "radius", "hands", "locked_base", "robot")
 
 @dataclass(frozen=True)
 class KnownOptimum:
-    """The best reward known of a task, with all joints free and under the paper's model."""
+    """The best reward known of a task, with both arms free and under the paper's model."""
 
     reward: int
     """Total reward, minus the ticks."""
@@ -55,9 +55,9 @@ def essence(task: Task) -> str:
 
 
 def best_shipped(task: Task) -> KnownOptimum | None:
-    """Return the best reward known of a task, from the shipped files; the task is recognised by
-    :func:`essence`, whatever its name. Return None for a task that is not there, as instances of a
-    family except the first 40 of its test split."""
+    """Return the best reward known of a task, and its bound, from the shipped files; the task is
+    recognised by :func:`essence`, whatever its name. Return None for a task that is not there, such
+    as instances of a family except the first 40 of its test split."""
     return _by_essence().get(essence(task))
 
 

@@ -56,10 +56,10 @@ class Draws:
         self._pairs = (pair for a, b, c, d in blocks for pair in (a << 32 | b, c << 32 | d))
 
     def integer(self, least: int, most: int) -> int:
-        """Draw an integer from ``least`` to ``most``, both included, with equal probabilities to
-        within 2^-64."""
+        """Return an integer from ``least`` to ``most``, both included, drawn with equal
+        probabilities to within 2^-64."""
         return least + (next(self._pairs) * (most - least + 1) >> 64)
 
     def one_of(self, choices: Sequence[Choice]) -> Choice:
-        """Draw and return one of ``choices``, each equally likely."""
+        """Return one of ``choices``, drawn with probabilities as in :meth:`integer`."""
         return choices[self.integer(0, len(choices) - 1)]

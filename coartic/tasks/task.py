@@ -1,8 +1,6 @@
 """Tasks: a start, a sequence of goals, and what is known about each figure.
 
-A task is read from a TOML file, one of those shipped in ``paper`` or the
-user's own in the same form. Anything that cannot be right is refused with the file,
-the key and what would be right.
+A task is read from a TOML file, shipped in ``paper`` or the user's own in the same form.
 """
 
 from __future__ import annotations
@@ -41,7 +39,7 @@ NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 """Form of names of tasks and suites, which become names of files and parts of commands."""
 _IN_FAMILY = r"^([a-z][a-z0-9-]*/v[1-9][0-9]?/)?"
 TASK_PATTERN = _IN_FAMILY + NAME_PATTERN.removeprefix("^")
-"""Form of names of tasks, those among them that are drawn from a family."""
+"""Form of names of tasks, also of instances of a family."""
 _ADDRESS = re.compile(_IN_FAMILY.removesuffix("?") + r"([di]|[0-9]{4}-)([0-9]{3,6})")
 WITHOUT_REACH = "without reach"
 
@@ -93,8 +91,8 @@ class Address(NamedTuple):
 
 def address_of(name: str) -> Address | None:
     """Return the address that a task's name spells: ``two-armed/v1/i017`` is family
-    ``two-armed/v1``, stream ``i``, number 17. None for a name of another form, such as ``i0017``;
-    whether the family exists is not checked."""
+    ``two-armed/v1``, stream ``i``, number 17. None for a name of another form, such as number
+    ``0017``; whether the family exists is not checked."""
     parts = _ADDRESS.fullmatch(name)
     if parts is None:
         return None
@@ -126,7 +124,7 @@ class Start(FileData):
 class Task(FileData):
     """A sequence of spatial goals to be hit in turn, each with one of the robot's hands.
 
-    :func:`load_task` reads one from a file, or finds it by its name. It cannot be changed. In
+    :func:`load_task` reads a task from a file, or finds it by its name. Fields cannot be set. In
     Python ``q0=``, a configuration ``(dof,)``, can stand for ``start``:
     ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
 
@@ -135,7 +133,7 @@ class Task(FileData):
     """
 
     name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)] = "unnamed"
-    """Name in commands, suites and tables: letters, digits, ``.``, ``_``, ``-``."""
+    """Name in commands, suites and tables, such as ``ascending`` or ``two-armed/v1/i017``."""
     title: Line = ""
     """Name in figures and tables; ``name`` if it is empty."""
     description: Line = ""
@@ -217,7 +215,7 @@ class Task(FileData):
     def _with_start(cls, content: Any) -> Any:
         """Return the content of a task with ``q0``, ``(dof,)``, as ``start``, or, without either,
         with the base at (0, 0) and both arms along +x; what is no dictionary comes back unchanged.
-        Raises a validation error for both, for a wrong ``q0`` and for the key ``penalty``."""
+        Raises a validation error for both keys, a wrong ``q0`` and the key ``penalty``."""
         if not isinstance(content, dict):
             return content
         if "penalty" in content:
@@ -280,9 +278,9 @@ class Task(FileData):
 
     @checked_arguments
     def save(self, path: str | Path, *, replace: bool = False) -> None:
-        """Write the task as a file ``.toml``, which :func:`load_task` reads. With ``replace`` a
-        file of that name is written over. Raises CoarticError if its name does not end in
-        ``.toml``, if the file cannot be written, or if it is there and ``replace`` is False."""
+        """Write the task as a task file, ``.toml``. With ``replace`` a file of that name is written
+        over. Raises CoarticError if its name does not end in ``.toml``, if the file cannot be
+        written, or if it is there and ``replace`` is False."""
         file = folder_named(path, "the name of a task's file")
         if file.suffix != ".toml":
             raise CoarticError(f"cannot write {file}: the name of a task's file ends in .toml")
@@ -345,8 +343,8 @@ def check_hands(task: Task, hands: str) -> str:
 
 def _out_of_reach(task: Task, tolerance: float) -> str | None:
     """Return a sentence on the first goal that no hand of the task, or not the hand that
-    ``initial_hands`` gives it, can reach to ``tolerance``, the distance from its centre at which
-    the corrective process ends, length unit; None if all can be reached."""
+    ``initial_hands`` gives it, can reach to ``tolerance``, a distance from its centre, length unit;
+    None if all can be reached."""
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
         excess = {hand: beyond_reach(task, hand, goal, tolerance) for hand in task.hands}
@@ -390,7 +388,7 @@ def check_task(task: Task) -> Task:
 
 def read_task(path: Path) -> Task:
     """Read a task from its TOML file; a task without the key ``name`` has the file's name, without
-    the ending. Raises TaskError, which names the file and the key, for a file that is no task."""
+    the ending. Raises TaskError, which names the file, for a file that is no task."""
     return parse_task({"name": path.stem, **read_toml(path, error=TaskError)}, str(path))
 
 
@@ -412,7 +410,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     source : str
         Name of the content in errors, such as the path of the file.
     reach : bool
-        Whether to refuse goals that are out of reach.
+        True to refuse goals that are out of reach.
 
     Returns
     -------
@@ -422,7 +420,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     Raises
     ------
     TaskError
-        The content is no task. The message has a line for each problem.
+        The content is no task.
     """
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
@@ -438,8 +436,7 @@ def _all_keys() -> list[str]:
 
 
 def task_text(task: Task) -> str:
-    """Return the task as the text of its file, from which :func:`coartic.load_task` reads an equal
-    task."""
+    """Return the task as the text of a task file, TOML."""
     content = task.model_dump(mode="json")
     tables = {key: content.pop(key, {}) for key in ("start", "robot", "provenance")}
     if task.robot == Robot():
