@@ -26,11 +26,11 @@ KINEMATICS = frozenset({Information.GOALS, Information.FORWARD_KINEMATICS, Infor
 """Information of a planner about goals and hands."""
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
-"""A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
+"""A hand sequence with a configuration per goal, ``(G, dof)``, as a start of a solver."""
 Layers = dict[tuple[int, Hand], Array]
 """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
 Nodes = Annotated[int, Field(ge=10, le=1000)]
-"""Parameter: nodes of a layer."""
+"""Parameter: number of samples for a layer."""
 Count = Annotated[int, Field(ge=1)]
 """Parameter: a number of graphs, chains or starts."""
 BEAM_WIDTH = 64
@@ -80,12 +80,12 @@ class Beginning(NamedTuple):
 
     hands: HandSequence
     nodes: dict[Hand, Array]
-    """Nodes of the layer in which each hand was last used."""
+    """Nodes of the layer in which each hand was last used, ``(n, dof)``; else the start."""
     cost: Array
     """``cost[i, j]``: the joint-space length of the shortest chain to node i of the hand used last
     and node j of the other hand."""
     back: tuple[NDArray[np.int32], ...]
-    """For each goal, ``back[i, j]``: the index of the node from which the chain came to this
+    """For each goal, ``back[i, j]``: the index of the node from which the goal's hand came to this
     state."""
 
 
@@ -94,8 +94,9 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
     for each goal and hand; return them by ``(goal, hand)``, goals from 0, and the
     ``forward_kinematics`` and ``jacobians`` counted.
 
-    Half of the samples begin at nodes of the goal before, by whichever hand: of 40 one-armed random
-    tasks the best path known was then found more often on 23, less often on 11.
+    Half of the samples begin at nodes of the goal before, by whichever hand, if it has any, others
+    at the start: of 40 one-armed random tasks the best path known was then found more often on 23,
+    less often on 11.
     """
     spent: Counter[str] = Counter()
     layers: Layers = {}
@@ -178,10 +179,10 @@ def cheapest_chains(
 ) -> Iterator[Chain]:
     """Yield hands and configurations ``(G, dof)`` of the cheapest chain of each hand sequence, at
     most ``most`` a graph in alphabetical order (:func:`chains_of`), of ``graphs`` random graphs
-    with ``nodes`` postures per goal and hand, then of more graphs until at least ``chains`` are
-    yielded. With ``spread`` and two hands each chain is followed by a copy in which the idle arm
-    moves in equal steps (:func:`move_other_arm`), which does not count for ``chains``. The session
-    counts the evaluations. Raises MethodError if a goal has no posture in a graph."""
+    with at most ``nodes`` postures per goal and hand, then of more graphs until at least ``chains``
+    are yielded. With ``spread`` and two hands each chain is followed by a copy in which the idle
+    arm moves in equal steps (:func:`move_other_arm`), which does not count for ``chains``. The
+    session counts the evaluations. Raises MethodError if a goal has no posture in a graph."""
     yielded = 0
     for number in itertools.count(1):
         layers, spent = sample_layers(task, nodes, rng)
