@@ -52,7 +52,8 @@ class Solution(NamedTuple):
 
 def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
     """Find changes x of the joints with A x >= b as nearly as they can be, at most 2 in absolute
-    value (level 1), then the x nearest to z among these (level 2); return the changes of both.
+    value (level 1), then the x nearest to z among these (level 2); return both, with the
+    iterations.
 
     ``rows`` is A, shape ``(m, joints)``, length unit per unit of change; ``least`` is b, shape
     ``(m,)``, length unit; ``preferred`` is z, shape ``(joints,)``. Raises MethodError if the solver
@@ -70,10 +71,9 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
 def _solve_level(
     level: int, hessian: Array, gradient: Array, rows: Array, least: Array
 ) -> tuple[Array, int]:
-    """Minimise ½ vᵀ H v + gᵀ v (``hessian`` H, ``gradient`` g) with A x + s >= b (``rows`` A,
-    ``least`` b) and all |x| <= 2; return v, the changes x, at level 1 preceded by the slack s (else
-    0), and the number of iterations. Raises MethodError, with the ``level``, if the solver fails.
-    """
+    """Minimise ½ vᵀ H v + gᵀ v (``hessian`` H, ``gradient`` g), v = (s, x) at level 1 and x at
+    level 2, with A x + s >= b (``rows`` A, ``least`` b; s = 0 at level 2) and |x_i| <= 2; return v
+    and the number of iterations. Raises MethodError, which names ``level``, if the solver fails."""
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))
     matrix[:task, :-joints] = -1.0

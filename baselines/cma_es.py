@@ -1,12 +1,11 @@
 """CMA-ES over target configurations; hand sequences by a bandit, or goal by goal.
 
-Each hand sequence has an evolution strategy (CMA-ES, Hansen 2016) over the targets of all explored
-joints, which sees the total reward of each trial and nothing else. Its first mean are the
-configurations of the corrective process **A** alone, which takes one trial; its first step size is
-``sigma``; where it stops by its own criteria it starts again from the first mean with twice the
-population (IPOP, Auger & Hansen 2005). A failed trial ranks last. UCB1 (Auer, Cesa-Bianchi &
-Fischer 2002) on the best reward of each sequence, scaled by the spread of the first rewards,
-decides in ``cma-es/bandit`` which strategy makes the next generation of trials.
+Each hand sequence has an evolution strategy (CMA-ES) over the targets of all explored joints, which
+sees the total reward of each trial and nothing else. Its first mean are the configurations of the
+corrective process **A** alone, which takes one trial; its first step size is ``sigma``; where it
+stops by its own criteria it starts again from the first mean with twice the population (IPOP). A
+failed trial ranks last. UCB1 on the best reward of each sequence, scaled by the spread of the first
+rewards, decides in ``cma-es/bandit`` which strategy makes the next generation of trials.
 
 Tuning, three or four runs a value. c = 0.02, 0.05, 0.1, 0.2, 0.5 on the two-armed tasks: no
 reward differs by more than 2.4; with the other arm kept still, up to 0.05 can settle on RRRR in
@@ -108,9 +107,9 @@ class CMAES(Method):
     Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
-        """Make a trial by the corrective process with each hand sequence, then, if one succeeds,
-        generations of trials until none is left; return the movements of the best trial. Raises
-        MethodError if no trial hit every goal."""
+        """Make a trial by the corrective process with each hand sequence (of more than 4096 only
+        with the initial one), then, if one succeeds, generations of trials until none is left;
+        return the movements of the best trial. Raises MethodError if no trial hit every goal."""
         attempts = Attempts(session, self.parameters.trials)
         with session.solving():
             strategies = [
@@ -140,8 +139,8 @@ class GoalByGoalParameters(UninformedParameters):
 
 
 class GoalByGoal(Method):
-    """CMA-ES for each hand sequence; the hand of each goal is chosen by the best reward of trials
-    with this hand after the hand before."""
+    """CMA-ES for each hand sequence; the hand of each goal is the hand with the best reward after
+    the hand before, or random."""
 
     name = "cma-es/goal-by-goal"
     version = 2

@@ -47,7 +47,7 @@ class Aim(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """The path from the start, or from one goal, to a goal."""
+    """A simulated path to a goal, from the start or from the goal before."""
 
     movement: Movement
     """Movement of kind ``path`` to the goal."""
@@ -144,10 +144,10 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Return the changes x of the joints with A x >= b (``rows`` A, ``least`` b) as nearly as
-        they can be and, of these, nearest to ``preferred`` (:func:`solve_cascade`); count two
-        programmes in ``solves``, and the iterations in the session. Raises MethodError if the
-        solver fails."""
+        """Return the changes x of the joints with A x >= b (``rows`` A, ``(m, joints)``; ``least``
+        b, ``(m,)``) as nearly as they can be and, of these, nearest to ``preferred``
+        (:func:`solve_cascade`); count two programmes in ``solves``, and the iterations in the
+        session. Raises MethodError if the solver fails."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)

@@ -39,7 +39,7 @@ class GivenHands(Method):
 
 
 class BestHands(Method):
-    """The corrective process with every hand sequence; the best one is kept."""
+    """The corrective process with every hand sequence; the best sequence is kept."""
 
     name = "corrective-alone/best-hands"
     tuned_on = GivenHands.tuned_on

@@ -23,7 +23,7 @@ _MOST_DRAWN = 128  # trials that are drawn before they are made, at most
 
 
 class HillClimbing(Method):
-    """A (1+1) hill climber per hand sequence."""
+    """Hill climbing for each hand sequence, from its best trial so far."""
 
     name = "hill-climbing"
     tuned_on = "nothing: the paper's values"

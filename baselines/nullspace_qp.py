@@ -18,7 +18,7 @@ the step is shortened, and the hand goes straight and slower. Level 2 takes the 
 
 Sources: Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987), Task-priority based redundancy control of
 robot manipulators; O. Kanoun, F. Lamiraux, P.-B. Wieber (2011); the next goal as the objective of
-lower priority: K. Rohanimanesh et al. (2004), B. Thibodeau et al. (2004). Nothing was tuned.
+lower priority: K. Rohanimanesh et al. (2004), B. Thibodeau et al. (2004).
 """
 
 from __future__ import annotations

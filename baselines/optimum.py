@@ -37,7 +37,7 @@ class OptimumParameters(Parameters):
     nodes: Nodes = 200
     """Most postures per goal and hand in a graph."""
     graphs: Count = 3
-    """Independent graphs, or more, until there are as many ``chains``."""
+    """Independent graphs; more are made while chains are too few."""
     chains: Count = 100
     """Least number of chains, over all graphs and hand sequences. With three, the best path known
     was missed on 9 of 40 random tasks for one arm."""

@@ -12,7 +12,7 @@ For every goal a posture is planned first, then the straight joint-space movemen
 
 With a horizon of two goals the cost of travel includes the way on to a posture for the next goal.
 Only the first movement is made; the second posture is planned again from there. The authors name
-anticipation as an extension (1995); this form of it is ours.
+anticipation as an extension (1995); this form is ours.
 
 Where this differs from the theory: the cost of travel is the joint-space distance, which the tasks
 charge, not each joint's expense. The hierarchy has two levels: there are no obstacles. The store

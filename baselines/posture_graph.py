@@ -91,12 +91,11 @@ class Beginning(NamedTuple):
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
     """Sample at most ``count`` nodes (postures with the hand in the goal, ``(n, dof)``), or none,
-    for each goal and hand; return them by ``(goal, hand)``, goals from 0, and the
-    ``forward_kinematics`` and ``jacobians`` counted.
+    for each goal and hand; return them by ``(goal, hand)``, goals from 0, and the numbers of
+    ``forward_kinematics`` and ``jacobians`` evaluated.
 
-    Half of the samples begin at nodes of the goal before, by whichever hand, if it has any, others
-    at the start: of 40 one-armed random tasks the best path known was then found more often on 23,
-    less often on 11.
+    Half of the samples begin at nodes of the goal before, by whichever hand, if it has any; others
+    begin at the start.
     """
     spent: Counter[str] = Counter()
     layers: Layers = {}
@@ -143,8 +142,8 @@ def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain
 
 
 def _extend(task: Task, layers: Layers, begun: Beginning) -> Iterator[Beginning]:
-    """Yield the cheapest chains of a beginning extended by one goal, once for each hand that has a
-    node in its layer of ``layers``, left before right."""
+    """Yield ``begun``, the cheapest chains for the beginning of a hand sequence, extended by one
+    goal, once for each hand that has a node for it in ``layers``, left before right."""
     hands, nodes, cost, back = begun
     goal = len(hands)
     for hand in sorted(task.hands):  # left before right

@@ -77,14 +77,14 @@ def draw_trials(
     session: Session, hands: str | None, parameters: RandomSearchHandsParameters
 ) -> tuple[Attempts, int]:
     """Make a trial of the corrective process alone with one or more hand sequences, then trials
-    with noise with one of them until none is left; return the trials, which keep the best of all,
-    and the number of trials with noise.
+    with noise with the best of them until none is left; return an account of the trials, which
+    keeps the best trial of all, and the number of trials with noise.
 
     ``hands``: a hand sequence, or None for the sequence with which the process alone does best,
     among as many as there are trials; where more than 4096 exist, the task's initial sequence.
     ``parameters.trials``: most trials, both kinds together. Raises MethodError without a single
     trial, and if the process completes none of the sequences; ValueError for ``hands`` that do not
-    fit.
+    fit the task.
     """
     attempts = Attempts(session, parameters.trials)
     trials = attempts.left

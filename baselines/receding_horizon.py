@@ -1,12 +1,11 @@
 """A planner that looks a fixed number of goals ahead.
 
 From where the robot stands it seeks the shortest movements through the next goals, ``horizon``
-beyond the one to be hit, over hand sequences. It makes the first of them, stands where that
-one ended, and plans again (model predictive control: Garcia, Prett & Morari 1989; Mayne, Rawlings,
-Rao & Scokaert 2000). With ``horizon`` 0 it goes to each goal the shortest way. A window that
-reaches the last goal is followed to its end, since planning again would find the rest of it. With
-a horizon of all goals it plans the whole task at once, so that its gap to the optimum is what the
-smaller search costs.
+beyond the one to be hit, over hand sequences. It makes the first of them, stands where that one
+ended, and plans again (model predictive control). With ``horizon`` 0 it goes to each goal the
+shortest way. A window that reaches the last goal is followed to its end, since planning again would
+find the rest of it. With a horizon of all goals it plans the whole task at once, so that its gap to
+the optimum is what the smaller search costs.
 
 A window is planned as ``optimum/search`` plans a task (:mod:`.shortest_paths`): chains of posture
 graphs, IPOPT, whole ticks. Two things differ, for speed: fewer chains, with two hands from smaller
@@ -47,7 +46,7 @@ class RecedingHorizonParameters(Parameters):
     """Most postures per goal of a posture graph, shared by the hands: with two, half as many each.
     """
     graphs: Count = 3
-    """Independent graphs for each window, or more, until there are as many ``chains``."""
+    """Independent graphs for each window; more are made while chains are too few."""
     chains: Count = 24
     """Least number of chains of each window, over all graphs and hand sequences."""
     starts: Count = 24

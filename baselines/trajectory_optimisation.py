@@ -40,8 +40,8 @@ class TrajectoryParameters(Parameters):
     """Hand sequences that are planned, and the starts of each."""
 
     most_sequences: Count = BEAM_WIDTH
-    """Most hand sequences that are planned in a graph: all sequences of two hands for up to six
-    goals; of more sequences those with which a beam search of this width over the goals ends."""
+    """Most hand sequences that are planned in a graph, 64 for all of two hands and six goals; of
+    more sequences those with which a beam search of this width over the goals ends."""
     nodes: Nodes = 150
     """Most postures per goal and hand in a graph."""
     graphs: Count = 3
@@ -62,16 +62,16 @@ class SmoothParameters(TrajectoryParameters):
 
 
 class JerkParameters(SmoothParameters):
-    """Parameters without noisy starts: on the paper's tasks these find cheaper plans for four of 34
-    hand sequences, and change neither hands nor ticks."""
+    """Parameters, by default without noisy starts: these find cheaper plans for four of 34 hand
+    sequences of the paper's tasks, and change neither hands nor ticks."""
 
     noisy_starts: Annotated[int, Field(ge=0)] = 0
     """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
 
 
 class HandJerkParameters(JerkParameters):
-    """Parameters with one start for a hand sequence: a plan by jerk of the hand takes four times as
-    long, and on the paper's tasks a second start found no other plan for any hand sequence."""
+    """Parameters, by default with one start for a hand sequence: a plan by jerk of the hand takes
+    four times as long, and on the paper's tasks a second start found no other plan."""
 
     graphs: Count = 1
     """Independent graphs, one start for a hand sequence from each."""

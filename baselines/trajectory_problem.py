@@ -122,7 +122,7 @@ def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np
 
 @dataclass(frozen=True)
 class PathPlan:
-    """The outcome of a solve, converged or not."""
+    """A plan, the outcome of a solve, converged or not."""
 
     instance: Instance
     """The instance that was solved."""
@@ -372,8 +372,8 @@ def segment_lengths(configurations: Array) -> Array:
 
 
 def spline(plan: PathPlan, samples: int) -> list[Array]:
-    """Return configurations along a plan with rates, a list of a piece ``(samples, dof)`` per goal,
-    each at equal steps in time and ending at the goal; the start is left out. Between goals:
+    """Return configurations along a plan with rates, a list of pieces ``(samples, dof)``, one per
+    goal, each at equal steps in time and ending at the goal; the start is left out. Between goals:
     Hermite cubics (plans with velocities) or quintics (accelerations too)."""
     from scipy.interpolate import BPoly  # slow, and a command that names methods needs none
 

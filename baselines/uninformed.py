@@ -99,7 +99,7 @@ class Attempts:
 
     @property
     def solution(self) -> tuple[Movement, ...]:
-        """The movements of the best trial; ValueError before the first success."""
+        """The movements of the best trial. Raises ValueError before the first success."""
         return movements_of(self.hands, self.targets)
 
     def result(self, **details: Any) -> Result:

@@ -1,10 +1,9 @@
 """From a shortest path to movements in whole control ticks.
 
-A movement lasts a whole number of steps of length m, so a plan whose segments are not
-multiples of m pays for the rest of each. Here the segments are rounded and the plan is
-solved again around them, and each movement aims *through* the goal's rim: a target a
-little beyond it on the same joint-space line, so that the movement ends by hitting the
-goal and not by arriving short of it.
+A movement lasts a whole number of steps of length m, so a plan whose segments are not multiples of
+m pays for the rest of each. Here the segments are rounded and the plan is solved again around them,
+and each movement aims *through* the goal's rim: its target lies beyond, on the same joint-space
+line, so that the movement ends by hitting the goal and not by arriving short of it.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from coartic.robot import Array
 
 MOST_ROUNDINGS = 64  # of a plan that are tried: all with up to seven goals
 _SLACK = 1e-6  # of a step: lengths are known to the solver's tolerance
-_BEYOND = tuple(1 << k for k in range(11))  # steps that a target lies beyond the rim
+_BEYOND = tuple(1 << k for k in range(11))  # steps that a target lies beyond the configuration
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,7 @@ class Rounding:
     def nearest(self, plan: PathPlan) -> TickPlan | None:
         """Return the plan solved again with each segment except the last at the nearest whole
         number of steps, and the last, as short as it then can be, rounded up; None if a solve
-        fails. To first order all roundings of a shortest path (:meth:`every`) have as many ticks.
-        """
+        fails. To first order all roundings of a shortest path (:meth:`every`) have equal ticks."""
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
 
@@ -91,10 +89,9 @@ class Rounding:
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
         """Yield pairs: a tuple of goals (from 0) that are hit without a movement, and the shortest
-        plan found in which these goals are hit so; first the empty tuple with ``plan`` itself. Such
-        a plan pays if its path grows by fewer steps than the ticks that it saves. ``worth`` is
-        asked whether a number of ticks is of interest; plans that cannot have such a number, by
-        :meth:`least`, are not sought."""
+        plan found in which these goals are hit so; first the empty tuple with ``plan`` itself.
+        ``worth`` is asked whether a number of ticks is of interest; plans that cannot have such a
+        number, by :meth:`least`, are not sought."""
         hands, goals = self._instance.hands, len(self._instance.hands)
         # The hand can be there before: at the start, since another hand hits the goal before, or
         # since the discs of both goals overlap.
@@ -177,10 +174,10 @@ def movements(
 
     Joints that are held on the way to a goal stay where they are, even if an earlier movement ended
     by a hit short of its target. With ``steps``, a number per goal, the target of a movement lies
-    beyond the rim of the goal's disc, on the same line, so that the movement hits after at most
-    that many steps; if no such target does, the target is the configuration given. For 0 steps the
-    movement is corrective, and not to be made where the hand is in the goal already. The session
-    counts the effort.
+    beyond the configuration, on the same line, so that the movement hits after at most that many
+    steps; if no such target does, the target is the configuration. For 0 steps the movement is
+    corrective, and not to be made where the hand is in the goal already. The session counts the
+    effort.
     """
     planned: list[Movement] = []
     q, model = np.array(task.q0), session.model
