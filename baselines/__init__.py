@@ -1,1 +1,1 @@
-"""Methods the learner is compared with, one concept a file. Imports only ``coartic``."""
+"""Methods the learner is compared with, one concept a file."""

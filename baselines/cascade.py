@@ -1,11 +1,11 @@
 """A cascade of two prioritised quadratic programmes over changes x of the joints.
 
-Level 1, an inequality task, as nearly as it can be met::
+Level 1, an inequality task, as nearly as damping allows::
 
     min  s² + λ² |x|²     subject to   A x + s >= b,       |x_i| <= L
     s, x
 
-Level 2, the change nearest to the preferred z among the changes that meet level 1 as nearly::
+Level 2, the change nearest to the preferred z among the changes that meet level 1 as nearly, to ε::
 
     min  |x - z|²         subject to   A x >= b - s⁺ - ε,  |x_i| <= L
      x
@@ -15,7 +15,7 @@ with λ = ``DAMPING``, L = ``LIMIT``, ε = ``SLACK`` and s⁺ = max(s, 0).
 Inequality tasks in lexicographic quadratic programmes: O. Kanoun, F. Lamiraux, P.-B. Wieber (2011),
 Kinematic control of redundant manipulators: generalizing the task-priority framework to inequality
 tasks, IEEE Transactions on Robotics. The matrices go to the solver, DAQP, as they are: cvxpy, in
-which the tests state the same programmes, takes 20 to 100 times as long.
+which the tests state the same programmes, takes far longer.
 """
 
 from __future__ import annotations
@@ -29,30 +29,31 @@ from coartic.method import MethodError
 from coartic.robot import Array
 
 DAMPING = 0.01
-"""λ, length unit per unit of change: 1e-4 of the task is given up where the singular value is 1,
-and changes stay bounded where it is 0."""
+"""λ, length unit per unit of change: some 1e-4 of the task is given up where the singular value is
+1, and changes stay small where it is 0."""
 
 LIMIT = 2.0
-"""L, largest change of any joint."""
+"""L, largest absolute change of any joint."""
 
 SLACK = 1e-6
-"""ε, length unit: without it level 2 would be left with a single point where limits bind."""
+"""ε, length unit: without it level 2 could be left with a single point where limits bind."""
 
 
 class Solution(NamedTuple):
     """Solution of both levels."""
 
     changes: Array
-    """Changes of the joints, shape ``(joints,)``."""
+    """Changes of the joints by both levels, shape ``(joints,)``."""
     first: Array
     """Changes that level 1 alone would make, shape ``(joints,)``."""
     iterations: int
-    """Iterations of the solver."""
+    """Iterations of the solver in both levels."""
 
 
 def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
-    """Solve level 1, for changes x of the joints with A x >= b, as nearly as they can be, then
-    level 2, for the x nearest to z among these; return the solution of both.
+    """Find changes x of the joints with A x >= b as nearly as they can be, at most 2 in absolute
+    value (level 1), then the x nearest to z among these (level 2); return both, with the
+    iterations.
 
     ``rows`` is A, shape ``(m, joints)``, length unit per unit of change; ``least`` is b, shape
     ``(m,)``, length unit; ``preferred`` is z, shape ``(joints,)``. Raises MethodError if the solver
@@ -70,9 +71,9 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
 def _solve_level(
     level: int, hessian: Array, gradient: Array, rows: Array, least: Array
 ) -> tuple[Array, int]:
-    """Minimise ½ vᵀ H v + gᵀ v (``hessian`` H, ``gradient`` g) under the limits of ``level``, 1 or
-    2; return the variables v (at level 1 first the slack s, then the changes) and the number of
-    iterations. Raises MethodError if the solver fails."""
+    """Minimise ½ vᵀ H v + gᵀ v (``hessian`` H, ``gradient`` g), v = (s, x) at level 1 and x at
+    level 2, with A x + s >= b (``rows`` A, ``least`` b; s = 0 at level 2) and |x_i| <= 2; return v
+    and the number of iterations. Raises MethodError, which names ``level``, if the solver fails."""
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))
     matrix[:task, :-joints] = -1.0

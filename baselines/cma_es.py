@@ -1,28 +1,26 @@
 """CMA-ES over target configurations; hand sequences by a bandit, or goal by goal.
 
-Every hand sequence has an evolution strategy of its own (CMA-ES, Hansen 2016) over the
-targets of all its explored joints, which sees the total reward of each trial and nothing
-else. Its first mean are the configurations of the corrective process **A** alone, which takes
-one trial; its first step size is the learner's noise; where it stops by its own
-criteria it starts again there with twice the population (IPOP, Auger & Hansen 2005). A
-failed trial ranks last. UCB1 (Auer, Cesa-Bianchi & Fischer 2002) on the best reward of each
-sequence, scaled by the spread of the first rewards, decides in ``cma-es/bandit`` which strategy
-makes the next generation of trials.
+Each hand sequence has an evolution strategy (CMA-ES) over the targets of all explored joints, which
+sees the total reward of each trial and nothing else. Its first mean are the configurations of the
+corrective process **A** alone, which takes one trial; its first step size is ``sigma``; where it
+stops by its own criteria it starts again from the first mean with twice the population (IPOP). A
+failed trial ranks last. UCB1 on the best reward of each sequence, scaled by the spread of the first
+rewards, decides in ``cma-es/bandit`` which strategy makes the next generation of trials.
 
 Tuning, three or four runs a value. c = 0.02, 0.05, 0.1, 0.2, 0.5 on the two-armed tasks: no
 reward differs by more than 2.4; with the other arm kept still, up to 0.05 can settle on RRRR in
 two-armed-2 (-339 in the mean, where 0.1 and more give -331). Step sizes 0.02, 0.05, 0.1
 and 0.2 within one given sequence are within 5 of each other after 2000 trials; after 300
-0.05 leads or is 2 behind. Handing the strategy the configurations in which the goals were hit
-instead of the targets (Lamarckian) cost 6 to 9 after 2000 trials, so it is not done.
+0.05 leads or is 2 behind. To learn from where the goals were hit, not from the targets
+(Lamarckian), cost 6 to 9 after 2000 trials.
 
-``cma-es/bandit`` has tried every hand sequence before it prefers one; of 14 goals there are
-16,384. In ``cma-es/goal-by-goal`` each pair of hands at two goals in a row has a value, the highest
-reward of any trial that used it. Goal by goal the hand of higher value is chosen, with probability
-ε, the learner's, a random one. A sequence that comes for the first time takes one trial by the
-corrective process alone, one that comes again a generation of its own strategy. On six random tasks
-with 14 goals and two arms, mean reward with ε = 0.05 and 0.2: -1439 and -1351; with hands drawn
-around those of the best trial -1404 and -1331; the learner EC4 -1799.
+``cma-es/bandit`` tries every hand sequence, while trials are left, before it prefers one; of more
+than 4096 it has the initial one alone. In ``cma-es/goal-by-goal`` each pair of hands at two goals
+in a row has a value, the highest reward of any trial that used it. Goal by goal the hand of higher
+value is chosen, with probability ε a random one. A sequence that comes for the first time takes one
+trial by the corrective process; if that succeeds, each time it comes again, a generation of its own
+strategy. On six random tasks with 14 goals and two arms, mean reward with ε = 0.05 and 0.2: -1439
+and -1351; the learner EC4 -1799.
 """
 
 from __future__ import annotations
@@ -49,14 +47,14 @@ _CITATION = (
 
 
 class BanditParameters(UninformedParameters):
-    """Parameters of the bandit."""
+    """Parameters of CMA-ES with a bandit over hand sequences."""
 
     exploration: Annotated[float, Field(ge=0, le=100)] = 0.2
-    """c of UCB1, as a multiple of the range of the first rewards, at least 1."""
+    """c of UCB1, as a multiple of the range of the first rewards, which counts as 1 or more."""
 
 
 class Strategy:
-    """CMA-ES over the targets of one hand sequence."""
+    """CMA-ES over the targets of one hand sequence, after a trial by the corrective process."""
 
     def __init__(self, session: Session, attempts: Attempts, hands: str, sigma: float) -> None:
         self.hands = hands
@@ -74,8 +72,8 @@ class Strategy:
     def generation(self) -> None:
         """Make the trials of one generation of CMA-ES, or as many as are left (at least one must
         be), and, if the generation is complete, update CMA-ES from their rewards. Where CMA-ES has
-        ended, it restarts with twice the population. To be called only if the corrective process
-        completes the hand sequence."""
+        ended, it first restarts with twice the population. To be called only if the corrective
+        process completes the hand sequence."""
         evolution = self._evolution
         if evolution is None or evolution.has_ended():
             default = 4 + int(3 * math.log(len(self._mean)))
@@ -109,8 +107,9 @@ class CMAES(Method):
     Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
-        """Make generations of trials until no trial is left; return the movements of the best
-        trial. Raises MethodError if no trial hit every goal."""
+        """Make a trial by the corrective process with each hand sequence (of more than 4096 only
+        with the initial one), then, if one succeeds, generations of trials until none is left;
+        return the movements of the best trial. Raises MethodError if no trial hit every goal."""
         attempts = Attempts(session, self.parameters.trials)
         with session.solving():
             strategies = [
@@ -140,8 +139,8 @@ class GoalByGoalParameters(UninformedParameters):
 
 
 class GoalByGoal(Method):
-    """CMA-ES for each hand sequence; the hand of each goal is chosen by the best reward of trials
-    with this hand after the hand before."""
+    """CMA-ES for each hand sequence; the hand of each goal is the hand with the best reward after
+    the hand before, or random."""
 
     name = "cma-es/goal-by-goal"
     version = 2
@@ -152,8 +151,9 @@ class GoalByGoal(Method):
     Parameters = GoalByGoalParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials while any are left and a hand sequence may succeed; return the movements of
-        the best trial. Raises MethodError if no trial hit every goal."""
+        """Make trials until none is left, every hand sequence has failed, or, with ``epsilon`` 0, a
+        failed sequence is chosen again; return the movements of the best trial. Raises MethodError
+        if no trial hit every goal, and NotApplicableError if no initial hands are found."""
         attempts = Attempts(session, self.parameters.trials)
         letters = sorted(letters_of(session.hands))
         values: dict[tuple[int, str], float] = defaultdict(lambda: -math.inf)

@@ -47,7 +47,7 @@ class Aim(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """The path from the start, or from one goal, to the next."""
+    """A simulated path to a goal, from the start or from the goal before."""
 
     movement: Movement
     """Movement of kind ``path`` to the goal."""
@@ -56,33 +56,34 @@ class Leg(NamedTuple):
     q: Array
     """Configuration in which the goal is hit, shape ``(dof,)``."""
     memory: Any
-    """Memory of the controller when the goal is hit, with which the next leg goes on."""
+    """Memory of the controller after the last control step, with which the next leg goes on."""
     steps: NDArray[np.int64]
-    """Numbers of control steps, shape ``(3,)``: of all, of steps in which level 1 binds, and of
-    steps in which level 2 binds."""
+    """Numbers of control steps, shape ``(3,)``: of all, of steps with changes other than preferred
+    (level 1 binds), and of steps with other changes than level 1 alone makes (level 2 binds)."""
 
 
 class _StuckError(Exception):
-    """The hand does not reach the goal."""
+    """Error of a hand that does not reach its goal."""
 
 
 @dataclass
 class Controller(ABC):
-    """The control loop on one task; the session counts evaluations and iterations."""
+    """Control loop on a task; the session counts evaluations and iterations. Changes ``(joints,)``
+    are of all entries of a configuration that are not locked."""
 
     session: Session
     task: Task
     period: int
-    """Ticks from one control step to the next."""
+    """Most ticks of a control step."""
     solves: int = 0
     """Quadratic programmes solved so far."""
 
     def __post_init__(self) -> None:
         locked = ["xy".index(coordinate) for coordinate in self.task.locked_base]
         self.moving = np.delete(np.arange(self.task.robot.dof), locked)
-        """Indices of the joints that are not locked."""
+        """Indices of the joints in a configuration, shape ``(joints,)``."""
         self.length = self.session.model.step * self.period
-        """Joint-space length of a control step."""
+        """Largest joint-space length of a control step."""
 
     @abstractmethod
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Any) -> Any:
@@ -102,10 +103,10 @@ class Controller(ABC):
         leg."""
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
-        """Simulate control steps until the hand of the first of ``aims`` (hand and goal) is in its
-        goal, from the end of the leg ``before``, or, for None, from the task's start. Further aims
-        are the goals ahead. Raises _StuckError if the hand does not reach its goal, and MethodError
-        if the solver fails."""
+        """Simulate control steps from the end of the leg ``before``, or, for None, from the task's
+        start, until the hand of the first of ``aims`` (hand and goal) is in its goal; return this
+        leg. Further aims are the goals ahead. Raises _StuckError if the hand does not reach its
+        goal, and MethodError if the solver fails."""
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         model, radius = self.session.model, self.task.radius
         _, tolerance = model.tolerances(radius)
@@ -143,9 +144,10 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Solve levels 1 and 2 of the cascade (:func:`solve_cascade`, with these arguments) and
-        return the solution; count two programmes in ``solves``, and the iterations in the session.
-        Raises MethodError if the solver fails."""
+        """Return the changes x of the joints with A x >= b (``rows`` A, ``(m, joints)``; ``least``
+        b, ``(m,)``) as nearly as they can be and, of these, nearest to ``preferred``
+        (:func:`solve_cascade`); count two programmes in ``solves``, and the iterations in the
+        session. Raises MethodError if the solver fails."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)
@@ -170,7 +172,7 @@ class ControlParameters(Parameters):
     """Parameters of a controller."""
 
     period: Annotated[int, Field(ge=1, le=20)] = 5
-    """Ticks from one control step to the next."""
+    """Most ticks of a control step."""
 
 
 class Control(Method):
@@ -190,7 +192,7 @@ class Control(Method):
     """Goals after the current one that the controller takes into account."""
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence that a task has more than 4096 hand sequences; None for fewer."""
+        """Return a sentence that a task has more than 4096 hand sequences; else None."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
@@ -205,11 +207,11 @@ class Control(Method):
             return self.search(controller, candidates)
 
     def search(self, controller: Controller, candidates: list[HandSequence]) -> Result:
-        """Return the paths, a movement for each goal, of the candidate (hand sequence) with the
-        fewest ticks under ``controller``: the candidate with the fewest ticks so far is extended by
-        a movement until one is complete. Of equal candidates the one with the fewest changes of
-        hand is kept, then the first. Raises MethodError if the hand gets stuck in all candidates.
-        """
+        """Return the paths, a movement for each goal, of the candidate (hand sequence) that takes
+        the fewest ticks under ``controller``, with counts of the search as details; of equal
+        candidates the candidate with the fewest changes of hand, then the first. The candidate with
+        the fewest ticks so far is extended by the path to its next goal until such a candidate is
+        complete. Raises MethodError if the hand gets stuck in all, or if the solver fails."""
         heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
             (0, changes_of_hand(letters_of(hands)), index, ())
             for index, hands in enumerate(candidates)

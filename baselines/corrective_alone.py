@@ -1,7 +1,7 @@
 """The corrective process alone: with given hands, and with the best hands.
 
 The best hands come from the paper's exhaustive strategy (section *Exploration Condition 3*):
-try all 2^G hand sequences, each target from **A**, and no further exploration.
+try all 2^G hand sequences, each target from **A**, without further exploration.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from coartic.motion.trial import changes_of_hand, sequences_with
 
 
 class GivenHands(Method):
-    """The corrective process with the task's initial hands: trial 0 of the learner."""
+    """The corrective process with the task's initial hands: trial 0 of a learner with all hands."""
 
     name = "corrective-alone/given"
     tuned_on = "nothing: it has no constants but the paper's"
@@ -28,7 +28,8 @@ class GivenHands(Method):
 
     def solve(self, session: Session) -> Result:
         """Make one trial in which the corrective process alone goes to each goal with the task's
-        initial hands; return its movements. Raises MethodError if the trial misses a goal."""
+        initial hands; return its movements. Raises MethodError if the trial misses a goal,
+        NotApplicableError if no initial hands are found, and BudgetError if no trial is left."""
         hands = session.find_initial_hands()
         with session.solving():
             execution = session.trial(corrective_movements(hands))
@@ -38,7 +39,7 @@ class GivenHands(Method):
 
 
 class BestHands(Method):
-    """The corrective process with every hand sequence; the best one is kept."""
+    """The corrective process with every hand sequence; the best sequence is kept."""
 
     name = "corrective-alone/best-hands"
     tuned_on = GivenHands.tuned_on
@@ -48,13 +49,13 @@ class BestHands(Method):
     stochastic = False
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence that a task has more than 4096 hand sequences; None for fewer."""
+        """Return a sentence that a task has more than 4096 hand sequences; else None."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
         """Make one trial for each hand sequence while trials are left; return the movements of the
-        best trial, of equal rewards the one with the fewest changes of hand. Raises MethodError if
-        every trial misses a goal."""
+        best trial, of equal rewards the trial with the fewest changes of hand. Raises MethodError
+        if no trial hit every goal."""
         completed: list[Execution] = []
         for hands in sequences_with(session.hands, session.goals_count, session.task_name):
             if session.trials_left == 0:

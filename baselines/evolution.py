@@ -1,13 +1,12 @@
-"""CMA-ES as in the package ``cma``, bit for bit, at a quarter of its time and without its import.
+"""CMA-ES as in the package ``cma``, bit for bit, but in less time and without its slow import.
 
 N. Hansen (2016), The CMA evolution strategy: a tutorial (arXiv 1604.00772), whose equations have
 their numbers in brackets here; with negative weights. Constants, stopping criteria and the order of
-operations are those of the package ``cma`` 4.5 with its defaults, so that the points are the same
-to the last bit, which a test checks; but in generations of less than six points, as in one
-dimension, the package mirrors some. It takes four times as long, and most of a second to import.
-Where it begins to rescale the coordinates, at variances 1e8 apart or a condition number of 1e12,
-this strategy ends. Weights are added from left to right, as the package does up to Python 3.11;
-later versions round ``sum`` otherwise, and the points would depend on them.
+operations come from the package ``cma`` 4.5 with its defaults, so that the points are the same to
+the last bit, except in generations of less than six points, as in one dimension, of which the
+package mirrors some. Where the package begins to rescale the coordinates, at variances 1e8 apart or
+a condition number of 1e12, this strategy ends. Weights are added from left to right, as the package
+does up to Python 3.11; later versions round ``sum`` otherwise.
 """
 
 from __future__ import annotations
@@ -38,9 +37,9 @@ def _added(weights: list[float]) -> float:
 
 
 class EvolutionStrategy:
-    """Evolution strategy: :meth:`ask` for points, :meth:`tell` their costs, until
-    :meth:`has_ended`. It begins at ``mean``, shape ``(dim,)``, with SD ``step_size`` in each
-    coordinate."""
+    """Evolution strategy: :meth:`ask` for ``size`` points, :meth:`tell` their costs, until
+    :meth:`has_ended`. It begins at ``mean``, shape ``(dim,)``, with SD ``step_size`` (to 0.01 %) in
+    each coordinate."""
 
     def __init__(self, mean: Array, step_size: float, size: int, rng: np.random.Generator) -> None:
         dim = len(mean)
@@ -110,7 +109,7 @@ class EvolutionStrategy:
         self._flat = 0
 
     def ask(self) -> Array:
-        """Draw and return the points of the next generation, shape ``(λ, dim)``."""
+        """Draw and return the points of the next generation, shape ``(size, dim)``."""
         if self._generation >= self._decomposed + self._gap:
             self._covariance = (self._covariance + self._covariance.T) / 2
             variances, axes = np.linalg.eigh(self._covariance)
@@ -122,8 +121,8 @@ class EvolutionStrategy:
         return self._mean + self._step_size * drawn
 
     def tell(self, points: Array, costs: Array) -> None:
-        """Update mean, covariance and step size, in place, from the points ``(λ, dim)`` of the last
-        :meth:`ask` and their costs ``(λ,)``, finite; the least cost is best."""
+        """Update mean, covariance and step size of the strategy from the points ``(size, dim)`` of
+        the last :meth:`ask` and their finite costs ``(size,)``; the least cost is best."""
         self._generation += 1
         least = int(np.argmin(costs))
         if costs[least] < self._best:
@@ -173,9 +172,9 @@ class EvolutionStrategy:
             self._still_at, self._still_since = self._mean, self._generation
 
     def has_ended(self) -> bool:
-        """Return whether a criterion to stop is met, False before the first generation: points or
-        costs change too little, steps have become too long, the covariance is ill-conditioned, or
-        there were too many generations."""
+        """Return whether a criterion to stop is met, False before the first :meth:`tell`: points or
+        costs change too little or costs do not improve, steps have become too long, the covariance
+        is ill-conditioned, or there were too many generations."""
         if not self._generation:
             return False
         deviations = self._step_size * np.sqrt(np.diag(self._covariance))

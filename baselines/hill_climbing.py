@@ -1,12 +1,11 @@
 """Hill climbing: Gaussian noise and drawn hands, a (1+1) hill climber for each hand sequence.
 
-A sequence has a centre, at first the configurations of the corrective process **A**
-alone, which take the first trial of the sequence. A trial perturbs all explored joints of the
-centre at once; any better one moves the centre to the configurations in which it hit the goals, as
-in the learner. To keep its targets would gain more: random search that goes on from its best trial
-after each of 1,000 parts (``stages``) gains 0 to 16 ticks more with targets on the paper's tasks,
-and less on none of 30 development instances of five families. Hands are explored as the learner
-does, with ε for each goal around the best sequence known. The SD and ε are the learner's, untuned.
+A sequence has a centre, at first the configurations of the corrective process **A** alone, which
+take the first trial of the sequence. A trial perturbs all explored joints of the centre at once;
+any better one moves the centre to the configurations in which it hit the goals, as in the learner.
+To keep its targets would gain more: random search with 1,000 ``stages`` gains 0 to 16 ticks more
+with targets on the paper's tasks. Hands are explored as the learner does, with ε for each goal
+around the best sequence known. SD (by default) and ε are the learner's, untuned.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ _MOST_DRAWN = 128  # trials that are drawn before they are made, at most
 
 
 class HillClimbing(Method):
-    """A (1+1) hill climber per hand sequence."""
+    """Hill climbing for each hand sequence, from its best trial so far."""
 
     name = "hill-climbing"
     tuned_on = "nothing: the paper's values"
@@ -37,8 +36,9 @@ class HillClimbing(Method):
     Parameters = UninformedParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until none is left, or no hand sequence succeeds; return the movements of the
-        best trial. Raises MethodError if no trial hit every goal."""
+        """Make trials until none is left, or every hand sequence has failed; return the movements
+        of the best trial. Raises MethodError if no trial hit every goal, and NotApplicableError if
+        no initial hands are found."""
         first, rng, letters = session.find_initial_hands(), session.rng, letters_of(session.hands)
         attempts = Attempts(session, self.parameters.trials)
         most, ahead = len(letters) ** session.goals_count, 1
@@ -48,8 +48,9 @@ class HillClimbing(Method):
         hopeless: set[str] = set()  # A alone does not complete them, ever
 
         def draw() -> str:
-            """Return a hand sequence drawn around the best one, or, if none has succeeded yet,
-            uniformly; never a hopeless one."""
+            """Draw a hand sequence: hands of the best trial, each replaced with probability 0.2 by
+            a random hand, or, before a success, random hands; never a sequence with which the
+            corrective process alone failed."""
             while True:
                 chosen = list(attempts.hands or letters[0] * session.goals_count)
                 for goal in range(len(chosen)):

@@ -1,15 +1,13 @@
 """The search for the optimum: the best reward that a global search finds.
 
 Reward is lost in proportion to the joint-space path, so the shortest path that touches every disc
-is sought over hand sequences, from the chains of posture graphs (layered dynamic programming).
-Plans that may be best are then rounded to whole control ticks, with and without goals that are hit
-as their turn comes because the other hand is already there. A reference for the gaps of all other
-methods, not a competitor. Bounds on the optima are proven outside the package (``studies/optima``).
+in turn is sought over hand sequences, from the chains of posture graphs (layered dynamic
+programming). Plans that may be best are then rounded to whole control ticks, with and without goals
+that are hit as their turn comes because the hand is already there. A reference for the gaps of all
+other methods, not a competitor. Bounds on the optima are proven in ``studies/optima``.
 
 Another search for the same paths is ``trajectory-optimisation/path-length``, from graphs and starts
-of its own. When the shipped optima (``optima.json``) were made there was a third, from random
-starts around the configurations of the corrective process. It found the same rewards but for
-two-armed-1: one tick more, and three fewer with the other arm still.
+of its own.
 """
 
 from __future__ import annotations
@@ -25,11 +23,11 @@ from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.tasks.task import letters_of
 
-MOST_KEPT = 64  # hand sequences whose shortest paths are kept beside the solution
+MOST_KEPT = 64  # hand sequences whose shortest paths are kept with the solution
 
 
 class OptimumParameters(Parameters):
-    """The restriction, and how long to search."""
+    """Restriction of the movements, and effort of the search."""
 
     other_arm: Literal["free", "still"] = "free"
     """``still``: the arm whose hand is not chosen for a goal does not move on the way to it."""
@@ -37,9 +35,9 @@ class OptimumParameters(Parameters):
     """Base coordinates that are locked in addition to the task's own locks: ``y``, ``xy``, or none
     for ``task``."""
     nodes: Nodes = 200
-    """Postures per goal and hand."""
+    """Most postures per goal and hand in a graph."""
     graphs: Count = 3
-    """Independent graphs, or more, until there are as many ``chains``."""
+    """Independent graphs; more are made while chains are too few."""
     chains: Count = 100
     """Least number of chains, over all graphs and hand sequences. With three, the best path known
     was missed on 9 of 40 random tasks for one arm."""
@@ -64,7 +62,7 @@ class OptimumSearch(Method):
     def solve(self, session: Session) -> Result:
         """Search for the shortest path over hand sequences (at most 64 a graph), round it to whole
         ticks, and return the movements with the fewest ticks found. Raises MethodError if none are
-        found."""
+        found, and if locks of the base make the task invalid."""
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
         task = with_locks(session.reveal(*self.information), parameters.base)

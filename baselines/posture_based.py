@@ -3,22 +3,22 @@
 For every goal a posture is planned first, then the straight joint-space movement to it
 (Rosenbaum, Meulenbroek, Vaughan & Jansen 2001):
 
-1. *Instance retrieval.* Of the stored postures first those survive whose hand is at the goal, then
-   the one with the least cost of travel.
+1. *Instance retrieval.* Of the stored postures, corrected, first all survive whose hand is at the
+   goal, then the posture with the least cost of travel.
 2. *Instance generation.* Postures that resemble it are generated and evaluated in the same way
    until a deadline. What a generated posture lacks in accuracy, feedforward correction makes up for
    (Rosenbaum, Loukopoulos, Meulenbroek, Vaughan & Engelbrecht 1995).
-3. An internal simulation says where the movement ends; the posture joins the store.
+3. An internal simulation says where the movement ends; the planned postures join the store.
 
 With a horizon of two goals the cost of travel includes the way on to a posture for the next goal.
 Only the first movement is made; the second posture is planned again from there. The authors name
-anticipation as an extension (1995); this form of it is ours.
+anticipation as an extension (1995); this form is ours.
 
 Where this differs from the theory: the cost of travel is the joint-space distance, which the tasks
-charge, not each joint's expense. The hierarchy has two levels, as there are no obstacles. The store
-is filled with random postures of the arms about the start, with the base wherever that takes the
-hand to the goal. Diffusion gets narrower until the deadline, about a weighted sum of the better
-postures (the rule of 1995), so that it converges. The hand is planned with the posture.
+charge, not each joint's expense. The hierarchy has two levels: there are no obstacles. The store
+begins with random postures of the arms about the start, with the base wherever that takes the hand
+to the goal. Diffusion gets narrower until the deadline, about a weighted sum of the better postures
+(the rule of 1995), so that it converges. The hand is planned with the posture.
 """
 
 from __future__ import annotations
@@ -57,18 +57,16 @@ _LAST_SD = 0.01  # last SD of the diffusion, as a part of the first
 class PostureBasedParameters(Parameters):
     """Parameters of posture-based planning.
 
-    Tried by hand. Over 5 seeds on each shipped task, 50, 300 and 1000 stored postures (mean rewards
-    within 3 of each other). Over 6 seeds on the first two goals of three tasks, 60 and 100 rounds
-    of 60, 40 of 100, first SDs of 0.1 and 0.3, last ones of 0.001 and 0.01 of these (within 3
-    ticks); equal weights, and diffusion at all widths in each round (up to 4 ticks). Hands are
-    chosen by cost of travel, goal by goal. That matters where a goal's cheapest hand is the wrong
-    one for the next: two-armed-1 with one goal gets -624, and -520 with the best hand sequence.
+    Tried by hand: over 5 seeds on each shipped task 50, 300 and 1000 stored postures (mean rewards
+    within 3 of each other); over 6 seeds on the first two goals of three tasks 60 and 100 rounds of
+    60, 40 of 100, first SDs of 0.1 and 0.3, last ones of 0.001 and 0.01 of these (within 3 ticks),
+    equal weights, and diffusion at all widths in each round (up to 4 ticks).
     """
 
     stored: Annotated[int, Field(ge=0, le=2000)] = 300
-    """Random postures in the store, in addition to the starting posture."""
+    """Random postures in the first store, in addition to the starting posture."""
     rounds: Annotated[int, Field(ge=0)] = 60
-    """Rounds of generation until the deadline."""
+    """Rounds of generation for each goal, until the deadline."""
 
 
 class PostureBased(Method):
@@ -88,7 +86,7 @@ class PostureBased(Method):
 
     def solve(self, session: Session) -> Result:
         """Plan a movement for each goal, from where the movement before it is expected to end;
-        return the movements. Raises MethodError for a goal that no posture hits."""
+        return the movements. Raises MethodError for a goal that no corrected posture hits."""
         with session.building():
             planner = PosturePlanner(session, self.parameters, self.horizon)
         with session.solving():
@@ -97,7 +95,7 @@ class PostureBased(Method):
 
 
 class OneGoal(PostureBased):
-    """Each posture is planned for its own goal."""
+    """Posture-based planning of each posture for its own goal alone."""
 
     name = "posture-based/one-goal"
     title = "Posture-based planning, one goal at a time"
@@ -106,7 +104,7 @@ class OneGoal(PostureBased):
 
 
 class TwoGoals(PostureBased):
-    """Each posture is planned together with the next one."""
+    """Posture-based planning of each posture together with a posture for the next goal."""
 
     name = "posture-based/two-goals"
     title = "Posture-based planning, one goal ahead"
@@ -118,8 +116,8 @@ METHODS: tuple[type[Method], ...] = (OneGoal, TwoGoals)
 
 
 class PosturePlanner:
-    """Makes a plan from ``store``, postures of shape ``(n, dof)``; ``q`` is the configuration in
-    which the movements planned so far end."""
+    """Plan movements from ``store``, postures of shape ``(n, dof)``; ``q`` is the configuration in
+    which the movements planned so far are expected to end."""
 
     def __init__(
         self, session: Session, parameters: PostureBasedParameters, horizon: Literal[1, 2]
@@ -137,7 +135,7 @@ class PosturePlanner:
             mask[:BASE_DOF] = mask[session.joints(hand)] = True
         self.movable: Mask = explored_joints(session)
         self.free = {hand: self.movable & mask for hand, mask in self.base_and_arm.items()}
-        """Joints that may move towards a posture for each hand."""
+        """True for joints that may move towards a posture for each hand, shape ``(dof,)``."""
         # SDs from zero up: dense near the start, sparse far from it.
         sds = _SPREAD * session.rng.uniform(size=(parameters.stored, 1))
         noise = session.rng.standard_normal((parameters.stored, session.dof))
@@ -150,7 +148,7 @@ class PosturePlanner:
     def plan(self) -> tuple[tuple[Movement, ...], list[int]]:
         """Return the movement to each goal, and the ticks that each movement is expected to take.
         To be called once: ``q`` and ``store`` of the planner change. Raises MethodError for a goal
-        that no posture hits."""
+        that no corrected posture hits."""
         movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
             ahead = range(goal, min(goal + self.horizon, len(self.goals)))
@@ -188,8 +186,8 @@ class PosturePlanner:
     def retrieve(self, goals: range) -> Layers:
         """Return, by goal (from 0) and hand, postures ``(n, dof)`` with the hand at the goal: the
         hand's arm has stored joint angles, the other arm its angles in ``q``, and the base carries
-        the hand to the goal if it can move; then all are corrected. Postures that correction does
-        not bring there are left out."""
+        the hand to the goal if it can move; then base and hand's arm are corrected. Postures that
+        correction does not bring there are left out."""
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
             postures = np.tile(self.q, (len(self.store), 1))
@@ -223,7 +221,7 @@ class PosturePlanner:
         self, promising: dict[HandSequence, Array], noises: Array, goals: range
     ) -> list[tuple[float, HandSequence, Array]]:
         """Return for each hand sequence the cheapest postures ``(goals, dof)`` found around its
-        ``promising`` postures by the deadline, as a triple: their cost (joint-space length of the
+        ``promising`` postures, these included, as a triple: their cost (joint-space length of the
         path from ``q``), the hands, the postures. ``noises`` are standard normal, shape ``(hand
         sequences, rounds, PER_ROUND, goals, dof)``; ``goals`` are from 0."""
         sequences = [*promising]
@@ -258,8 +256,8 @@ class PosturePlanner:
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
         """Bring a hand of contiguous postures ``(..., dof)``, in place, to a goal (from 0), in at
-        most ``steps`` steps each; return True where the hand is then at the goal, shape ``(...)``.
-        The session counts the evaluations."""
+        most ``steps`` steps each; return True where the hand is then within ``tolerance`` of the
+        goal's centre, shape ``(...)``. The session counts the evaluations."""
         flat = postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)
         far = np.arange(len(flat))
@@ -298,9 +296,9 @@ def _linearise_far(
     ys: Any,
 ) -> int:
     """Keep at the beginning of ``far``, indices of rows of ``postures``, the indices of postures
-    whose hand is farther than ``tolerance`` from (x, y); return their number. For each fill a row
-    of ``wanted``, the hand's step towards (x, y), shortened, and of ``jacobian``, the columns of
-    the arm's joints. ``xs`` and ``ys`` are space for the points of an arm."""
+    whose hand is farther than ``tolerance`` from (x, y); return their number. For each kept index
+    fill a row of ``wanted``, the hand's step towards (x, y), shortened, and of ``jacobian``, the
+    columns of the arm's joints. ``xs`` and ``ys`` are space for the points of an arm."""
     tip = len(arm.links)
     left = 0
     for row in far:  # with the C library's cosine and sine, as in the robot's own kinematics

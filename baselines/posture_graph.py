@@ -26,11 +26,11 @@ KINEMATICS = frozenset({Information.GOALS, Information.FORWARD_KINEMATICS, Infor
 """Information of a planner about goals and hands."""
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
-"""A hand sequence with a configuration per goal to start from, ``(G, dof)``."""
+"""A hand sequence with a configuration per goal, ``(G, dof)``, as a start of a solver."""
 Layers = dict[tuple[int, Hand], Array]
 """Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
 Nodes = Annotated[int, Field(ge=10, le=1000)]
-"""Parameter: nodes of a layer."""
+"""Parameter: number of samples for a layer."""
 Count = Annotated[int, Field(ge=1)]
 """Parameter: a number of graphs, chains or starts."""
 BEAM_WIDTH = 64
@@ -80,22 +80,22 @@ class Beginning(NamedTuple):
 
     hands: HandSequence
     nodes: dict[Hand, Array]
-    """Nodes of the layer in which each hand was last used."""
+    """Nodes of the layer in which each hand was last used, ``(n, dof)``; else the start."""
     cost: Array
     """``cost[i, j]``: the joint-space length of the shortest chain to node i of the hand used last
     and node j of the other hand."""
     back: tuple[NDArray[np.int32], ...]
-    """For each goal, ``back[i, j]``: the index of the node from which the chain came to this
+    """For each goal, ``back[i, j]``: the index of the node from which the goal's hand came to this
     state."""
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
     """Sample at most ``count`` nodes (postures with the hand in the goal, ``(n, dof)``), or none,
-    for each goal and hand; return them by ``(goal, hand)``, goals from 0, and the
-    ``forward_kinematics`` and ``jacobians`` counted.
+    for each goal and hand; return them by ``(goal, hand)``, goals from 0, and the numbers of
+    ``forward_kinematics`` and ``jacobians`` evaluated.
 
-    Half of the samples begin at nodes of the goal before, by whichever hand: of 40 one-armed random
-    tasks the best path known was then found more often on 23, less often on 11.
+    Half of the samples begin at nodes of the goal before, by whichever hand, if it has any; others
+    begin at the start.
     """
     spent: Counter[str] = Counter()
     layers: Layers = {}
@@ -142,8 +142,8 @@ def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain
 
 
 def _extend(task: Task, layers: Layers, begun: Beginning) -> Iterator[Beginning]:
-    """Yield the cheapest chains of a beginning extended by one goal, once for each hand that has a
-    node in its layer of ``layers``, left before right."""
+    """Yield ``begun``, the cheapest chains for the beginning of a hand sequence, extended by one
+    goal, once for each hand that has a node for it in ``layers``, left before right."""
     hands, nodes, cost, back = begun
     goal = len(hands)
     for hand in sorted(task.hands):  # left before right
@@ -178,10 +178,10 @@ def cheapest_chains(
 ) -> Iterator[Chain]:
     """Yield hands and configurations ``(G, dof)`` of the cheapest chain of each hand sequence, at
     most ``most`` a graph in alphabetical order (:func:`chains_of`), of ``graphs`` random graphs
-    with ``nodes`` postures per goal and hand, then of more graphs until at least ``chains`` are
-    yielded. With ``spread`` and two hands each chain is followed by a copy in which the idle arm
-    moves in equal steps (:func:`move_other_arm`), which does not count for ``chains``. The session
-    counts the evaluations. Raises MethodError if a goal has no posture in a graph."""
+    with at most ``nodes`` postures per goal and hand, then of more graphs until at least ``chains``
+    are yielded. With ``spread`` and two hands each chain is followed by a copy in which the idle
+    arm moves in equal steps (:func:`move_other_arm`), which does not count for ``chains``. The
+    session counts the evaluations. Raises MethodError if a goal has no posture in a graph."""
     yielded = 0
     for number in itertools.count(1):
         layers, spent = sample_layers(task, nodes, rng)

@@ -1,38 +1,36 @@
 """Posture QP: a controller that goes straight in joint space to postures that hit the goals.
 
-It is a planner of postures by prioritised quadratic programmes more than null-space control, which
-is :mod:`coartic.baselines.nullspace_qp`: the priority of the hand hardly ever binds (``details`` of
-a run count how often), because the joints prefer to go straight to a posture that hits the goal.
+It plans postures more than it controls in the null space (:mod:`coartic.baselines.nullspace_qp`):
+the priority of the hand hardly ever binds (``details`` of a run count how often), because the
+joints prefer to go straight to a posture that hits the goal.
 
 The controller keeps a **posture** for the current goal and for each goal that it looks ahead to.
 Both the postures and the control steps are answers of one cascade (:mod:`coartic.baselines.
 cascade`): level 1 asks for a hand in a disc, level 2 for what the joints prefer. With p(q) the
 hand, J its Jacobian, c and r the centre and radius of the disc, and n_i the normals of a regular
-polygon in the unit circle, the disc is
+polygon in the unit circle, in place of the disc stands
 
     n_i · (c - p(q) - J x) <= ρ  for all i,  that is  A = (n_i · J),  b = (n_i · (c - p(q)) - ρ),
 
 linear in the change x of the joints, where ρ is the distance of the polygon's sides from c.
 
-- A posture has its hand in its goal's disc. Of all such postures it is the one that makes the path
-  from posture to posture shortest in the metric of the reward, which is Euclidean in joint space.
+- A posture has its hand in its goal's disc. Of such postures it makes, locally, the path from one
+  to the next shortest in the metric of the reward, which is Euclidean in joint space.
 - A control step has the hand in a disc about the goal that shrinks from where the hand is towards
-  the goal's own; the joints prefer to go straight to the posture. So the hand comes nearer all the
-  time, on whatever path suits the joints.
+  the goal's own; the joints prefer to go straight to the posture. So the hand comes nearer step
+  by step, on whatever path suits the joints.
 
 Postures are found once for each goal to come and kept up by a step of the same kind at every
-control step. The objective decides which posture hits the current goal:
+control step except the first to a goal. The objective decides which posture hits the current goal:
 
-- current goal: the nearest to where the robot stands when the last goal is hit;
-- goals ahead: the posture from which the path on to the next goal's posture is shortest, too
-  (coarticulation by concurrent subgoals of lower priority). The next goal's posture is itself
-  chosen with a view to the goal after it.
+- current goal: the nearest to where the robot stands;
+- goals ahead: the posture from which the path on to the next goal's posture is shortest, too. The
+  next goal's posture is itself chosen with a view to the goal after it.
 
 Tuned on thirty development instances (``d000`` to ``d009`` of families one-armed, two-armed and
-aligned), and on nothing else: 12 settings of the controller as it is, tabled here, and before
-that some 50 of a prototype (other first postures, 8 to 24 faces, control steps of 1 to 10 ticks,
-posture steps of 0.05 to 0.2 and gains of 0.1 to 0.7 for them, horizons, weights). Mean gap to
-the best path known of ``goals-ahead``, one setting changed at a time, * the value used:
+aligned), and on nothing else: 12 settings of the controller as it is, tabled here, and before that
+some 50 of a prototype. Mean gap to the best path known of ``goals-ahead``, one setting changed at a
+time, * the value used:
 
 =========================  ====================================================================
 hand comes nearer, at      0: 2.2 %, 0.03*: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
@@ -42,13 +40,11 @@ weight of paths to come    0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1*: 2.3 %, 1.2: 
 goals ahead (same)         none: 20.1 %, 1: 5.6 %, 2*: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
 =========================  ====================================================================
 
-On the same instances the corrective process alone with its best hand sequence has 24.8 %; half of
-the joint rates of the step before, kept (smoothness is no part of the reward), 20.5 % where
-``current-goal`` has 20.1 %.
+On the same instances the corrective process alone with its best hand sequence has 24.8 %, and
+``current-goal`` 20.1 %.
 
 The remaining gap is local: postures are found by descent from where the robot is, and another
-branch of the inverse kinematics may be far shorter (35 % on the worst of the thirty). First
-postures sought from a straight arm, too, mended one instance and spoiled others as often.
+branch of the inverse kinematics may be far shorter (35 % on the worst of the thirty).
 """
 
 from __future__ import annotations
@@ -76,23 +72,23 @@ _SHORTEST = 0.02  # path whose share still counts, length unit and rad
 
 class PostureController(Controller):
     """Go straight in joint space to the posture of the current goal. The memory has a posture,
-    shape ``(dof,)``, for each aim: the current goal and the goals ahead."""
+    shape ``(dof,)``, by aim: for the current goal and the goals ahead."""
 
     def begin(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
-        """Return a posture ``(dof,)`` that hits the goal for each of ``aims`` (hand and goal), by
-        aim, for the movement from configuration ``q``; postures in ``memory`` are kept
-        (:meth:`find_postures`)."""
+        """Return a posture ``(dof,)``, sought to hit the goal, for each of ``aims`` (hand and
+        goal), by aim, for the movement from configuration ``q``; postures in ``memory`` are taken
+        over, and moved on if there are several aims (:meth:`find_postures`)."""
         return dict(zip(aims, self.find_postures(q, aims, memory or {}), strict=True))
 
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array], first: bool
     ) -> tuple[Solution, Array, dict[Aim, Array]]:
-        """Update the postures in ``memory``, unless the step is the ``first`` of a movement, and
-        solve for a control step from ``q`` towards the posture of the current goal. Return
-        solution, preferred changes ``(joints,)`` in lengths of a control step, and postures by aim.
-        """
+        """Move the postures of ``memory`` a step on, except at the ``first`` step of a movement,
+        and solve for a control step from ``q`` towards the posture of the current goal. Return
+        solution, preferred changes ``(joints,)`` in lengths of a control step, and the postures by
+        aim in a new dictionary."""
         postures = [memory[aim] for aim in aims]
         if not first:
             self.sweep(q, aims, postures)
@@ -107,7 +103,7 @@ class PostureController(Controller):
     def find_postures(
         self, q: Array, aims: tuple[Aim, ...], earlier: dict[Aim, Array]
     ) -> list[Array]:
-        """Return a posture ``(dof,)`` that hits its goal for each aim, in the order of the goals. A
+        """Return a posture ``(dof,)``, sought to hit its goal, for each aim, in their order. A
         posture in ``earlier`` is taken over; any other is sought by descent from the posture of the
         aim before, the first from ``q``. With several aims all are then moved to shorten the path
         from ``q`` through them. A search that does not converge ends after 400 steps."""
@@ -128,9 +124,9 @@ class PostureController(Controller):
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
         """Replace each of ``postures``, one for each aim (hand and goal), in place, by a posture a
         step nearer to where the path from ``q`` through all is shortest; return the largest length
-        of these steps, length unit and rad mixed (:meth:`step_nearer`). The sum of two distances is
-        least where their ends, each weighted by the inverse of its distance, have their mean
-        (Weiszfeld 1937)."""
+        of these steps before they were limited (:meth:`step_nearer`). Preferred is the mean of the
+        postures before and after, weighted by inverse distances (Weiszfeld 1937), for the last the
+        posture before."""
         largest = 0.0
         for k, aim in enumerate(aims):
             before = q if k == 0 else postures[k - 1]
@@ -146,8 +142,9 @@ class PostureController(Controller):
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
         """Make a Gauss-Newton step from a posture towards the posture that hits the goal of an aim
-        nearest to a preferred posture. Returns a copy, the posture after the step, and the length
-        of the step before it was limited to 0.1, length unit and rad mixed."""
+        (hand and goal) and is then nearest to a preferred posture. Return a copy, the posture after
+        the step, and the length of the step before it was limited to 0.1, length unit and rad
+        mixed."""
         rows, outside = self.faces(posture, aim)
         wanted = _POSTURE_GAIN * (preferred - posture)[self.moving]
         change = self.solve(rows, outside, wanted).changes
@@ -162,7 +159,7 @@ class PostureController(Controller):
         return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
     def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
-        """Return A, ``(16, joints)``, and b, ``(16,)``, length unit: to first order, a change x of
+        """Return A, ``(16, joints)``, and b, ``(16,)``, length unit: to first order a change x of
         the joints that are not locked brings the hand of an aim (hand and goal) from configuration
         ``q`` into a polygon within its goal's disc if A x >= b."""
         jacobian = self.session.jacobian(q, aim.hand)[:, self.moving]

@@ -1,19 +1,19 @@
 """Random search: the paper's learner without its memory; the best trial is kept.
 
-Every trial draws Gaussian noise with the learner's standard deviation around the postures in which
-the corrective process hits the goals; trial 0 is the corrective process alone. With one stage, the
-default, no noise depends on earlier rewards, so that random search cannot coarticulate by learning:
-its best trial shows the effect of selecting one of many noisy trials by the reward of the whole
-task. It is the control of signatures of coarticulation (:mod:`coartic.analysis.control`), and
-differs from the learner in one thing: it forgets.
+Every trial draws Gaussian noise, by default with the learner's standard deviation, around the
+postures in which the corrective process hits the goals; the first trials are the corrective process
+alone. With one stage, the default, no noise depends on earlier rewards, so that random search
+cannot coarticulate by learning: its best trial shows the effect of selecting one of many noisy
+trials by the reward of the whole task. It is the control of signatures of coarticulation
+(:mod:`coartic.analysis.control`).
 
-Memory comes in doses: with ``stages`` above 1 the trials are equal parts, and after each part the
-centre of the noise moves to the best trial so far, to the postures that this trial reached or to
-the targets that it aimed at (``keep``).
+With ``stages`` above 1 the trials are equal parts, and after each part the centre of the noise
+moves to the best trial so far, to the postures that this trial reached or to the targets that it
+aimed at (``keep``).
 
-``random-search`` has the hands with which the corrective process alone does best, or those that are
-given. In ``random-search/hands`` every hand sequence gets as many of the trials; the best of all is
-the solution.
+``random-search`` has the hands with which the corrective process alone does best, or hands given.
+In ``random-search/hands`` every hand sequence gets as many of the trials; the best of all is the
+solution.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ class RandomSearchHandsParameters(Parameters):
     """Parameters of random search with every hand sequence."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run, the corrective process alone among them."""
+    """Trials of a run, trials of the corrective process alone among them."""
     sigma: Annotated[float, Field(gt=0, le=MOST_NOISE)] = 0.05
-    """SD of the noise on each explored joint, length unit (base) and rad (joints): the
-    learner's."""
+    """SD of the noise on each explored joint, length unit (base) and rad (joints); the default is
+    the learner's."""
     stages: Annotated[int, Field(ge=1)] = 1
     """Number r of equal parts of the T trials with a hand sequence: part k ends after ⌊kT/r⌋
     trials, and then noise is drawn around the best trial so far. 1: nothing is kept."""
@@ -69,20 +69,22 @@ class RandomSearchParameters(RandomSearchHandsParameters):
 
     hands: str | None = None
     """Hand sequence, such as ``"RRLR"``; by default the sequence with which the corrective process
-    alone gets the highest reward, or the task's initial one where more than 4096 exist."""
+    alone gets the highest reward (of as many as there are trials), or the task's initial sequence
+    where more than 4096 exist."""
 
 
 def draw_trials(
     session: Session, hands: str | None, parameters: RandomSearchHandsParameters
 ) -> tuple[Attempts, int]:
     """Make a trial of the corrective process alone with one or more hand sequences, then trials
-    with noise until none is left; return the trials, which keep the best one of all, and the number
-    of trials with noise.
+    with noise with the best of them until none is left; return an account of the trials, which
+    keeps the best trial of all, and the number of trials with noise.
 
-    ``hands``: a hand sequence, or None for the one with which the process alone does best, among as
-    many as there are trials; where more than 4096 exist, the task's initial sequence.
+    ``hands``: a hand sequence, or None for the sequence with which the process alone does best,
+    among as many as there are trials; where more than 4096 exist, the task's initial sequence.
     ``parameters.trials``: most trials, both kinds together. Raises MethodError without a single
-    trial, and if the process completes none of the sequences.
+    trial, and if the process completes none of the sequences; ValueError for ``hands`` that do not
+    fit the task.
     """
     attempts = Attempts(session, parameters.trials)
     trials = attempts.left
@@ -138,7 +140,7 @@ class RandomSearchHands(Method):
     def solve(self, session: Session) -> Result:
         """Make equal shares of the trials with one hand sequence after the other; return the
         movements of the best trial. Raises MethodError if the corrective process completes no hand
-        sequence."""
+        sequence that has a trial."""
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
@@ -156,10 +158,7 @@ class RandomSearchHands(Method):
 
 
 class RandomSearch(RandomSearchHands):
-    """Gaussian noise around the postures in which the corrective process hits the goals.
-
-    The best trial is the solution.
-    """
+    """Random search with one hand sequence."""
 
     name = "random-search"
     title = "Random search around the corrective process"
@@ -169,7 +168,8 @@ class RandomSearch(RandomSearchHands):
         """Make trials with one hand sequence, parameter ``hands`` or by default the sequence with
         which the corrective process alone does best, until none is left; return the movements of
         the best trial. Raises MethodError if there is no trial to make, or if the corrective
-        process alone misses a goal with this sequence, or by default with every sequence."""
+        process alone misses a goal with this sequence, or by default with every sequence tried;
+        ValueError for ``hands`` that do not fit the task."""
         parameters: RandomSearchParameters = self.parameters
         with session.solving():
             best, evaluations = draw_trials(session, parameters.hands, parameters)

@@ -1,20 +1,18 @@
 """A planner that looks a fixed number of goals ahead.
 
 From where the robot stands it seeks the shortest movements through the next goals, ``horizon``
-beyond the one to be hit, over hand sequences. It makes the first of them, stands where that
-one ended, and plans again (model predictive control: Garcia, Prett & Morari 1989; Mayne, Rawlings,
-Rao & Scokaert 2000). With ``horizon`` 0 it goes to each goal the shortest way. A window that
-reaches the last goal is followed to its end, since planning again would find the rest of it. With
-a horizon of all goals it is the search for the optimum itself, so that its gap to the optimum is
-what the search alone costs.
+beyond the one to be hit, over hand sequences. It makes the first of them, stands where that one
+ended, and plans again (model predictive control). With ``horizon`` 0 it goes to each goal the
+shortest way. A window that reaches the last goal is followed to its end, since planning again would
+find the rest of it. With a horizon of all goals it plans the whole task at once, so that its gap to
+the optimum is what the smaller search costs.
 
-A window is planned as ``optimum/search`` plans a task (:mod:`coartic.baselines.
-shortest_paths`): chains of posture graphs, IPOPT, whole ticks. Two things differ, for speed: the
-graphs are fewer and smaller, and only the shortest ``starts`` of them are polished. Without whole
-ticks in every window each goal would lose half a tick for a reason that has nothing to do with
-the horizon. With them a window loses half a tick at its last goal alone: that is once in all, but
-at every goal with a horizon of 0. ``path_length`` in the details has no such loss: it adds up the
-plans as they were before the rounding, from where the robot stood.
+A window is planned as ``optimum/search`` plans a task (:mod:`.shortest_paths`): chains of posture
+graphs, IPOPT, whole ticks. Two things differ, for speed: fewer chains, with two hands from smaller
+graphs, and only the shortest ``starts`` are polished. Without whole ticks in every window each goal
+would lose half a tick, in the mean, whatever the horizon. With them a window does so at its last
+goal alone: once in all, but at every goal with a horizon of 0. ``path_length`` in the details has
+no such loss: it adds up the plans before the rounding, from where the robot stood.
 """
 
 from __future__ import annotations
@@ -45,14 +43,15 @@ class RecedingHorizonParameters(Parameters):
     horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
     """Number of goals in view beyond the one to be hit; at the end of a task fewer."""
     nodes: Nodes = 200
-    """Postures per goal of a posture graph, shared by the hands: with two, half as many each."""
+    """Most postures per goal of a posture graph, shared by the hands: with two, half as many each.
+    """
     graphs: Count = 3
-    """Independent graphs for each window, or more, until there are as many ``chains``."""
+    """Independent graphs for each window; more are made while chains are too few."""
     chains: Count = 24
     """Least number of chains of each window, over all graphs and hand sequences."""
     starts: Count = 24
-    """Number of starts of each window that are polished, the shortest: all chains, each also with
-    the idle arm moving in equal steps, are ranked by length."""
+    """Most starts of each window that are polished, the shortest: all chains, with two hands and
+    several goals each also with the idle arm moving in equal steps, are ranked by length."""
 
 
 class RecedingHorizon(Method):

@@ -2,8 +2,8 @@
 
 Shared by the search for the optimum and the planner with a receding horizon: each start is
 polished by IPOPT, the shortest plan of each hand sequence is kept, and plans that may be best are
-rounded to whole ticks, with and without goals that are hit as their turn comes because the other
-hand is already there.
+rounded to whole ticks, with and without goals that are hit as their turn comes because the hand is
+already there.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class ShortestPlans(NamedTuple):
 
     @property
     def ranked(self) -> list[PathPlan]:
-        """The shortest plan of each hand sequence in a new list, in the order of their length."""
+        """The shortest plan of each hand sequence in a new list, the shortest first."""
         return sorted(self.by_hands.values(), key=lambda plan: plan.cost)
 
 
@@ -56,9 +56,10 @@ def shortest_plans(
     still: bool,
 ) -> ShortestPlans:
     """Solve the ``problem`` of the shortest path on a task from each of ``starts``, a hand sequence
-    and configurations ``(G, dof)``; return the shortest plan of each hand sequence. With ``still``
-    the arm whose hand is not chosen for a goal does not move on the way to it. The session counts
-    the effort. Raises MethodError if no solve finds a path."""
+    and configurations ``(G, dof)``; return the shortest plan found for each hand sequence, and the
+    numbers of solves and failures. With ``still`` the arm whose hand is not chosen for a goal does
+    not move on the way to it. The session counts the effort. Raises MethodError if no solve finds a
+    path."""
     best: dict[HandSequence, PathPlan] = {}
     solves = failed = 0
     for hands, start in starts:
@@ -81,8 +82,9 @@ def fewest_ticks(
 ) -> PlanInTicks:
     """Round plans of a task to whole ticks, as far as they may be best (of a plan at most the
     nearest 64 roundings, :meth:`.Rounding.every`), with and without goals that are hit without a
-    movement; return the rounding with the fewest ticks when executed. The session counts the
-    effort. Raises MethodError if no rounding is solved and hits every goal."""
+    movement; return, of the roundings executed, the one with the fewest ticks, then the fewest
+    corrections. The session counts the effort. Raises MethodError if no rounding is solved and hits
+    every goal."""
     fewest: PlanInTicks | None = None
     least: tuple[float, float] = math.inf, math.inf
 

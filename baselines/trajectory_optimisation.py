@@ -4,7 +4,7 @@ One method per cost. Path length is the task's own reward as a formula; the othe
 the smoothness objectives that informed accounts of coarticulation use: the sum of squared joint
 displacements (Jordan 1986, 1992), minimum acceleration and minimum jerk of the joints, and minimum
 jerk of the hand (Flash & Hogan 1985), the last three over times that are free at a constant total.
-Each hand sequence is planned from the cheapest chain of a posture graph; the plan that is cheapest
+Hand sequences are planned from the cheapest chains of posture graphs; the plan that is cheapest
 *by the method's own cost* is returned.
 """
 
@@ -37,16 +37,16 @@ SAMPLES = 200  # points of a smooth path between goals; four times as many chang
 
 
 class TrajectoryParameters(Parameters):
-    """The hand sequences that are planned, and the starts of each."""
+    """Hand sequences that are planned, and the starts of each."""
 
     most_sequences: Count = BEAM_WIDTH
-    """Most hand sequences that are planned in a graph: all sequences of two hands for up to six
-    goals; of more sequences those with which a beam search of this width over the goals ends."""
+    """Most hand sequences that are planned in a graph, 64 for all of two hands and six goals; of
+    more sequences those with which a beam search of this width over the goals ends."""
     nodes: Nodes = 150
-    """Postures per goal and hand in a graph."""
+    """Most postures per goal and hand in a graph."""
     graphs: Count = 3
-    """Independent graphs, one or two starts for a hand sequence from each. With one, the best
-    path was missed on 3 of 23 small random tasks."""
+    """Independent graphs, at most two starts for a hand sequence from each. With one graph, the
+    best path was missed on 3 of 23 small random tasks."""
     chains: Count = 30
     """Least number of chains of all hand sequences, from as many further graphs as are needed."""
     noisy_starts: Annotated[int, Field(ge=0)] = 4
@@ -54,7 +54,7 @@ class TrajectoryParameters(Parameters):
 
 
 class SmoothParameters(TrajectoryParameters):
-    """The hand sequences and starts, and whether plans stop at goals."""
+    """Hand sequences and starts, and whether plans stop at goals."""
 
     stop: Literal[0, 1] = 0
     """1: the plan comes to a full stop at each goal, where velocities, for jerk accelerations too,
@@ -62,21 +62,21 @@ class SmoothParameters(TrajectoryParameters):
 
 
 class JerkParameters(SmoothParameters):
-    """Fewer starts: on the paper's tasks noisy ones find cheaper plans for four of 34 hand
-    sequences, and change neither hands nor ticks."""
+    """Parameters, by default without noisy starts: these find cheaper plans for four of 34 hand
+    sequences of the paper's tasks, and change neither hands nor ticks."""
 
     noisy_starts: Annotated[int, Field(ge=0)] = 0
     """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
 
 
 class HandJerkParameters(JerkParameters):
-    """One start for a hand sequence, because a plan by jerk of the hand takes some four times as
-    long; on the paper's tasks a second start found no other plan for any hand sequence."""
+    """Parameters, by default with one start for a hand sequence: a plan by jerk of the hand takes
+    four times as long, and on the paper's tasks a second start found no other plan."""
 
     graphs: Count = 1
     """Independent graphs, one start for a hand sequence from each."""
     chains: Count = 1
-    """Chains of all hand sequences, from as many further graphs as that takes."""
+    """Least number of chains of all hand sequences, from as many further graphs as are needed."""
 
 
 def cheapest_plan(
@@ -99,7 +99,7 @@ def cheapest_plan(
 
 
 class TrajectoryOptimisation(Method):
-    """The cheapest plan by one cost."""
+    """Base of the methods that return the cheapest plan by one cost."""
 
     version = 2
     cost: ClassVar[Cost]
@@ -109,8 +109,8 @@ class TrajectoryOptimisation(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 1}
 
     def solve(self, session: Session) -> Result:
-        """Plan for each hand sequence, and return the movements of the plan with the least cost by
-        the method's own cost. Raises MethodError if no plan converges."""
+        """Plan for each hand sequence of :meth:`starts`, and return the movements of the plan with
+        the least cost by the method's own cost. Raises MethodError if no plan is found."""
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
@@ -164,9 +164,9 @@ class TrajectoryOptimisation(Method):
 
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
         """Return a list of starts, each ``(G, dof)``, for each hand sequence planned: the cheapest
-        chain (a posture for each goal) of each random graph; except for jerk of the hand, each
-        chain also with the idle arm moving in equal steps; and copies of the first start with
-        noise. Raises MethodError if a goal has no posture."""
+        chain (a posture for each goal) of each random graph; with two hands, except for jerk of the
+        hand, each chain also with the idle arm moving in equal steps; and copies of the first start
+        with noise. Raises MethodError if a goal has no posture."""
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(0)  # the same starts for all seeds
         chains = cheapest_chains(
@@ -219,7 +219,7 @@ class SquaredDisplacement(TrajectoryOptimisation):
 
 
 class Acceleration(TrajectoryOptimisation):
-    """Minimum acceleration: a spline through the goals' discs."""
+    """Minimum acceleration of the joints: a cubic spline through the goals' discs."""
 
     name = "trajectory-optimisation/acceleration"
     title = "Trajectory optimisation, minimum acceleration"
@@ -234,7 +234,7 @@ class Acceleration(TrajectoryOptimisation):
 
 
 class Jerk(Acceleration):
-    """Minimum jerk: a smoother spline."""
+    """Minimum jerk of the joints: a quintic spline through the goals' discs."""
 
     name = "trajectory-optimisation/jerk"
     title = "Trajectory optimisation, minimum jerk"
@@ -270,8 +270,8 @@ def path_movements(
     """Return movements of kind path, one per goal, along ``path``, a piece ``(k, dof)`` per goal.
 
     A smooth path goes on towards a goal's inside after its rim is hit; the rest of the piece then
-    begins the next movement, so that the whole path is followed, except by joints held on the way
-    to the next goal, which stay where they are. The session counts the evaluations.
+    begins the next movement, so that the path is followed up to the last hit, except by joints held
+    on the way to the next goal, which stay where they are. The session counts the evaluations.
     """
     paths: list[Movement] = []
     here, rest = np.array(task.q0), np.empty((0, task.robot.dof))

@@ -12,14 +12,14 @@ where f is one of the costs
     path length        Σ_g l_g  with  |Δ_g|² <= l_g²
     squared displacement Σ_g |Δ_g|²
     acceleration       ∫ |d²q/dt²|² dt,  from rest to rest, the goals hit at times t_g
-    jerk               ∫ |d³q/dt³|² dt,  t_g - t_(g-1) > 0 free at a constant sum, or equal
+    jerk               ∫ |d³q/dt³|² dt,  t_g - t_(g-1) > 0 free at a constant sum
     hand jerk          ∫ |d³p/dt³|² + w |d³q/dt³|² dt,  of the hand that is on its way to a goal
 
 The integrals over joints are written out in the rates at the goals (:func:`segment_cost`), which
-are variables beside Δ. Jerk of the hand is a sum over Gauss-Legendre nodes; it leaves motion in the
+are variables as Δ is. Jerk of the hand is a sum over Gauss-Legendre nodes; it leaves motion in the
 null space of the hand undecided, which the small weight w = ``JOINT_WEIGHT`` settles.
 
-One programme per robot, number of goals and cost is compiled once. The start, the goals and the
+One programme per robot, hands, number of goals and cost is compiled. The start, the goals and the
 hand sequence are its parameters. A locked base or an arm that is held is a variable bound, so that
 one solver serves every hand sequence of a task. Solved by IPOPT (Wächter & Biegler 2006) with exact
 derivatives from CasADi (Andersson et al. 2019). IPOPT's linear solver is not thread-safe:
@@ -54,11 +54,10 @@ JOINT_WEIGHT = 0.1
 _NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(6)  # on [-1, 1], of each segment
 
 _ONE_AT_A_TIME = RLock()
-"""Held while CasADi builds a programme and IPOPT solves it, as two threads cannot do so at once."""
+"""Held while CasADi builds a programme and IPOPT solves it: two threads cannot do so at once."""
 _RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
 # Least duration of a segment, where the mean is 1. It binds where a smooth plan would hit two
-# goals at once. With less, jerk fails to converge for many hand sequences of two-armed-2, and hand
-# jerk for two of 16.
+# goals at once. With less, jerk fails to converge for many hand sequences of two-armed-2.
 _SHORTEST: dict[Cost, float] = {"acceleration": 0.01, "jerk": 0.05, "hand-jerk": 0.2}
 _RATES: dict[Cost, int] = {
     "acceleration": 1,
@@ -123,7 +122,7 @@ def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np
 
 @dataclass(frozen=True)
 class PathPlan:
-    """The outcome of a solve, also of one that did not converge."""
+    """A plan, the outcome of a solve, converged or not."""
 
     instance: Instance
     """The instance that was solved."""
@@ -143,12 +142,12 @@ class PathPlan:
 
     def lengths(self) -> Array:
         """Return the straight joint-space distances from the start to goal 1 and from goal to goal,
-        shape ``(G,)``, also where the plan is curved."""
+        shape ``(G,)``, length unit and rad together, also where the plan is curved."""
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]))
 
 
 class TrajectoryProblem:
-    """The compiled programme of one cost, for every task of a robot with these hands and this
+    """The compiled programme of one cost, for every task of a robot with these ``hands`` and this
     number of ``goals``."""
 
     def __init__(self, robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost) -> None:
@@ -223,13 +222,13 @@ class TrajectoryProblem:
     ) -> PathPlan:
         """Return a locally cheapest plan for an instance (start, goals, hands), sought from one
         configuration per goal, ``start`` ``(G, dof)``. A plan has converged if IPOPT says so and
-        every constraint holds; a plan that has not converged is returned as well.
+        every constraint holds (to 1e-8); a plan that has not converged is returned, too.
 
         Only for path length: ``lengths`` ``(G,)`` are upper bounds of the joint-space lengths of
         the segments, NaN for a free length; None frees all. With ``deep`` (goals, from 0) the path
         is not made short; the least depth of the hands inside the discs of these goals is made as
-        large as ``lengths`` allow. Only for costs with rates: ``stops`` holds all rates at the
-        goals at 0.
+        large as ``lengths`` allow. Only for costs with rates (velocities, accelerations): ``stops``
+        holds the rates at all goals at 0.
         """
         goals, at = self._goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
@@ -303,8 +302,8 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals are
     written out in the end states, so that nothing is discretised. ``step``: change of the joints,
     ``(dof,)``; ``time``: duration above 0; ``rates``: pair of the velocities at both ends, and for
-    both kinds of jerk pair of the accelerations, ``(dof,)`` each. Squared displacement ignores the
-    two.
+    both kinds of jerk pair of the accelerations, ``(dof,)`` each. Squared displacement ignores time
+    and rates.
     """
     if cost == "squared-displacement":
         return casadi.sumsqr(step)
@@ -325,9 +324,10 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
 def _hand_jerks(
     robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
 ) -> Any:
-    """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column,
-    along quintics between the end states: start ``q0``, changes ``steps``, ``(dof, G)``, and
-    ``rates``, velocities and accelerations at start and goals, ``(dof, G + 1)`` each."""
+    """Return the integral (Gauss-Legendre, 6 nodes) of the squared jerk of a hand over each of G
+    segments, a CasADi column, along quintics between the end states: start ``q0``, changes
+    ``steps``, ``(dof, G)``, ``durations``, ``(G,)``, and ``rates``, velocities and accelerations at
+    start and goals, ``(dof, G + 1)`` each."""
     powers = np.arange(6)
     integrals, here = [], q0
     for g in range(steps.shape[1]):
@@ -356,8 +356,8 @@ def _hand_jerks(
 def trajectory_problem(
     robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
 ) -> TrajectoryProblem:
-    """Return the compiled problem for a robot, its hands, a number of goals and a cost; a process
-    keeps the last 32 problems."""
+    """Return the compiled problem for a robot, hands to choose from, a number of goals and a cost;
+    a process keeps the 32 problems used last."""
     with _ONE_AT_A_TIME:
         return _built(robot, hands, goals, cost)
 
@@ -372,10 +372,9 @@ def segment_lengths(configurations: Array) -> Array:
 
 
 def spline(plan: PathPlan, samples: int) -> list[Array]:
-    """Return a list of configurations along a plan with rates, a piece ``(samples, dof)`` per goal,
-    at equal steps in time. The last row of a piece is the configuration at the goal; the start is
-    left out. Between goals: Hermite cubics (plans with velocities) or quintics (accelerations too).
-    """
+    """Return configurations along a plan with rates, a list of pieces ``(samples, dof)``, one per
+    goal, each at equal steps in time and ending at the goal; the start is left out. Between goals:
+    Hermite cubics (plans with velocities) or quintics (accelerations too)."""
     from scipy.interpolate import BPoly  # slow, and a command that names methods needs none
 
     corners = np.vstack([plan.instance.q0, plan.configurations])

@@ -1,4 +1,4 @@
-"""The learner's trials for methods that see nothing of them but the total reward.
+"""The learner's trials for methods that see of a trial its total reward and where it hit.
 
 As in the learner, a trial moves towards one target configuration per goal, the
 corrective process **A** corrects the goals that are missed, and the configurations in which the
@@ -22,7 +22,7 @@ from coartic.robot import Array
 
 
 class UninformedParameters(Parameters):
-    """Parameters of all uninformed methods; the defaults are the learner's."""
+    """Parameters of CMA-ES and hill climbing; the defaults are the learner's."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Trials of a run."""
@@ -31,12 +31,12 @@ class UninformedParameters(Parameters):
 
 
 class Attempts:
-    """The physical trials of one run: makes them and remembers the best."""
+    """Make the physical trials of one run, and remember the best trial."""
 
     def __init__(self, session: Session, trials: int) -> None:
         self._session = session
         self.explored = np.tile(explored_joints(session), (session.goals_count, 1))
-        """Joints that are explored at each goal, shape ``(G, dof)``."""
+        """True for joints that are explored at each goal, shape ``(G, dof)``."""
         left = session.trials_left
         self.left = trials if left is None else min(trials, left)
         """Number of trials left, at most ``trials``."""
@@ -64,7 +64,7 @@ class Attempts:
 
     def around(self, hands: str, values: Array) -> Trials:
         """Make N trials with one hand sequence, or as many as the budget of the session still has;
-        remember the best, and return the results of these trials, a row for each trial made.
+        remember the best trial so far, and return the results of these trials, a row for each.
 
         ``values``, shape ``(N, n)``, length unit and rad, are target coordinates of the n explored
         joints of all goals (True in ``explored``), goal by goal; other joints keep still. N is at
@@ -77,9 +77,10 @@ class Attempts:
     def by_targets(
         self, hands: str | list[str], targets: Array, until: Array | None = None
     ) -> Trials:
-        """Make N trials with targets of shape ``(N, G, dof)``, length unit and rad, and one hand
-        sequence, or a hand sequence for each trial; remember the best trial, and return the results
-        of all trials made.
+        """Make N trials (at least one) with targets of shape ``(N, G, dof)``, length unit and rad,
+        NaN for joints that keep still, and one hand sequence, or a hand sequence for each trial;
+        remember the best trial so far, and return the results of the trials made, fewer if the
+        budget of the session ends.
 
         ``until``, rewards of shape ``(N,)``: the first trial whose reward exceeds its entry is the
         last trial made. Raises BudgetError if no trial of the session is left.
@@ -98,7 +99,7 @@ class Attempts:
 
     @property
     def solution(self) -> tuple[Movement, ...]:
-        """The movements of the best trial."""
+        """The movements of the best trial. Raises ValueError before the first success."""
         return movements_of(self.hands, self.targets)
 
     def result(self, **details: Any) -> Result:

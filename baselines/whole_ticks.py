@@ -1,10 +1,9 @@
 """From a shortest path to movements in whole control ticks.
 
-A movement lasts a whole number of steps of length m, so a plan whose segments are not
-multiples of m pays for the rest of each. Here the segments are rounded and the plan is
-solved again around them, and each movement aims *through* the goal's rim: a target a
-little beyond it on the same joint-space line, so that the movement ends by hitting the
-goal and not by arriving short of it.
+A movement lasts a whole number of steps of length m, so a plan whose segments are not multiples of
+m pays for the rest of each. Here the segments are rounded and the plan is solved again around them,
+and each movement aims *through* the goal's rim: its target lies beyond, on the same joint-space
+line, so that the movement ends by hitting the goal and not by arriving short of it.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from coartic.robot import Array
 
 MOST_ROUNDINGS = 64  # of a plan that are tried: all with up to seven goals
 _SLACK = 1e-6  # of a step: lengths are known to the solver's tolerance
-_BEYOND = tuple(1 << k for k in range(11))  # steps that a target lies beyond the rim
+_BEYOND = tuple(1 << k for k in range(11))  # steps that a target lies beyond the configuration
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class TickPlan:
 
 
 class Rounding:
-    """Rounds plans of one problem and instance; the session counts the solver's effort.
+    """Round plans of one problem and instance; the session counts the solver's effort.
 
     ``merged`` names goals (0-based) that are hit as their turn comes, without a movement.
     """
@@ -55,16 +54,15 @@ class Rounding:
         self._step = session.model.step
 
     def nearest(self, plan: PathPlan) -> TickPlan | None:
-        """Return the plan solved again with each segment but the last at the nearest whole number
-        of steps, and the last, as short as it then can be, rounded up; None if a solve fails. At a
-        shortest path the total does not change, to first order, with its division into segments, so
-        of all roundings (:meth:`every`) this one nearly always has the fewest ticks."""
+        """Return the plan solved again with each segment except the last at the nearest whole
+        number of steps, and the last, as short as it then can be, rounded up; None if a solve
+        fails. To first order all roundings of a shortest path (:meth:`every`) have equal ticks."""
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
 
     def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
-        """Yield roundings of a plan to whole steps, the nearest first: each segment but the last is
-        rounded up or down, the last up. Goals ``merged`` (from 0) are hit without a movement. Of
+        """Yield roundings of a plan to whole steps, the nearest first: each segment is rounded up
+        or down, the last one up. Goals ``merged`` (from 0) are hit without a movement. Of
         the nearest 64 roundings, which are all for up to seven goals, roundings that cannot be
         solved are left out.
         """
@@ -80,8 +78,9 @@ class Rounding:
                 yield rounded
 
     def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
-        """Return a lower bound of the ticks of all roundings of a plan in which the goals
-        ``merged`` (from 0) are hit without a movement."""
+        """Return the ticks of a plan if only its whole length is rounded up, with a movement to
+        each goal that is not in ``merged`` (from 0): roundings of a shortest plan hardly take
+        fewer."""
         length = float(plan.lengths().sum())
         moved = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + moved
@@ -90,10 +89,9 @@ class Rounding:
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
         """Yield pairs: a tuple of goals (from 0) that are hit without a movement, and the shortest
-        plan in which these goals are hit so; first the empty tuple with ``plan`` itself. Such a
-        plan pays if its path grows by fewer steps than the ticks that it saves. ``worth`` is asked
-        whether a number of ticks is of interest; plans that cannot have such a number are not
-        sought."""
+        plan found in which these goals are hit so; first the empty tuple with ``plan`` itself.
+        ``worth`` is asked whether a number of ticks is of interest; plans that cannot have such a
+        number, by :meth:`least`, are not sought."""
         hands, goals = self._instance.hands, len(self._instance.hands)
         # The hand can be there before: at the start, since another hand hits the goal before, or
         # since the discs of both goals overlap.
@@ -119,9 +117,9 @@ class Rounding:
                     waiting.append((more, merger))
 
     def divide(self, plan: PathPlan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
-        """Return a plan rounded to ``steps``, a number of steps to each goal but the last, and the
-        fewest steps to the last goal; None if a solve fails. Goals ``merged`` (from 0) are hit
-        without a movement."""
+        """Return a plan rounded to ``steps``, a number of steps to each goal except the last, and
+        the fewest steps found to the last goal; None if a solve fails. Goals ``merged`` (from 0)
+        are hit without a movement."""
         lengths = np.array([*steps, np.nan]) * self._step
         shortest = self.solve_around(plan.configurations, lengths, merged)
         if not shortest.converged:
@@ -176,10 +174,10 @@ def movements(
 
     Joints that are held on the way to a goal stay where they are, even if an earlier movement ended
     by a hit short of its target. With ``steps``, a number per goal, the target of a movement lies
-    beyond the rim of the goal's disc, on the same line, so that the movement hits after at most
-    that many steps; if no such target does, the target is the configuration given. For 0 steps the
-    movement is corrective, and is not made where the hand is in the goal already. The session
-    counts the effort.
+    beyond the configuration, on the same line, so that the movement hits after at most that many
+    steps; if no such target does, the target is the configuration. For 0 steps the movement is
+    corrective, and not to be made where the hand is in the goal already. The session counts the
+    effort.
     """
     planned: list[Movement] = []
     q, model = np.array(task.q0), session.model
