@@ -41,21 +41,21 @@ class Finding:
     tests: tuple[Estimate, ...] = ()
     """Tests of the claim, which all have to hold; a positive estimate is as claimed."""
     against: tuple[Estimate, ...] = ()
-    """Tests of the opposite of the claim; any test below 5 %, after correction, refutes the
-    claim."""
+    """Tests of the opposite of the claim; p below 5 % of any test, after correction, refutes a
+    claim that does not hold."""
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
 
     def __str__(self) -> str:
-        """A sentence: what the runs show, p-values uncorrected, and the evidence."""
+        """Return a sentence: what the runs show, the largest p of ``tests``, and the evidence."""
         shown = {True: "The runs show it", False: "The runs do not show it", None: "Too few runs"}
         p = p_value(_largest_p(self.tests))
         return f"{shown[self.holds]}{f' ({p})' * bool(p)}: {self.evidence.rstrip('.')}."
 
     @property
     def opposite_p(self) -> float:
-        """Smallest p-value of the tests in ``against``, times their number (Bonferroni), 1 at most;
-        NaN without a test."""
+        """Smallest p-value in ``against``, times the number of p-values there (Bonferroni), 1 at
+        most; NaN without a p-value."""
         tested = [test.p for test in self.against if not math.isnan(test.p)]
         return min(1.0, min(tested) * len(tested)) if tested else math.nan
 
@@ -65,8 +65,9 @@ class Finding:
 
         A claim that holds is supported if ``p`` is below 5 %, or NaN as of an exact count. A claim
         that does not hold is not supported if ``opposite_p`` is below 5 %, if the claim has no
-        test, or if values without spread contradict it. Other claims, and claims with too few runs,
-        are undecided."""
+        test, or if a test of three values or more (in each sample) has no p and no positive
+        estimate: all values equal the bound or each other. Other claims are undecided, and claims
+        with too few runs: ``holds`` is None, or a test of fewer than three values has no p."""
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -116,15 +117,17 @@ def mean_beyond(
     Returns
     -------
     Finding
-        ``holds``: the mean lies on this side; None with fewer than three tasks. ``evidence``: the
-        sentence. ``tests`` has a test of the claim; ``without`` a test of the claim without the
-        task that favours it most; ``against`` a test of the opposite, with all tasks or without the
-        task that favours the opposite most, whichever has the larger p.
+        ``holds``: the mean lies on this side; None, without a test, with fewer than three tasks.
+        ``evidence``: the sentence. ``tests`` has a test of the claim; ``without`` a test of the
+        claim without the task that favours it most; ``against`` a test of the opposite, with all
+        tasks or without the task that favours the opposite most, whichever has the larger p.
 
     Raises
     ------
     CoarticError
         For another side or shape, and for a sentence that has not one ``{}``.
+    ValueError
+        Three values or more, one of them infinite.
 
     Examples
     --------

@@ -107,10 +107,11 @@ def fill_page(template: str | Path, **values: Any) -> str:
     Raises
     ------
     CoarticError
-        There is no such template, or a function or filter in it gets a wrong argument, such as a
+        There is no such template, or ``interval`` or ``number`` gets a wrong argument, such as a
         row without the numbers.
     ValueError
-        A sentence that the template expects of the results does not hold.
+        A sentence that the template expects of the results does not hold, or ``listed`` gets no
+        words.
     jinja2.TemplateError
         The template is wrong, or uses an unknown name.
     """

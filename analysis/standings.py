@@ -38,7 +38,7 @@ _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "paramet
 @cached
 def compared(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs, also failed ones, of every method except searches for the optimum, by label
-    of the row in :attr:`.Study.methods`, in the order of these rows.
+    of the row in :attr:`.Study.methods`, in the order of these rows, without :data:`_OF_RECORD`.
 
     A row that joins two conditions of the learner has runs that are in the rows of these
     conditions, too. Runs on tasks without a best known reward are left out, and so are methods
@@ -102,8 +102,8 @@ def equal_trials(study: Study) -> int:
 def trials_of(study: Study) -> dict[str, int]:
     """Return, by label, the number of trials of a run of each row of :attr:`.Study.methods`: its
     parameter ``trials``; without this parameter the most trials made, at least
-    :func:`equal_trials`; for a method that does not use the reward of each trial always
-    :func:`equal_trials`."""
+    :func:`equal_trials`; of joined conditions the larger; for a method that does not use the reward
+    of each trial always :func:`equal_trials`."""
     asked, equal = _trials_asked(study), equal_trials(study)
     made = study.runs.fillna({"trials": 0}).groupby("label").trials.max()
     return {
@@ -163,9 +163,9 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
 
 def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
     """Return a sentence for each row of :func:`board` that is not ranked, settings left out: its
-    gap, why it is not ranked, and the gap of the first method with the same use of the reward on
-    the same tasks; and for each method from a file, or of the labels ``also``, that has no row, as
-    it solved no task."""
+    gap, why it is not ranked, and the gap of the first ranked method with the same use of the
+    reward on the same tasks, if that ran on all of them; and for each method from a file, or of the
+    labels ``also``, that solved every run on no task and so has no row."""
     rows, sentences = without_settings(board(study, also)), []
     for method in rows.index[~rows.ranked]:
         on, name = solved_tasks(study, method), study.methods.title[method]
@@ -209,9 +209,9 @@ def shown_name(study: Study, method: str) -> str:
     """Return the title of a method and, for a method of :func:`compared`, why its numbers are not
     comparable with the numbers of other methods:
     ``mine (3 of 8 tasks)`` for a method from a file that did not solve every run on
-    :func:`common_tasks`; ``mine (at most 77 of 10,000 trials)`` for one whose runs all stopped
-    before their trials were made; ``mine (400 trials)`` for another number of trials than
-    :func:`equal_trials`, where its setting does not say it."""
+    :func:`common_tasks`; ``mine (at most 77 of 400 trials)`` for a method from a file whose runs
+    all stopped before their trials were made; ``mine (400 trials)`` for another number of trials
+    than :func:`equal_trials`, where the title has no setting of ``trials``."""
     row, trials = study.methods.loc[method], trials_of(study)[method]
     if method not in compared(study):
         return str(row.title)
@@ -226,9 +226,9 @@ def shown_name(study: Study, method: str) -> str:
 
 
 def _on_tasks(study: Study, method: str) -> str:
-    """Return on how many of all tasks a method solved every run, ``3 of 8 tasks``, with the number
-    of its failed runs if there are any; empty if it solved every run on the tasks over which
-    methods are ranked (:func:`common_tasks`)."""
+    """Return on how many of all tasks of :func:`compared` a method solved every run, ``3 of 8
+    tasks``, with the number of its failed runs if there are any; empty if it solved every run on
+    the tasks over which methods are ranked (:func:`common_tasks`)."""
     on = {*solved_tasks(study, method)}
     if {*common_tasks(study)} <= on:
         return ""

@@ -183,10 +183,10 @@ def as_in_isolation(runs: Solutions) -> Array:
 @checked_arguments
 def other_arm(runs: Solutions) -> Array:
     """Return for each run, shape ``(n,)``, the share of the way to its next goal that the idle hand
-    covers, a mean of :func:`preshaping` over the goals after which the idle hand hits a later goal.
+    covers, a mean of :func:`preshaping` over the goals where that is not NaN.
 
-    Negative where the idle hand moves away. NaN on a task for one hand, without an initial
-    solution, and for a run whose idle hand never hits a later goal.
+    Negative if on the whole the idle hand moves away. NaN on a task for one hand, without an
+    initial solution, and for a run without such a goal.
     """
     initial = initial_solution(runs.task)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:

@@ -60,11 +60,11 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
 
     ‖Nᵀ Δq‖ / √dim N and ‖Rᵀ Δq‖ / √dim R, for orthonormal bases N of the null space of the Jacobian
     J and R of the row space. ``difference`` Δq has shape ``(k,)``, length unit and rad mixed,
-    ``jacobian`` J shape ``(2, k)``, for the k joints that can move. A random direction has equal
-    parts in expectation. A difference between contexts is motor-equivalent if the first part
-    exceeds the second: another posture with the same position of the hand. Caveat: the radius of
-    the goal bounds the second part, and nothing bounds the first. NaN for a space of dimension 0.
-    Raises ValueError for other shapes.
+    ``jacobian`` J shape ``(2, k)``, for the k joints that can move. In a random direction the
+    squares of the parts have equal expectations. A difference between contexts is motor-equivalent
+    if the first part exceeds the second: another posture with the same position of the hand.
+    Caveat: the radius of the goal bounds the second part, and nothing bounds the first. NaN for a
+    space of dimension 0. Raises ValueError for other shapes.
     Source: Mattos, Latash and colleagues, Experimental Brain Research
     (doi:10.1007/s00221-015-4327-4, 10.1007/s00221-018-5215-5).
     """

@@ -63,7 +63,7 @@ def other_tasks(scores: Scores) -> Estimate:
 
     Notes
     -----
-    A percentile interval, widened by √(k / (k − 1)) for the k instances of a family, as the
+    A percentile interval, widened by √(k / (k − 1)) for the k instances of a family, because the
     bootstrap underestimates the spread of a mean by this factor. The interval is a little too wide
     for few runs with much noise, which the means of instances contain already, and does not exceed
     the means over families of the least and of the greatest score of a run. Families have the same
