@@ -124,7 +124,8 @@ def list_contexts(study: Study) -> Rows:
     ),
 )
 def list_signatures(study: Study) -> Rows:
-    """Yield rows with the signatures of every method on every task, and of random search there.
+    """Yield rows with the signatures of every method, except searches, on every task of
+    :func:`.one_by_one`, and of random search there for methods that select among trials.
 
     A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
     the choice of hands (``hands`` empty). Means over runs; p is of the one-tailed exchange test and
@@ -235,8 +236,9 @@ def list_saved(study: Study) -> Rows:
     "n = {n} runs.",
 )
 def draw_saved(study: Study) -> Parts | None:
-    """Draw for each task a row for each of some methods (the learner, random search, the best of
-    each kind that uses the reward, methods from files), the smallest mean gap first. A row has a
+    """Draw for each task a row for each of some methods (the learner that explores most, random
+    search, the best of each kind that uses the reward, methods from files), the smallest mean gap
+    first. A row has a
     bar for each goal: mean ticks of the movement less the ticks of the corrective process alone
     with the same hands, up where it takes more. None if there is nothing to draw."""
     rows, methods = list_saved(study), study.methods
@@ -326,7 +328,7 @@ def draw_postures(study: Study) -> Parts | None:
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
     """Draw the postures of runs at a shared goal, runs thin and their mean on each task thick;
     return two frames, one for each task, with a row for each run: ``task``, ``method``, ``goal``,
-    ``hand`` and the posture, a column for each joint."""
+    ``hand`` and the posture, a column for each of its entries."""
     axes.set_axis_off()
     axes.set_aspect("equal")
     robot, radius = shared.tasks[0].robot, shared.tasks[0].radius

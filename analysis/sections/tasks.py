@@ -27,8 +27,8 @@ from coartic.tasks.task import shipped_tasks
     "source: best known from; bound: proven bound",
 )
 def list_tasks(study: Study) -> Rows:
-    """Yield a row for each task with its best known reward, and the rewards of the corrective
-    process alone with the initial and the best hands, negative ticks."""
+    """Yield a row for each task of :func:`.one_by_one` with its best known reward, and the rewards
+    of the corrective process alone with the initial and the best hands, negative ticks."""
     for name, task in one_by_one(study).items():
         best, locked = study.optima.get(name), " and ".join(task.locked_base)
         alone = study.sequences(name).reward.dropna()

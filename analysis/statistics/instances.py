@@ -66,9 +66,8 @@ def other_tasks(scores: Scores) -> Estimate:
     A percentile interval, widened by √(k / (k − 1)) for the k instances of a family, because the
     bootstrap underestimates the spread of a mean by this factor. The interval is a little too wide
     for few runs with much noise, which the means of instances contain already, and does not exceed
-    the means over families of the least and of the greatest score of a run. Families have the same
-    weight, and so have the instances of a family. No interval (NaN) if any family has fewer than
-    three instances.
+    the means over families of the least and of the greatest score of a run. No interval (NaN) if a
+    family has fewer than three instances.
     """
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")
