@@ -1,9 +1,8 @@
 """Findings and verdicts: evidence and tests of each claim, corrected over all claims of a study.
 
 A claim needs one mean over tasks, or several, beyond a bound (:func:`mean_beyond`, joined by
-:func:`all_of`). :func:`judge` corrects the claims of a study over each other (Holm). No single task
-may carry a claim: a claim is undecided if its tests come out otherwise without the task that
-favours it most.
+:func:`all_of`). :func:`judge` corrects the claims of a study over each other (Holm). A claim that
+holds is undecided if its tests come out otherwise without the task that favours it most.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import counted
 
 RESAMPLES_OF_CLAIMS = 99_999
-"""Resamples of a test over tasks: some are close, and p-values are corrected over many claims."""
+"""Resamples of a test over tasks, whose p-value is corrected over many claims."""
 Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
 Side = Literal["greater", "less"]
 
@@ -63,11 +62,11 @@ class Finding:
         """Return ``supported``, ``not supported`` or ``undecided`` by p-values of the claim and of
         its opposite, corrected or not.
 
-        A claim that holds is supported if ``p`` is below 5 %, or NaN as of an exact count. A claim
+        A claim that holds is supported if ``p`` is below 5 %, or NaN: counted exactly. A claim
         that does not hold is not supported if ``opposite_p`` is below 5 %, if the claim has no
         test, or if a test of three values or more (in each sample) has no p and no positive
-        estimate: all values equal the bound or each other. Other claims are undecided, and claims
-        with too few runs: ``holds`` is None, or a test of fewer than three values has no p."""
+        estimate: all values equal the bound or each other. Other claims are undecided, and so is a
+        claim that holds by a test of fewer than three values without p."""
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -127,7 +126,7 @@ def mean_beyond(
     CoarticError
         For another side or shape, and for a sentence that has not one ``{}``.
     ValueError
-        Three values or more, one of them infinite.
+        There are three values or more, and one of them or the bound is not finite.
 
     Examples
     --------
@@ -207,9 +206,8 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
         A row for each claim, by its id: ``statement``, ``verdict`` (``supported``, ``not
         supported`` or ``undecided``), ``evidence``, ``test`` and corrected p-values: ``p_holm`` of
         the claim, ``p_without`` of the claim with all tasks and without the task that favours it
-        most (the larger p), and ``opposite_p_holm`` of its opposite; NaN without a test. A claim
-        that holds is supported if ``p_without`` is below 5 %, or NaN as of an exact count; with
-        too few values it is undecided (:meth:`Finding.verdict`).
+        most (the larger p), and ``opposite_p_holm`` of its opposite; NaN without a test. The
+        verdict is :meth:`Finding.verdict` of the last two p-values.
 
     Examples
     --------

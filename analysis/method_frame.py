@@ -132,8 +132,8 @@ def _group_of(runs: pd.DataFrame) -> str:
     """Return the group of a method, one of :data:`GROUPS`, from its runs.
 
     ``using the reward of each trial`` if the method declares this reward and a run made more than
-    one trial, whatever else it uses; or else ``using the reward as a formula`` if it declares the
-    formula; or else ``not using the reward``.
+    one trial; or else ``using the reward as a formula`` if it declares the formula; or else ``not
+    using the reward``.
     """
     information = {each for text in runs.information.unique() for each in text.split(", ")}
     if (runs.trials > 1).any() and Information.REWARD_BY_TRIAL.value in information:

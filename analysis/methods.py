@@ -85,8 +85,8 @@ _WORDS = {
 
 
 def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False) -> str:
-    """Return the name of a method with its setting in words: ``learner EC4``, ``hill climbing``,
-    ``CMA-ES (other arm still)``. ``setting`` has the form ``sigma=0.1, stop=1``, empty for none.
+    """Return the name of a method with its setting in words: ``learner EC4``, ``CMA-ES (other
+    arm still)``. ``setting`` has the form ``sigma=0.1, stop=1``, empty for none.
     The name of a method from a file is the title in its declaration, or its id if ``method`` is
     the id. ``short``: the short name of a built-in method, if it has one; the id of a method from a
     file."""

@@ -16,7 +16,7 @@ from coartic.tasks.task import hands_of
 
 @dataclass(frozen=True)
 class Solutions:
-    """Executed solutions of n runs of one method with parameters on one task with G goals."""
+    """Executed solutions of n runs of one method with one setting on one task with G goals."""
 
     task: Task
     label: str
@@ -66,7 +66,7 @@ def initial_solution(task: Task) -> Execution | None:
     """Return the execution of the corrective process alone with the initial hands of a task.
 
     None if the corrective process does not complete the task with these hands, or if the task does
-    not name them and none of at most 4,096 hand sequences completes it.
+    not name them and no hand sequence completes it or over 4,096 would have to be tried.
     """
     try:
         execution = corrective_trial(task, initial_hands(task))

@@ -52,8 +52,8 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method on some tasks, failed ones too. Raises KeyError for a label that
-    :func:`compared` does not have.
+    """Return the runs of a method (label) on some tasks, failed runs too. Raises KeyError for a
+    label that :func:`compared` does not have.
 
     No rows if the method has no run on one of the tasks, or if it is a row of
     :attr:`.Study.methods` that joins conditions of the learner and one condition has no run there.
@@ -65,7 +65,7 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
 
 
 def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the different pairs of task and method (label) among some runs, in their order."""
+    """Return the different pairs of task and method (label) in some runs, in order."""
     return [*dict.fromkeys(zip(runs.task, runs.label, strict=True))]
 
 
@@ -81,9 +81,9 @@ def common_tasks(study: Study) -> tuple[str, ...]:
 @cached
 def equal_trials(study: Study) -> int:
     """Return the number of trials of a run with which methods are ranked. Of methods that use the
-    reward of each trial: the number in the suite's file, if the command asked for another and one
-    of them has it, or else the number that most algorithms have (of equals the least). Without
-    such a method that has a parameter ``trials``: the most trials that a run made."""
+    reward of each trial: the number in the suite's file, if the command asked for another and a
+    method has it, or else the number that most algorithms have (of equals the least). Without such
+    a method that has a parameter ``trials``: the most trials that a run made."""
     asked, algorithms = _trials_asked(study), dict[int, set[str]]()
     for method in compared(study):
         for part in study.methods.parts[method]:
@@ -116,7 +116,8 @@ def trials_of(study: Study) -> dict[str, int]:
 
 @cached
 def _trials_asked(study: Study) -> dict[str, int]:
-    """Return the parameter ``trials`` of each method with its setting, by label; 0 without it."""
+    """Return the parameter ``trials`` of each method with its setting, by label; 0 without such a
+    whole number."""
     return {job.cell.label: trials_in(job.cell.parameters) for job in study.plan}
 
 

@@ -59,7 +59,7 @@ class Plot:
             path.write_bytes(picture(self.figure, path.suffix))
 
     def _repr_html_(self) -> str:
-        """Return the picture that a notebook shows, with title and caption."""
+        """Return the HTML that a notebook shows: the picture, with title and caption."""
         words = html.escape(one_line(f"{self.title}. {self.caption}"))
         return f"<figure>{for_page(self)}<figcaption>{words}</figcaption></figure>"
 
@@ -164,7 +164,7 @@ def picture(drawing: Figure, ending: str) -> bytes:
 
 def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
     """Return a figure as the bytes of a file, made by ``Figure.savefig`` with the arguments ``how``
-    and with ``settings`` of Matplotlib (rcParams). Its parts are laid out once, not twice."""
+    and with ``settings`` of Matplotlib (rcParams). Parts of the figure are laid out only once."""
     stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
     canvas = drawing.canvas
     try:

@@ -1,6 +1,6 @@
 """Style of all figures: sizes, colours and marks.
 
-Colours: Okabe & Ito (2008), Color Universal Design, without the yellow, which is faint on white.
+Colours: Okabe & Ito (2008), Color Universal Design, without the yellow.
 Methods have colours of their own (:data:`.COLORS`), and marks and dashes that distinguish them.
 """
 
@@ -70,7 +70,7 @@ def grid(panels: int) -> tuple[int, int]:
 @contextmanager
 def drawn_at(width: float | None) -> Iterator[None]:
     """Let :func:`panels` make figures of a width, inches, within a ``with`` block; None: of the
-    width in its argument ``size``."""
+    width in argument ``size`` of :func:`panels`."""
     before = _width.set(width)
     try:
         yield

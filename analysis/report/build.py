@@ -45,7 +45,7 @@ def write_report(
 
     ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF, of this ``width``,
     inches; None: as wide as on the page. ``watch`` is called with the title of each section before
-    it is made, and ``for_paper`` again with ``TITLE, for print`` before its files of figures.
+    it is made, and, ``for_paper``, again with ``TITLE, for print`` before its files of figures.
     Returns the paths of the files below ``folder``, and the errors of parts that could not be made,
     by the name of the part. Raises CoarticError if the folder holds the results themselves or the
     report of other results (not looked for below the results), or another file in the place of a
@@ -123,11 +123,7 @@ def _plots_of(study: Study, section: Section, width: float | None = None) -> lis
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     """Return the values of a section for the template: ``finding``, a list of lines; ``figures``,
     a plot, its SVG and, of the ranking, its SVG at one column, for phones; ``shown``, for each
-    table with rows its ``id``, ``caption``, ``rows`` and ``settings`` (numbers) and ``html``.
-
-    Settings and ablations have rows only in the ranking, in the table of contexts, whose verdicts
-    are counted in a sentence, and in the table of all methods.
-    """
+    table with rows its ``id``, ``caption``, ``rows`` and ``settings`` (numbers) and ``html``."""
     tables = []
     for table in section.tables:
         frame = table(study)

@@ -1,8 +1,4 @@
-"""The interactive figure of `coartic play`, with the runs of a folder.
-
-The figure begins with stored runs. After a reader has moved a goal, the learner or another method
-solves the changed task.
-"""
+"""The interactive figure of `coartic play`, with the runs of a folder."""
 
 from __future__ import annotations
 

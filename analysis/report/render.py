@@ -60,7 +60,7 @@ def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
     """Return the headings of the columns that the page can show, by name of the column: columns
     with a heading and a value in some row, without ends of intervals and SDs of other columns.
 
-    A task goes by its title, with † where it is reconstructed.
+    A task in a heading goes by its title, with † where it is reconstructed.
     """
     headers, titles = {}, frame.attrs.get("titles", {})
     names = [name for name in frame.columns if not _is_end(table, frame, name)]

@@ -104,9 +104,8 @@ def times_of(
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:
     """Return the wall time of solving, s, of the runs that were made in warm processes, or of all
-    runs if no process was warm, by the index of ``runs``; the wall time of a run that has no time
-    of solving above 0.
-    """
+    runs if no process was warm, by the index of ``runs``; of a run without a time of solving above
+    0 its whole wall time."""
     times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
     warm = runs.warm.to_numpy(bool, na_value=False)
     return times[warm] if warm.any() else times

@@ -63,10 +63,9 @@ def list_family_gaps(study: Study) -> Rows:
     families with two arms and in each family, with intervals for other tasks of the families.
 
     A method that did not solve every run of every instance of a family has gap NaN in the family,
-    and over families with two arms if the family has two, as in the ranking. ``instances`` is the
-    number of instances on which it solved every run, ``missing`` the number of other instances, of
-    families with two arms, or, for a method that ran on families with one arm alone, of families on
-    which it ran.
+    and over families with two arms if the family has two. ``instances`` is the number of instances
+    on which it solved every run, ``missing`` the number of other instances, of families with two
+    arms, or, for a method that ran on families with one arm alone, of families on which it ran.
     """
     every, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {each for each in families if len(study.tasks[families[each][0]].hands) > 1}

@@ -1,4 +1,4 @@
-"""Section on the ranking: gaps and shares of methods, over all tasks and on each."""
+"""Section on the ranking: gaps and shares of methods, over tasks and on each task."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ _EARLY = 1_000
     "least_p: -",
 )
 def list_against_learner(study: Study) -> Rows:
-    """Yield a row for each method and task: mean rewards, ticks, of the method and of the learner
-    (EC1, with two arms EC4), and the p-value of their difference.
+    """Yield a row for each method, except searches and this learner, and each task: mean rewards,
+    ticks, of the method and of the learner (EC1, with two arms EC4), and p of their difference.
 
     Only for tasks on which both solved every run. p is two-sided, of the exchange test, or, for a
     deterministic method, whose reward counts as exact, of the bootstrap test, and is corrected over

@@ -99,8 +99,8 @@ def permutation_p(
     """Test that the distance of the mean configurations of two contexts exceeds chance, by a
     one-tailed permutation test of runs.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, 0 < p ≤ 1: exact if all
-    permutations are no more than ``resamples``, 1 if all runs are equal, NaN if a context has a
+    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, 0 < p ≤ 1: exact if the runs can
+    be divided in no more than ``resamples`` ways, 1 if all runs are equal, NaN if a context has a
     single run. Raises ValueError for other shapes.
     """
     first, second = _groups(first, second)
@@ -126,7 +126,7 @@ def permutation_p(
 
 def smallest_p(first: int, second: int, resamples: Resamples = RESAMPLES) -> float:
     """Return the smallest p that the permutation test of runs (:func:`permutation_p`) can give, for
-    the numbers of runs in two contexts."""
+    the numbers of runs in two contexts, two or more each."""
     divisions = math.comb(first + second, first)
     alike = 2 if first == second else 1  # the exchange of both groups is as far apart
     return alike / divisions if divisions <= resamples else 1 / (1 + resamples)

@@ -36,8 +36,8 @@ step."""
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     """Return ``(name, name, n)`` for each pair of tasks that differ only after their first goals: n
-    shared first goals have a following goal in both tasks. Pairs with n = 0, and with different
-    robots, starts, radii, hands or locked bases, are left out."""
+    is the number of shared first goals that another goal follows in both tasks. Pairs with n = 0,
+    and with different robots, starts, radii, hands or locked bases, are left out."""
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
         others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
@@ -159,8 +159,8 @@ class TwoContexts:
 
     @cached_property
     def p_same(self) -> float:
-        """P-value of the test that the posture difference is below :data:`SAME`, by the bootstrap:
-        below 5 % if its 90 % interval is. NaN if a context has a single run."""
+        """P-value of the bootstrap test that the posture difference is below :data:`SAME`
+        (:func:`.posture_difference_below`); NaN if a context has a single run."""
         rng = self._rng("sameness")
         return posture_difference_below(*self.configurations, SAME, rng, standardised=False)
 

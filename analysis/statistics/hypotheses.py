@@ -1,8 +1,7 @@
 """Tests of means and shares, and Holm's correction for several tests.
 
 Two means have tests by exchange, a mean against a number the bootstrap, shares exact binomial
-tests; permutation tests of postures are in
-:mod:`coartic.analysis.signatures`. Samples and seeds are as in :mod:`coartic.estimates`.
+tests. Samples and seeds are as in :mod:`coartic.estimates`.
 
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 16;
 A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, chapter 4
@@ -69,7 +68,6 @@ def bootstrap_test(
     sample = vector(values) - vector([bound])[0]
     difference, n, shifted = float(sample.mean()), len(sample), centred(sample)
     size = float(np.abs(shifted).max())
-    # The smallest p of an exact test of as many values, by signs.
     tails = 2 if alternative == "two-sided" else 1
     least = max(tails / 2**n, 1 / (1 + resamples))
     differs = abs(difference) > NEGLIGIBLE * np.abs(vector(values)).max()

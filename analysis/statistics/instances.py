@@ -6,9 +6,8 @@ the bootstrap resamples runs within tasks.
 For other tasks, the sample has runs within instances within families. The bootstrap is hierarchical
 (A. C. Davison & D. V. Hinkley 1997, Bootstrap Methods and their Application, section 3.8): it
 resamples instances within families, then runs within instances. Families are fixed and have the
-same weight. A mixed model does not fit: gaps to an optimum are skewed and bounded by 0,
-deterministic methods have no spread over runs, and the spread of other methods differs by a factor
-of ten between tasks.
+same weight. A mixed model does not fit: gaps to an optimum are skewed and bounded by 0, and their
+spread over runs differs between methods and tasks.
 """
 
 from __future__ import annotations

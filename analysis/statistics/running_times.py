@@ -1,7 +1,6 @@
 """Running times: the costs at which runs reach targets, after COCO (Hansen et al. 2021).
 
-The ECDF of running times is the share of pairs of run and target reached within a budget, exact at
-every budget.
+The ECDF of running times is the share of pairs of run and target reached within a budget.
 """
 
 from __future__ import annotations
