@@ -162,8 +162,8 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        Holds if all findings hold. It has ``tests``, ``against`` and ``without`` of all findings.
-        If findings have too few runs, the first of these is returned.
+        Finding that holds if all findings hold, with ``tests``, ``against`` and ``without`` of all;
+        or the first finding with too few runs (``holds`` is None).
 
     Raises
     ------

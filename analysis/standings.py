@@ -129,8 +129,8 @@ def together(study: Study, by_method: Mapping[str, pd.DataFrame]) -> pd.DataFram
 
 
 def common_runs(study: Study) -> pd.DataFrame:
-    """Return the runs on :func:`common_tasks` of the methods that ran on all of them, as one frame
-    (:func:`together`)."""
+    """Return the runs of every compared method on :func:`common_tasks` (:func:`runs_on`) as one
+    frame (:func:`together`)."""
     tasks = common_tasks(study)
     return together(study, {method: runs_on(study, method, tasks) for method in compared(study)})
 
@@ -140,7 +140,7 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
     """Return the standings: a row for each method with a gap, by label, with the columns of
     :func:`.ranking` and of :attr:`.Study.methods`, and with ``ranked``.
 
-    Ranked are methods that solved every run on :func:`common_tasks`, in at most
+    Ranked are methods of :func:`common_runs` that solved every run there, in at most
     :func:`equal_trials` unless trials are varied; the smallest gap is first. Below them, not
     ranked, are methods with more trials, and methods from files or of the labels ``also`` that lack
     a run or a solution on one of these tasks, over the tasks on which they solved every run. Other

@@ -30,7 +30,7 @@ class Section:
     """Functions that draw the figures, or return None if the folder has no runs for one. The page
     folds all figures except the first."""
     sentence: str = ""
-    """Jinja template of the finding in words, or empty. It can use ``every``, the first table;
+    """Jinja template of the finding in words, or empty. Its names are ``every``, the first table;
     ``rows``, this table with the ``title`` of each method, without settings, ablations and methods
     below the ranking; ``others``, the other tables with titles, without settings and ablations
     (further names: :func:`.finding`)."""

@@ -112,11 +112,11 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 
 def _runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
-    """Return, by label, the runs of each compared method on those of :func:`.common_tasks` that
-    have targets (:func:`spans`).
+    """Return, by label, the runs of each compared method on each of :func:`.common_tasks` that has
+    targets (:func:`spans`).
 
-    A method that did not run on all these tasks is left out; a method from a file then has its runs
-    on all its tasks with targets.
+    A method without runs on all these tasks (:func:`.runs_on`) is left out; a method from a file
+    then has its runs on all its tasks with targets.
     """
     common = [task for task in standings.common_tasks(study) if task in spans(study)]
     of_methods = {}

@@ -27,9 +27,9 @@ Scores = Mapping[str, Sequence[Numbers]]
 
 
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
-    """Return the mean over tasks of the mean over runs, with its stratified BCa interval, for
-    ``values`` of shape ``(runs,)`` on each task. Raises ValueError without tasks, and for a task
-    without runs."""
+    """Return the mean over tasks of the mean over runs, with the interval of
+    :func:`.mean_of_means`, for ``values`` of shape ``(runs,)`` on each task. Raises ValueError
+    without tasks, and for a task without runs."""
     strata = [*map(estimates.vector, values)]
     return estimates.mean_of_means(strata, [1 / len(strata) for _ in strata])
 
