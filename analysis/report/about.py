@@ -63,7 +63,7 @@ def attempt(
     """Return ``make(*args)``, a part of a report, or None if it raises an exception.
 
     The error, with file and line, is then added to ``failures`` by the ``name`` of the part, unless
-    there is one already. A CoarticError is raised.
+    there is one already. A CoarticError passes through.
     """
     try:
         return make(*args)

@@ -147,7 +147,7 @@ def _parts_of(study: Study, section: Section) -> dict[str, Any]:
 
 
 def stamp(runs: pd.DataFrame) -> str:
-    """Return a hash, 64 hexadecimal digits, of the ids and results of runs, in any order."""
+    """Return a hash, 64 hex digits, of the ids and results of runs, whatever their order."""
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 

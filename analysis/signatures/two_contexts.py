@@ -111,7 +111,8 @@ class TwoContexts:
 
     @cached_property
     def configurations(self) -> tuple[Array, Array]:
-        """Configurations at the goal in each context, ``(runs, dof)``, length unit and rad."""
+        """Configurations of the runs with this hand at the goal in each context, ``(runs, dof)``,
+        length unit and rad."""
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         first, second = (
             runs.configurations[runs.hands[:, goal] == hand, goal]
@@ -127,7 +128,7 @@ class TwoContexts:
 
     @property
     def n(self) -> int:
-        """Number of runs in the two contexts together."""
+        """Number of runs with this hand in the two contexts together."""
         return sum(map(len, self.configurations))
 
     @property
