@@ -1,4 +1,4 @@
-"""Read stored runs: estimates, tests, tables, figures. Imports ``coartic`` and reads records.
+"""Read stored runs: estimates, tests, tables, figures.
 
 ``coartic.analysis.load(folder)`` reads a results folder as a :class:`Study`.
 """

@@ -36,21 +36,22 @@ def bibliography(
     environment: Mapping[str, Any] | None = None,
     imports: Mapping[str, Sequence[str]] | None = None,
 ) -> str:
-    """Return BibTeX for the software, the paper and the methods, each work once.
+    """Return BibTeX for the software, the paper and the methods, each entry of ``references.bib``
+    once.
 
     Parameters
     ----------
     methods : mapping of str to MethodInfo
-        Methods by id. A comment before an entry names the methods that use the work; a method from
-        a file is cited as its author declares.
+        Methods by id. A comment before an entry names the methods that use the work. A method from
+        a file is cited as its author declares; a comment alone names it if its author does not.
     analysis : bool
         Add the works behind statistics and signatures.
     environment : mapping, optional
         Environment of a results folder (:attr:`.Study.made_with`), whose version and commit are
         cited; by default the version of this program.
     imports : mapping, optional
-        Names and versions of the packages that files of methods import (:attr:`.Study.imports`): a
-        comment names them.
+        Names and versions of the packages that a method's file imports, by the id of the method
+        (:attr:`.Study.imports`): a comment names these packages.
     """
     made_with = environment or {}
     note = f"Version {made_with.get('coartic') or __version__}"
@@ -97,5 +98,5 @@ def _misc(key: str, **fields: str) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return text as one line that BibTeX skips: it has (at) for @, which would begin an entry."""
+    """Return text as a line of comment in BibTeX, with (at) for @, which would begin an entry."""
     return f"% {one_line(text)}".replace("@", "(at)")

@@ -1,9 +1,8 @@
 """Findings and verdicts: evidence and tests of each claim, corrected over all claims of a study.
 
 A claim needs one mean over tasks, or several, beyond a bound (:func:`mean_beyond`, joined by
-:func:`all_of`). :func:`judge` corrects the claims of a study over each other (Holm). No single task
-may carry a claim: a claim is undecided if its tests come out otherwise without the task that
-favours it most.
+:func:`all_of`). :func:`judge` corrects the claims of a study over each other (Holm). A claim that
+holds is undecided if its tests come out otherwise without the task that favours it most.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import counted
 
 RESAMPLES_OF_CLAIMS = 99_999
-"""Resamples of a test over tasks: some are close, and p-values are corrected over many claims."""
+"""Resamples of a test over tasks, whose p-value is corrected over many claims."""
 Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
 Side = Literal["greater", "less"]
 
@@ -41,21 +40,21 @@ class Finding:
     tests: tuple[Estimate, ...] = ()
     """Tests of the claim, which all have to hold; a positive estimate is as claimed."""
     against: tuple[Estimate, ...] = ()
-    """Tests of the opposite of the claim; any test below 5 %, after correction, refutes the
-    claim."""
+    """Tests of the opposite of the claim; p below 5 % of any test, after correction, refutes a
+    claim that does not hold."""
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
 
     def __str__(self) -> str:
-        """A sentence: what the runs show, p-values uncorrected, and the evidence."""
+        """Return a sentence: what the runs show, the largest p of ``tests``, and the evidence."""
         shown = {True: "The runs show it", False: "The runs do not show it", None: "Too few runs"}
         p = p_value(_largest_p(self.tests))
         return f"{shown[self.holds]}{f' ({p})' * bool(p)}: {self.evidence.rstrip('.')}."
 
     @property
     def opposite_p(self) -> float:
-        """Smallest p-value of the tests in ``against``, times their number (Bonferroni), 1 at most;
-        NaN without a test."""
+        """Smallest p-value in ``against``, times the number of p-values there (Bonferroni), 1 at
+        most; NaN without a p-value."""
         tested = [test.p for test in self.against if not math.isnan(test.p)]
         return min(1.0, min(tested) * len(tested)) if tested else math.nan
 
@@ -63,10 +62,11 @@ class Finding:
         """Return ``supported``, ``not supported`` or ``undecided`` by p-values of the claim and of
         its opposite, corrected or not.
 
-        A claim that holds is supported if ``p`` is below 5 %, or NaN as of an exact count. A claim
+        A claim that holds is supported if ``p`` is below 5 %, or NaN: counted exactly. A claim
         that does not hold is not supported if ``opposite_p`` is below 5 %, if the claim has no
-        test, or if values without spread contradict it. Other claims, and claims with too few runs,
-        are undecided."""
+        test, or if a test of three values or more (in each sample) has no p and no positive
+        estimate: all values equal the bound or each other. Other claims are undecided, and so is a
+        claim that holds by a test of fewer than three values without p."""
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -116,15 +116,17 @@ def mean_beyond(
     Returns
     -------
     Finding
-        ``holds``: the mean lies on this side; None with fewer than three tasks. ``evidence``: the
-        sentence. ``tests`` has a test of the claim; ``without`` a test of the claim without the
-        task that favours it most; ``against`` a test of the opposite, with all tasks or without the
-        task that favours the opposite most, whichever has the larger p.
+        ``holds``: the mean lies on this side; None, without a test, with fewer than three tasks.
+        ``evidence``: the sentence. ``tests`` has a test of the claim; ``without`` a test of the
+        claim without the task that favours it most; ``against`` a test of the opposite, with all
+        tasks or without the task that favours the opposite most, whichever has the larger p.
 
     Raises
     ------
     CoarticError
         For another side or shape, and for a sentence that has not one ``{}``.
+    ValueError
+        There are three values or more, and one of them or the bound is not finite.
 
     Examples
     --------
@@ -160,8 +162,8 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        Holds if all findings hold. It has ``tests``, ``against`` and ``without`` of all findings.
-        If findings have too few runs, the first of these is returned.
+        Finding that holds if all findings hold, with ``tests``, ``against`` and ``without`` of all;
+        or the first finding with too few runs (``holds`` is None).
 
     Raises
     ------
@@ -204,9 +206,8 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
         A row for each claim, by its id: ``statement``, ``verdict`` (``supported``, ``not
         supported`` or ``undecided``), ``evidence``, ``test`` and corrected p-values: ``p_holm`` of
         the claim, ``p_without`` of the claim with all tasks and without the task that favours it
-        most (the larger p), and ``opposite_p_holm`` of its opposite; NaN without a test. A claim
-        that holds is supported if ``p_without`` is below 5 %, or NaN as of an exact count; with
-        too few values it is undecided (:meth:`Finding.verdict`).
+        most (the larger p), and ``opposite_p_holm`` of its opposite; NaN without a test. The
+        verdict is :meth:`Finding.verdict` of the last two p-values.
 
     Examples
     --------

@@ -36,7 +36,8 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
 )
 """Groups of methods by their use of the reward."""
 OWN_COLOR, OWN_MARK = "walnut", "star"
-"""Colour of methods from files, and mark of the first: no built-in method has them."""
+"""Colour of the first nine methods from files, and mark of the very first: no built-in method has
+this colour or this mark."""
 
 
 MARK = " ‡"
@@ -131,8 +132,8 @@ def _group_of(runs: pd.DataFrame) -> str:
     """Return the group of a method, one of :data:`GROUPS`, from its runs.
 
     ``using the reward of each trial`` if the method declares this reward and a run made more than
-    one trial, whatever else it uses; or else ``using the reward as a formula`` if it declares the
-    formula; or else ``not using the reward``.
+    one trial; or else ``using the reward as a formula`` if it declares the formula; or else ``not
+    using the reward``.
     """
     information = {each for text in runs.information.unique() for each in text.split(", ")}
     if (runs.trials > 1).any() and Information.REWARD_BY_TRIAL.value in information:
@@ -202,7 +203,7 @@ def headline_methods(rows: pd.DataFrame) -> list[str]:
     ``rows``, some rows of :attr:`.Study.methods`; all labels if no row does.
 
     A setting counts where its method has no row. A row that joins conditions of the learner takes
-    the place of the single conditions; of several such rows only the last counts, with the
+    the place of all rows of its algorithm; of several such rows only the last counts, with the
     condition that explores most.
     """
     kept = without_settings(rows)

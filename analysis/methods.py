@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from coartic.runs.method_info import MethodInfo
 
 CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in EVERY_CONDITION}
-"""Exploration conditions and ablations of the learner by the id of the method."""
+"""Ids of conditions of the learner, informed ones and ablations too, by the id of the method."""
 LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
 """Ids of the learner under EC1 (for one arm) to EC4, which explore more and more."""
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
@@ -38,8 +38,7 @@ COLORS = {
     "rose": "#dc9fc3",
     "amber": "#eba717",
 }
-"""Colours of methods, from dark to light, in steps that remain in grey and for readers with a
-colour vision deficiency. On a dark page ``page.css`` has lighter ones."""
+"""Colours of methods by name, from dark to light. On a dark page ``page.css`` has lighter ones."""
 MARKS: dict[str, Any] = {
     "star": ("*", "-"),
     "circle": ("o", (0, (1, 1.2))),
@@ -86,10 +85,11 @@ _WORDS = {
 
 
 def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False) -> str:
-    """Return the name of a method with its setting in words: ``learner EC4``, ``hill climbing``,
-    ``CMA-ES (other arm still)``. ``setting`` has the form ``sigma=0.1, stop=1``, empty for none.
+    """Return the name of a method with its setting in words: ``learner EC4``, ``CMA-ES (other
+    arm still)``. ``setting`` has the form ``sigma=0.1, stop=1``, empty for none.
     The name of a method from a file is the title in its declaration, or its id if ``method`` is
-    the id. ``short``: the short name of a built-in method that has one, the id of another."""
+    the id. ``short``: the short name of a built-in method, if it has one; the id of a method from a
+    file."""
     name, title = (method, method) if isinstance(method, str) else (method.name, method.title)
     if known := KNOWN_METHODS.get(name):
         name = (short and known.short) or known.name

@@ -22,21 +22,22 @@ class BestKnown(KnownOptimum):
     """The best known reward of a task, and its source."""
 
     source: str = "shipped"
-    """``shipped`` if no run of the folder exceeds a shipped reward, or else the label of the method
-    with the best run, or ``corrective process alone``."""
+    """``shipped``; label of the method of the best run, if its reward exceeds all that is shipped;
+    or ``corrective process alone``, if the reward of this process exceeds both."""
     run_id: str = ""
     """Id of the best run; empty if the source is no run."""
     only_here: bool = False
-    """True if no reward is shipped and no search for the optimum has a solution."""
+    """True if no reward is shipped and no search for the optimum (with the task's own base) has a
+    solution."""
 
 
 def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown]:
     """Return the best known reward of each task, from shipped rewards and all runs of a folder.
 
-    All runs count, including searches and runs copied from other folders, but not runs with another
-    base, which solve another task. A task has no best known reward if its best reward is 0, which
-    leaves no gap, or if runs of one method with one setting are all that is known of the task, as
-    they would be compared with themselves; such a task is not in the result.
+    All solved runs count, including searches and runs copied from other folders, except runs with
+    another base, which solve another task. A task is not in the result if its best reward is 0,
+    which leaves no gap, if nothing is known of it, or if only runs of one method with one setting,
+    no search, are known, which would be compared with themselves.
 
     Parameters
     ----------

@@ -93,9 +93,9 @@ def fill_page(template: str | Path, **values: Any) -> str:
     Parameters
     ----------
     template : str or pathlib.Path
-        A Jinja template. It can call ``interval(row, column, digits, scale)``, which writes ``7.8
-        [7.3, 8.1]``, and ``expect(holds, what)``, use the filters ``number``, ``p_value`` and
-        ``listed``, and include templates of the same folder.
+        A Jinja template. The template can call ``interval(row, column, digits, scale)``, which
+        writes ``7.8 [7.3, 8.1]``, and ``expect(holds, what)``, use the filters ``number``,
+        ``p_value`` and ``listed``, and include templates of the same folder.
     **values
         Tables, numbers and functions, by the names that the template uses.
 
@@ -107,10 +107,11 @@ def fill_page(template: str | Path, **values: Any) -> str:
     Raises
     ------
     CoarticError
-        There is no such template, or a function or filter in it gets a wrong argument, such as a
+        There is no such template, or ``interval`` or ``number`` gets a wrong argument, such as a
         row without the numbers.
     ValueError
-        A sentence that the template expects of the results does not hold.
+        A sentence that the template expects of the results does not hold, or ``listed`` gets no
+        words.
     jinja2.TemplateError
         The template is wrong, or uses an unknown name.
     """
@@ -133,8 +134,8 @@ def fill_page(template: str | Path, **values: Any) -> str:
 
 
 def expect(holds: bool, what: str) -> str:
-    """Return an empty text if a sentence of the page holds. Raises ValueError with the words
-    ``what`` if ``holds`` is False."""
+    """Return an empty text if ``holds``, a condition of a sentence of the page, is True. Raises
+    ValueError with the words ``what`` if it is False."""
     if not holds:
         raise ValueError(f"this no longer holds: {what}")
     return ""

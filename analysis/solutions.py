@@ -16,17 +16,18 @@ from coartic.tasks.task import hands_of
 
 @dataclass(frozen=True)
 class Solutions:
-    """Executed solutions of n runs of one method with parameters on one task with G goals."""
+    """Executed solutions of n runs of one method with one setting on one task with G goals."""
 
     task: Task
     label: str
-    """Label: the method with its setting."""
+    """Label: id of the method with its setting, or ``recorded``."""
     runs: tuple[Execution, ...]
     """Executions of the solutions, one for each run."""
     run_ids: tuple[str, ...] = ()
-    """Ids of the runs, in the order of ``runs``."""
+    """Ids of the runs, in the order of ``runs``; empty without ids."""
     unfinished: int = 0
-    """Number of recorded trials in which a goal was never reached; they are not among ``runs``."""
+    """Number of recorded trials, not among ``runs``, in which a goal was never reached, as counted
+    by :func:`.hits_from_markers`; 0 for others."""
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
@@ -64,7 +65,8 @@ class Solutions:
 def initial_solution(task: Task) -> Execution | None:
     """Return the execution of the corrective process alone with the initial hands of a task.
 
-    None if the corrective process does not complete the task with these hands, or with any hands.
+    None if the corrective process does not complete the task with these hands, or if the task does
+    not name them and no hand sequence completes it or over 4,096 would have to be tried.
     """
     try:
         execution = corrective_trial(task, initial_hands(task))

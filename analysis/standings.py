@@ -38,7 +38,7 @@ _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "paramet
 @cached
 def compared(study: Study) -> dict[str, pd.DataFrame]:
     """Return the runs, also failed ones, of every method except searches for the optimum, by label
-    of the row in :attr:`.Study.methods`, in the order of these rows.
+    of the row in :attr:`.Study.methods`, in the order of these rows, without :data:`_OF_RECORD`.
 
     A row that joins two conditions of the learner has runs that are in the rows of these
     conditions, too. Runs on tasks without a best known reward are left out, and so are methods
@@ -52,8 +52,8 @@ def compared(study: Study) -> dict[str, pd.DataFrame]:
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method on some tasks, failed ones too. Raises KeyError for a label that
-    :func:`compared` does not have.
+    """Return the runs of a method (label) on some tasks, failed runs too. Raises KeyError for a
+    label that :func:`compared` does not have.
 
     No rows if the method has no run on one of the tasks, or if it is a row of
     :attr:`.Study.methods` that joins conditions of the learner and one condition has no run there.
@@ -65,7 +65,7 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
 
 
 def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the different pairs of task and method (label) among some runs, in their order."""
+    """Return the different pairs of task and method (label) in some runs, in order."""
     return [*dict.fromkeys(zip(runs.task, runs.label, strict=True))]
 
 
@@ -81,9 +81,9 @@ def common_tasks(study: Study) -> tuple[str, ...]:
 @cached
 def equal_trials(study: Study) -> int:
     """Return the number of trials of a run with which methods are ranked. Of methods that use the
-    reward of each trial: the number in the suite's file, if the command asked for another and one
-    of them has it, or else the number that most algorithms have (of equals the least). Without
-    such a method that has a parameter ``trials``: the most trials that a run made."""
+    reward of each trial: the number in the suite's file, if the command asked for another and a
+    method has it, or else the number that most algorithms have (of equals the least). Without such
+    a method that has a parameter ``trials``: the most trials that a run made."""
     asked, algorithms = _trials_asked(study), dict[int, set[str]]()
     for method in compared(study):
         for part in study.methods.parts[method]:
@@ -102,8 +102,8 @@ def equal_trials(study: Study) -> int:
 def trials_of(study: Study) -> dict[str, int]:
     """Return, by label, the number of trials of a run of each row of :attr:`.Study.methods`: its
     parameter ``trials``; without this parameter the most trials made, at least
-    :func:`equal_trials`; for a method that does not use the reward of each trial always
-    :func:`equal_trials`."""
+    :func:`equal_trials`; of joined conditions the larger; for a method that does not use the reward
+    of each trial always :func:`equal_trials`."""
     asked, equal = _trials_asked(study), equal_trials(study)
     made = study.runs.fillna({"trials": 0}).groupby("label").trials.max()
     return {
@@ -116,7 +116,8 @@ def trials_of(study: Study) -> dict[str, int]:
 
 @cached
 def _trials_asked(study: Study) -> dict[str, int]:
-    """Return the parameter ``trials`` of each method with its setting, by label; 0 without it."""
+    """Return the parameter ``trials`` of each method with its setting, by label; 0 without such a
+    whole number."""
     return {job.cell.label: trials_in(job.cell.parameters) for job in study.plan}
 
 
@@ -128,8 +129,8 @@ def together(study: Study, by_method: Mapping[str, pd.DataFrame]) -> pd.DataFram
 
 
 def common_runs(study: Study) -> pd.DataFrame:
-    """Return the runs on :func:`common_tasks` of the methods that ran on all of them, as one frame
-    (:func:`together`)."""
+    """Return the runs of every compared method on :func:`common_tasks` (:func:`runs_on`) as one
+    frame (:func:`together`)."""
     tasks = common_tasks(study)
     return together(study, {method: runs_on(study, method, tasks) for method in compared(study)})
 
@@ -139,7 +140,7 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
     """Return the standings: a row for each method with a gap, by label, with the columns of
     :func:`.ranking` and of :attr:`.Study.methods`, and with ``ranked``.
 
-    Ranked are methods that solved every run on :func:`common_tasks`, in at most
+    Ranked are methods of :func:`common_runs` that solved every run there, in at most
     :func:`equal_trials` unless trials are varied; the smallest gap is first. Below them, not
     ranked, are methods with more trials, and methods from files or of the labels ``also`` that lack
     a run or a solution on one of these tasks, over the tasks on which they solved every run. Other
@@ -163,9 +164,9 @@ def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
 
 def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
     """Return a sentence for each row of :func:`board` that is not ranked, settings left out: its
-    gap, why it is not ranked, and the gap of the first method with the same use of the reward on
-    the same tasks; and for each method from a file, or of the labels ``also``, that has no row, as
-    it solved no task."""
+    gap, why it is not ranked, and the gap of the first ranked method with the same use of the
+    reward on the same tasks, if that ran on all of them; and for each method from a file, or of the
+    labels ``also``, that solved every run on no task and so has no row."""
     rows, sentences = without_settings(board(study, also)), []
     for method in rows.index[~rows.ranked]:
         on, name = solved_tasks(study, method), study.methods.title[method]
@@ -209,9 +210,9 @@ def shown_name(study: Study, method: str) -> str:
     """Return the title of a method and, for a method of :func:`compared`, why its numbers are not
     comparable with the numbers of other methods:
     ``mine (3 of 8 tasks)`` for a method from a file that did not solve every run on
-    :func:`common_tasks`; ``mine (at most 77 of 10,000 trials)`` for one whose runs all stopped
-    before their trials were made; ``mine (400 trials)`` for another number of trials than
-    :func:`equal_trials`, where its setting does not say it."""
+    :func:`common_tasks`; ``mine (at most 77 of 400 trials)`` for a method from a file whose runs
+    all stopped before their trials were made; ``mine (400 trials)`` for another number of trials
+    than :func:`equal_trials`, where the title has no setting of ``trials``."""
     row, trials = study.methods.loc[method], trials_of(study)[method]
     if method not in compared(study):
         return str(row.title)
@@ -226,9 +227,9 @@ def shown_name(study: Study, method: str) -> str:
 
 
 def _on_tasks(study: Study, method: str) -> str:
-    """Return on how many of all tasks a method solved every run, ``3 of 8 tasks``, with the number
-    of its failed runs if there are any; empty if it solved every run on the tasks over which
-    methods are ranked (:func:`common_tasks`)."""
+    """Return on how many of all tasks of :func:`compared` a method solved every run, ``3 of 8
+    tasks``, with the number of its failed runs if there are any; empty if it solved every run on
+    the tasks over which methods are ranked (:func:`common_tasks`)."""
     on = {*solved_tasks(study, method)}
     if {*common_tasks(study)} <= on:
         return ""

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from coartic import CoarticError, load_task
 from coartic.analysis import load
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
-from coartic.analysis.figures.style import tip
+from coartic.analysis.figures.style import means, tip
 from coartic.analysis.methods import COLORS, KNOWN_METHODS, title_of
 from coartic.analysis.report.about import finding
 from coartic.analysis.sections import FIGURES, SECTIONS
@@ -49,6 +49,13 @@ def test_a_long_name_is_whole(width):
     assert misplaced(figure) == ([], [])
     words = " ".join(label.get_text() for label in figure.axes[0].get_yticklabels())
     assert long.strip() in words.replace("\n", " ")
+
+
+def test_means_refuse_text_in_the_ends_of_intervals():
+    frame = pd.DataFrame({"h": [0, 1], "gap": [0.2, 0.1], "gap_low": ["0", ""], "gap_high": 0.3})
+    for wrong in (frame, frame.assign(gap_low=0.1).drop(columns="gap_high")):
+        with pytest.raises(CoarticError, match="gap_"):
+            means(Figure().add_subplot(), wrong, x="h", y="gap")
 
 
 def test_short_names_fit_and_differ():

@@ -1,7 +1,8 @@
-"""Figures of your own, which look like those of the report.
+"""Figures of your own, which look like the figures of the report.
 
-:func:`panels` and :func:`means` draw within ``styled``, a decorator; :func:`picture` gives the
-file. ``coartic.analysis.sections.FIGURES["ranking"](study)`` draws a figure of the report.
+:func:`panels` and :func:`means` draw in a function with the decorator ``styled``; :func:`picture`
+returns the bytes of a file. ``coartic.analysis.sections.FIGURES["ranking"](study)`` draws a figure
+of the report.
 """
 
 from coartic.analysis.figures.plot import Plot, picture

@@ -42,14 +42,14 @@ class Plot:
     """A figure with its words and numbers."""
 
     id: str
-    """Name of its files: letters, digits, dashes, dots, underscores."""
+    """Name of the figure's files, without an ending."""
     title: str
     caption: str
     alt: str
     """Alternative text, a description for people who cannot see the figure."""
     figure: Figure
     data: pd.DataFrame
-    """Drawn numbers as a tidy frame, enough to draw the figure again."""
+    """Drawn numbers as a tidy frame."""
 
     def save(self, path: str | Path) -> None:
         """Write the picture into a file ``.svg``, ``.pdf`` or ``.png``, over an earlier one. Raises
@@ -59,7 +59,7 @@ class Plot:
             path.write_bytes(picture(self.figure, path.suffix))
 
     def _repr_html_(self) -> str:
-        """Return the picture that a notebook shows, with title and caption."""
+        """Return the HTML that a notebook shows: the picture, with title and caption."""
         words = html.escape(one_line(f"{self.title}. {self.caption}"))
         return f"<figure>{for_page(self)}<figcaption>{words}</figcaption></figure>"
 
@@ -79,11 +79,11 @@ more than the project's, in a form of ``matplotlib.style.use``.
 def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
     """Return a decorator that turns a drawing function of a study into a figure of the report.
 
-    The figure is in the style of all figures; its id is the function's name without ``draw_``, with
-    dashes for underscores. The caption gets the sentences that the function returns, and an
-    explanation of the dagger if one is drawn; ``{n}`` in it is the range of column ``runs`` of the
-    drawn numbers, empty without this column, ``{reference}`` the name of the rewards to which gaps
-    are taken.
+    The figure is in the style of all figures; its id is the function's name behind the first
+    underscore, with dashes for other underscores. The caption gets the sentences that the function
+    returns, and an explanation of the dagger if one is drawn; ``{n}`` in it is the range of column
+    ``runs`` of the drawn numbers, empty without this column, ``{reference}`` the name of the
+    rewards to which gaps are taken.
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
@@ -164,7 +164,7 @@ def picture(drawing: Figure, ending: str) -> bytes:
 
 def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
     """Return a figure as the bytes of a file, made by ``Figure.savefig`` with the arguments ``how``
-    and with ``settings`` of Matplotlib (rcParams). Its parts are laid out once, not twice."""
+    and with ``settings`` of Matplotlib (rcParams). Parts of the figure are laid out only once."""
     stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
     canvas = drawing.canvas
     try:
@@ -183,9 +183,9 @@ def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
 def for_page(plot: Plot) -> str:
     """Return a figure as one ``<svg>`` element for a page of HTML.
 
-    It scales with its container, its background is transparent and its ink is the page's
+    The element scales with its container, its background is transparent and its ink is the page's
     ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
-    one, its grey is ``--grey``, its blue ``--blue``, and colours of methods have their names. Marks
+    it. Grey is ``--grey``, blue ``--blue``, and colours of methods have their names. Marks
     with a :func:`~.style.tip` show its text. Ids begin with the plot's id, so that several figures
     can share a page. Every ``style`` attribute becomes a class, named by a hash of the style.
     """

@@ -1,7 +1,7 @@
 """Style of all figures: sizes, colours and marks.
 
-Colours: Okabe & Ito (2008), Color Universal Design, without the yellow, which is faint on white.
-Methods have colours of their own (:data:`.COLORS`); marks and dashes distinguish the same lines.
+Colours: Okabe & Ito (2008), Color Universal Design, without the yellow.
+Methods have colours of their own (:data:`.COLORS`), and marks and dashes that distinguish them.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def grid(panels: int) -> tuple[int, int]:
 @contextmanager
 def drawn_at(width: float | None) -> Iterator[None]:
     """Let :func:`panels` make figures of a width, inches, within a ``with`` block; None: of the
-    width in its argument ``size``."""
+    width in argument ``size`` of :func:`panels`."""
     before = _width.set(width)
     try:
         yield
@@ -92,7 +92,8 @@ def panels(
     **subplots: Any,
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with panels. In a block of :func:`drawn_at` the figure has the width chosen
-    there, and, if panels would be too narrow, fewer panels side by side and a larger height.
+    there, if any, and, if panels would be too narrow, fewer panels side by side; its height changes
+    with the number of rows.
 
     Parameters
     ----------
@@ -102,8 +103,8 @@ def panels(
         Width and height, inches: ``ONE`` and ``TWO`` are the widths of one and two columns of a
         journal.
     used : int, optional
-        Number of panels used, the first ones, by default all. Further panels stay empty; in a block
-        of :func:`drawn_at` there are none, except empty ones that fill the last row.
+        Number of panels used, the first ones, by default all. Further panels stay empty; in a
+        figure of chosen width there are none, except empty ones that fill the last row.
     least : float
         Least width of a panel next to another one in a figure of chosen width, inches.
     **subplots
@@ -173,7 +174,8 @@ def means(
     x, y : str
         Columns of the places and of the means.
     by : str
-        Column of groups, each with a line, a colour and a label; empty for a single line.
+        Column of groups, each with a line, a colour and a label; a row with NaN there is not drawn.
+        Empty for a single line.
     scale : float
         Factor of means and intervals: 100 for per cent.
     shift : float
@@ -186,9 +188,10 @@ def means(
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text in place of numbers.
+        The frame has no rows, lacks a column, or has text or infinite numbers in place of numbers.
     """
-    checked(frame, numbers=[x, y], others=[by] * bool(by))
+    ends = [f"{y}_low", f"{y}_high"] if f"{y}_low" in getattr(frame, "columns", ()) else []
+    checked(frame, numbers=[x, y, *ends], others=[by] * bool(by))
     frame = frame.reset_index(drop=True)
     groups = frame.groupby(by, sort=False) if by else [("", frame)]
     for number, (color, (name, rows)) in enumerate(
@@ -197,15 +200,15 @@ def means(
         looks: Look = {"color": color, "marker": "o", "markersize": 3, "linewidth": 1.2}
         looks |= ({"label": str(name)} if by else {}) | line
         places = rows[x] + number * shift
-        if f"{y}_low" in rows:
-            ends = scale * rows[f"{y}_low"], scale * rows[f"{y}_high"]
-            axes.vlines(places, *ends, looks["color"], linewidth=bars)
+        if ends:
+            low, high = (scale * rows[end] for end in ends)
+            axes.vlines(places, low, high, looks["color"], linewidth=bars)
         axes.plot(places, scale * rows[y], **looks)
 
 
 def tip(artist: Artist, text: str) -> None:
-    """Set the text that a page of HTML shows when the pointer rests on a mark, in place of the id
-    (gid) of the mark."""
+    """Set the text that a page of HTML shows when the pointer rests on a mark. The mark keeps the
+    text as its id (gid), in place of an earlier id."""
     artist.set_gid(f"{TIP}{text}")
 
 

@@ -62,8 +62,8 @@ def attempt(
 ) -> Made | None:
     """Return ``make(*args)``, a part of a report, or None if it raises an exception.
 
-    The error, with file and line, is then added to ``failures`` by the ``name`` of the part. A
-    CoarticError, which is an error of the folder, is raised.
+    The error, with file and line, is then added to ``failures`` by the ``name`` of the part, unless
+    there is one already. A CoarticError passes through.
     """
     try:
         return make(*args)
@@ -112,8 +112,8 @@ def _counts(values: pd.Series) -> str:
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the first two rows of a table, and the rows of the paper's learner (EC1, EC4), of
-    random search and of methods from files, each row a dict."""
+    """Return rows of a table, each as a dict: the rows of the first two rows' methods, of the
+    paper's learner (EC1, EC4, both joined), of random search and of methods from files."""
     always = [joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH, *rows.attrs.get("own", [])]
     return rows[rows.method.isin([*rows.method[:2], *always])].to_dict("records")
 
@@ -123,10 +123,10 @@ def limits(study: Study) -> dict[str, Any]:
     """Return facts that limit conclusions from a study's runs, by name: numbers of ``runs`` and of
     ``failed`` runs with ``reasons``; ``reconstructed`` tasks, and tasks whose best reward is
     ``unproven``, ``unknown`` or of this folder's ``own`` methods; ``trials`` of the learner (unless
-    as in the paper); ``few``, the fewest runs of the learner; ``seed``; ``processor`` and
-    ``cores``; True for runs ``side_by_side`` and code that is ``dirty``; built-in methods of
-    ``earlier`` versions; code that was loaded ``late``; ``imports`` by method. 0, False or empty
-    where a limit does not apply."""
+    as in the paper); ``few``, the fewest runs of the learner on a task, if fewer than the paper's;
+    ``seed``; ``processor`` and ``cores``; True for runs ``side_by_side`` and code that is
+    ``dirty``; ``earlier``, methods as of coartic 4.0.0; ``late``, all :attr:`.Study.marks`;
+    ``imports`` by method. 0, False or empty where a limit does not apply."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner

@@ -45,10 +45,11 @@ def write_report(
 
     ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF, of this ``width``,
     inches; None: as wide as on the page. ``watch`` is called with the title of each section before
-    it is made, and again with ``TITLE, for print`` before its files of figures. Returns the paths
-    of the files below ``folder``, and the errors of parts that could not be made, by the name of
-    the part. Raises CoarticError if the folder holds the results themselves, the report of other
-    results, or other files.
+    it is made, and, ``for_paper``, again with ``TITLE, for print`` before its files of figures.
+    Returns the paths of the files below ``folder``, and the errors of parts that could not be made,
+    by the name of the part. Raises CoarticError if the folder holds the results themselves or the
+    report of other results (not looked for below the results), or another file in the place of a
+    file of the report.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
@@ -102,7 +103,7 @@ def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, by
 
 def _files_of_figures(study: Study, section: Section, width: float | None) -> dict[str, bytes]:
     """Return the files of a section's figures of a width, inches, contents by path: SVG and PDF of
-    each; None: as wide as on the page."""
+    each; None: each of its usual width."""
     files = {}
     for plot in _plots_of(study, section, width):
         for ending in (".svg", ".pdf"):
@@ -122,11 +123,7 @@ def _plots_of(study: Study, section: Section, width: float | None = None) -> lis
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     """Return the values of a section for the template: ``finding``, a list of lines; ``figures``,
     a plot, its SVG and, of the ranking, its SVG at one column, for phones; ``shown``, for each
-    table with rows its ``id``, ``caption``, ``rows`` and ``settings`` (numbers) and ``html``.
-
-    Settings and ablations have rows in the ranking, in the table of contexts, whose verdicts are
-    counted in a sentence, in the table of all methods, and in CSV files.
-    """
+    table with rows its ``id``, ``caption``, ``rows`` and ``settings`` (numbers) and ``html``."""
     tables = []
     for table in section.tables:
         frame = table(study)
@@ -150,7 +147,7 @@ def _parts_of(study: Study, section: Section) -> dict[str, Any]:
 
 
 def stamp(runs: pd.DataFrame) -> str:
-    """Return a hash, 64 hexadecimal digits, of the ids and results of runs, in any order."""
+    """Return a hash, 64 hex digits, of the ids and results of runs, whatever their order."""
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 

@@ -1,8 +1,4 @@
-"""The interactive figure of `coartic play`, with the runs of a folder.
-
-The figure begins with stored runs. After a reader has moved a goal, the learner or another method
-solves the changed task.
-"""
+"""The interactive figure of `coartic play`, with the runs of a folder."""
 
 from __future__ import annotations
 
@@ -19,13 +15,13 @@ from coartic.robot import HANDS
 
 
 def player(study: Study) -> str:
-    """Return the interactive figure with the runs of a folder as HTML; empty if no run has a
-    solution.
+    """Return the interactive figure with the runs of a folder as HTML; empty without a preset.
 
-    The figure has a preset for each task, with the run nearest the median reward of each method
-    that moves straight. If two tasks share goal 1, the first preset is this goal, with the
-    standardised posture difference of random search there. The method shown first is the method
-    from a file with the smallest gap, or else the method at the shared goal, or the first one.
+    The figure has a preset for each task of :func:`.one_by_one` on which a method that moves
+    straight has a solution, with the run of each such method nearest the median reward. If two
+    tasks share goal 1 (:func:`.shared_goal`), the first preset is this goal, with the standardised
+    posture difference of random search there. The method shown first is the first of
+    :func:`.own_methods` in a preset, or else the method at the shared goal, or the first one.
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
@@ -74,9 +70,9 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
     """Return the methods with solved runs on all of these tasks, in the form of ``model.js``: label
     ``id``, title ``name``, and ``films``, a film for each task.
 
-    A film has the movements of the run nearest the median reward; films of several tasks also have
-    the postures of the first 500 solved runs at goal 1, which the tasks share. Methods that follow
-    paths are left out, because the script moves straight.
+    A film has the movements of the run nearest the median reward of the first 500 solved runs;
+    films of several tasks also have the postures of these runs at goal 1, which the tasks share.
+    Methods that follow paths are left out, because the script moves straight.
     """
     runs = []
     for label in study.methods.index:
@@ -94,7 +90,7 @@ def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
     ``model.js``: ``run``, the beginning of its id, ``ticks``, and ``movements`` with ``goal`` (from
     0), ``hand`` (index in HANDS), ``kind`` and ``target``.
 
-    Empty if the cell has no solution, or a solution that follows a path.
+    Empty if the cell has no solution, or one of its first 500 solutions follows a path.
     """
     cell = study.cells.get(key)
     if cell is None or not len(good := solved(cell)[:MOST_EXECUTED]):

@@ -57,10 +57,10 @@ def _guarded(value: Any) -> Any:
 
 
 def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
-    """Return the headings of the columns that the page and LaTeX show, by name of the column:
-    those with a heading and a value in some row.
+    """Return the headings of the columns that the page can show, by name of the column: columns
+    with a heading and a value in some row, without ends of intervals and SDs of other columns.
 
-    A task goes by its title, with † where it is reconstructed.
+    A task in a heading goes by its title, with † where it is reconstructed.
     """
     headers, titles = {}, frame.attrs.get("titles", {})
     names = [name for name in frame.columns if not _is_end(table, frame, name)]
@@ -93,7 +93,7 @@ def _is_end(table: Table, frame: pd.DataFrame, name: str) -> bool:
 
 
 def _is_number(values: pd.Series) -> bool:
-    """Return True if a column has numbers alone, or no value at all."""
+    """Return True if a column has numbers, True and False alone, or no value at all."""
     return bool(pd.api.types.is_numeric_dtype(values.infer_objects())) or not values.notna().any()
 
 
@@ -123,9 +123,9 @@ def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
 def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
     """Return a table in HTML.
 
-    Each row has a link to itself, and the classes ``own`` and ``setting`` (:func:`classes_of`). A
-    later column of texts that are the same in all rows moves to the caption if there are three rows
-    or more. Cells without a value are empty.
+    Each row has a link to itself and its classes (:func:`classes_of`). A column of texts that are
+    the same in all rows, except the first column, moves to the caption if there are three rows or
+    more. Cells without a value are empty.
     """
     slug = slugs(map(str, frame.index))
     cells: list[list[str]] = []
@@ -170,7 +170,7 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
 def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
     """Return the HTML classes of each row, separated by a space: ``own`` for a method from a file,
     if the table has other methods, and ``setting``, in the ranking, for a setting or an ablation
-    of a built-in method."""
+    of a built-in method that has a row, too."""
     is_own = [label in frame.attrs.get("own", ()) for label in frame.get("method", frame.index)]
     is_folded = is_setting(frame) & (table.id == "ranking") & ~np.array(is_own, dtype=bool)
     return [
@@ -181,9 +181,9 @@ def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
 
 def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence[str] = ()) -> str:
     """Return a table in LaTeX, with booktabs and longtable, in the columns that :data:`IN_LATEX`
-    has for its id.
+    has for its id; without settings and ablations, except in tables ``contexts`` and ``methods``.
 
-    ``notes``, sentences, are below the table, with the meaning of a dagger in it.
+    ``notes``, sentences, are below the table, with the meaning of a dagger in table or notes.
     """
     frame = frame if table.id in ("contexts", "methods") else frame[~is_setting(frame)]
     columns = columns_of(table, frame)

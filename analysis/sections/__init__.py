@@ -28,12 +28,12 @@ class Section:
     """Tables of the section, functions of a study."""
     figures: tuple[DrawsFigure, ...] = ()
     """Functions that draw the figures, or return None if the folder has no runs for one. The page
-    folds all figures but the first."""
+    folds all figures except the first."""
     sentence: str = ""
-    """Jinja template of the finding in words. It has ``every``, the first table, and ``rows``, this
-    table without settings and ablations, and with the ``title`` of each method; ``others`` are the
-    other tables in this form (further names: :func:`.finding`). Every number is a cell of a table.
-    Empty: no finding."""
+    """Jinja template of the finding in words, or empty. Its names are ``every``, the first table;
+    ``rows``, this table with the ``title`` of each method, without settings, ablations and methods
+    below the ranking; ``others``, the other tables with titles, without settings and ablations
+    (further names: :func:`.finding`)."""
     note: str = ""
     """Explanation of figures and tables."""
     single: bool = True

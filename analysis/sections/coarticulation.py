@@ -124,11 +124,12 @@ def list_contexts(study: Study) -> Rows:
     ),
 )
 def list_signatures(study: Study) -> Rows:
-    """Yield rows with the signatures of every method on every task, and of random search there.
+    """Yield rows with the signatures of every method, except searches, on every task of
+    :func:`.one_by_one`, and of random search there for methods that select among trials.
 
     A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
-    the choice of hands (``hands`` empty). Means over runs; p is of the one-tailed exchange test and
-    uncorrected. ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
+    the choice of hands (``hands`` empty) on a task for two. Means over runs; p is of the one-tailed
+    exchange test and uncorrected. ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
@@ -162,11 +163,11 @@ def verdict_of(
     """Return a verdict on whether the posture at a shared goal depends on the next goal, such as
     ``different postures``, ``the same posture`` or ``too few runs``.
 
-    Of stochastic methods, the permutation test distinguishes postures, and the 90 % interval of the
-    difference, below :data:`.SAME`, shows that they are the same; of others the difference itself
-    does both. Methods that select their solution from trials are compared with random search, too.
-    ``control`` is the result of :func:`_of_random_search` for ``shared``; None: computed here.
-    ``p`` is the p-value corrected for all shared goals of the method; NaN: ``shared.p`` is taken.
+    Of stochastic methods, the permutation test distinguishes postures, and the bootstrap test that
+    the difference is below :data:`.SAME` shows that postures are the same; of others the difference
+    itself does both. Methods that select their solution from trials are compared with random
+    search, too. ``control`` is the result of :func:`_of_random_search` for ``shared``; None:
+    computed here. ``p`` is corrected for all shared goals of the method; NaN: ``shared.p``.
     """
     method: Any = study.methods.loc[shared.method]
     can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
@@ -235,10 +236,10 @@ def list_saved(study: Study) -> Rows:
     "n = {n} runs.",
 )
 def draw_saved(study: Study) -> Parts | None:
-    """Draw for each task a row for each of some methods (the learner, random search, the best of
-    each kind that uses the reward, methods from files), the smallest mean gap first. A row has a
-    bar for each goal: mean ticks of the movement less the ticks of the corrective process alone
-    with the same hands, up where it takes more. None if there is nothing to draw."""
+    """Draw for each task a row for each of some methods (the learner that explores most, random
+    search, the best of each kind that uses the reward, methods from files), the smallest mean gap
+    first. A row has a bar for each goal: mean ticks of the movement less the ticks of the
+    corrective process alone with the same hands. None if there is nothing to draw."""
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
     drawn, parts = {*headline_methods(single)}, []
@@ -326,7 +327,7 @@ def draw_postures(study: Study) -> Parts | None:
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
     """Draw the postures of runs at a shared goal, runs thin and their mean on each task thick;
     return two frames, one for each task, with a row for each run: ``task``, ``method``, ``goal``,
-    ``hand`` and the posture, a column for each joint."""
+    ``hand`` and the posture, a column for each of its entries."""
     axes.set_axis_off()
     axes.set_aspect("equal")
     robot, radius = shared.tasks[0].robot, shared.tasks[0].radius

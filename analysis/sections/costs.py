@@ -60,11 +60,10 @@ def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
 
 @cached
 def spans(study: Study) -> dict[str, tuple[float, int]]:
-    """Return the two rewards between which targets lie, ticks, by name of the task: the reward of
-    the corrective process alone with its best hands, and the best known reward.
+    """Return the two rewards between which targets lie, ticks, by name of the task:
+    :attr:`.Study.corrective_best`, of the corrective process alone, and the best known reward.
 
-    Tasks that the corrective process does not complete, or on which its reward is the best known,
-    are left out.
+    Tasks without one of the two, or with equal ones, are left out.
     """
     zero = study.corrective_best
     rewards = {name: (zero[name], best.reward) for name, best in study.optima.items()}
@@ -79,10 +78,9 @@ def times_of(
 
     ``shares`` are the targets, as shares of the distance from the corrective process alone to the
     optimum. Infinite for a target that the run did not reach; a solved run without a known cost has
-    no row. A planner reaches its targets at its end. Forward-kinematics evaluations and time
-    (:func:`solve_times`) are totals of a run, spread evenly over its trials, an approximation: over
-    the first 10 to 1000 of 10 000 trials, evaluations were 0.6 to 1.5 times their even share, 3.4
-    times for the first 10 of CMA-ES on two-armed 1.
+    no row. A run without trials reaches its targets at its end. Forward-kinematics evaluations and
+    time (:func:`solve_times`) are totals of a run, spread evenly over its trials, though early
+    trials took 0.6 to 3.4 times as many evaluations.
     """
     initial, optimum = spans(study)[task]
     targets = np.ceil(initial + np.array(shares) * (optimum - initial) - 1e-9)
@@ -106,21 +104,19 @@ def times_of(
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:
     """Return the wall time of solving, s, of the runs that were made in warm processes, or of all
-    runs if no process was warm, by the index of ``runs``.
-
-    For methods that do not report the time of solving, the wall time of the run.
-    """
+    runs if no process was warm, by the index of ``runs``; of a run without a time of solving above
+    0 its whole wall time."""
     times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
     warm = runs.warm.to_numpy(bool, na_value=False)
     return times[warm] if warm.any() else times
 
 
 def _runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
-    """Return, by label, the runs of each compared method on those of :func:`.common_tasks` that
-    have targets (:func:`spans`).
+    """Return, by label, the runs of each compared method on each of :func:`.common_tasks` that has
+    targets (:func:`spans`).
 
-    A method that did not run on all these tasks is left out; a method from a file then has its runs
-    on all its tasks with targets.
+    A method without runs on all these tasks (:func:`.runs_on`) is left out; a method from a file
+    then has its runs on all its tasks with targets.
     """
     common = [task for task in standings.common_tasks(study) if task in spans(study)]
     of_methods = {}
@@ -147,8 +143,8 @@ def runtimes(
     """Return the share of reward targets that methods reach within a budget: the ECDF of running
     times.
 
-    Methods are those that the report compares and that ran on all tasks, and methods from files
-    that did not, each on the tasks on which it ran. Tasks have the same weight.
+    Methods are compared methods that ran on all compared tasks that have targets, and other methods
+    from files, on the tasks on which they ran. Tasks have the same weight.
 
     Parameters
     ----------
@@ -203,11 +199,11 @@ def runtimes(
     "seconds_to_half[]: seconds to half of the targets; half on *: -",
 )
 def list_runtimes(study: Study) -> Rows:
-    """Yield a row for each method: the share of targets reached, and the costs of reaching a
-    quarter and half of the targets (:data:`COSTS`).
+    """Yield a row for each method of :func:`runtimes` with known numbers of trials: the share of
+    targets reached, and the costs of reaching a quarter and half of the targets (:data:`COSTS`).
 
-    ``half on *``: median number of trials to the target halfway to the optimum on a task, infinite
-    if most runs do not reach this target.
+    ``half on *``, for methods that use the reward of each trial: median number of trials to the
+    target halfway to the optimum on a task, infinite if most runs do not reach this target.
     """
     for method, runs in _runs_with_targets(study).items():
         times = {spend: _times_on_tasks(study, runs, spend) for spend in SPENDS}

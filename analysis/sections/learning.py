@@ -22,7 +22,7 @@ from coartic.analysis.words import marked
 BUDGETS = (100, 1_000, 10_000)
 """Numbers of trials after which the table has rewards."""
 CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
-"""Built-in methods with learning curves; methods from files all have learning curves."""
+"""Built-in methods with learning curves; all methods from files with trials have them, too."""
 
 
 @table(
@@ -32,9 +32,9 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
     "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1",
 )
 def list_learning(study: Study) -> Rows:
-    """Yield a row for each task and method: the best reward, ticks, after each number of trials in
-    :data:`BUDGETS`, a mean over runs, if all runs there have a solution and made 100 trials or
-    more."""
+    """Yield a row for each task of :func:`.one_by_one` and each method, except searches, all of
+    whose runs there have a solution and made 100 trials or more: the best reward, ticks, after each
+    number of trials in :data:`BUDGETS` that all runs made, a mean over runs."""
     learned = improvements(study)
     for (task, label), every in study.cells.items():
         runs = [learned[run] for run in every.run_id if run in learned]
@@ -109,11 +109,11 @@ def draw_learning_curves(study: Study) -> Parts | None:
 def learning_curves(study: Study) -> pd.DataFrame:
     """Return the best reward so far, ticks, by task, method and number of trials.
 
-    For solved runs of :data:`CURVES` and of methods from files, :func:`.headline_methods`; EC1 only
-    on tasks without runs of EC2 to EC4. Columns ``task``, ``method`` (label), ``runs`` (number of
-    runs), ``trial`` (at most 120 numbers, from 1 to the trials of the shortest run), ``best`` (mean
-    over runs, NaN until all have a solution), quartiles ``best_low`` and ``best_high``; no columns
-    without a curve.
+    For solved runs of the :func:`.headline_methods` among :data:`CURVES` and methods from files;
+    EC1 only on tasks without solved runs of EC2 to EC4. Columns ``task``, ``method`` (label),
+    ``runs`` (number of runs), ``trial`` (at most 120 numbers, from 1 to the trials of the shortest
+    run), ``best`` (mean over runs, NaN until all have a solution), quartiles ``best_low`` and
+    ``best_high``; no columns without a curve.
     """
     learned, cells, curves = improvements(study), {}, [pd.DataFrame()]
     for (task, label), every in study.cells.items():

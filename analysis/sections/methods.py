@@ -17,7 +17,8 @@ from coartic.analysis.words import commonest, marked, tally
     "forward_kinematics: forward-kinematics evaluations; solve_s: solving time (s); median_run",
 )
 def list_methods(study: Study) -> Rows:
-    """Yield a row for each method on each task: mean reward, gap, hands and median costs.
+    """Yield a row for each method on each task of :func:`.one_by_one`: mean reward, gap, hands and
+    median costs.
 
     Within a task, searches for the optimum come first, then methods from the highest mean reward
     on. ``median_run`` is the beginning of the id of the run with the reward nearest to the median;
@@ -43,8 +44,8 @@ def list_methods(study: Study) -> Rows:
 
 @table("Runs without a solution", "task; method; failed: failed runs; runs; reasons")
 def list_failed(study: Study) -> Rows:
-    """Yield a row for each method on each task on which runs failed: their number and commonest
-    reasons."""
+    """Yield a row for each method on each task on which runs failed: their number and three
+    commonest reasons."""
     failures = study.runs[study.runs.status != "ok"]
     by_cell = dict([*failures.groupby(["task", "label"], sort=False)])
     for (task, label), runs in study.cells.items():

@@ -59,13 +59,13 @@ def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
     "method; instances; missing; gap[]: gap (%) .1; in [*]: {} (%) .1",
 )
 def list_family_gaps(study: Study) -> Rows:
-    """Yield a row for each method: its gap to the best known reward, over families with two arms
-    and in each family, with intervals for other tasks of the families.
+    """Yield a row for each method that ran on instances: its gap to the best known reward, over
+    families with two arms and in each family, with intervals for other tasks of the families.
 
     A method that did not solve every run of every instance of a family has gap NaN in the family,
-    and over families with two arms if the family has two, as in the ranking. ``instances`` is the
-    number of instances on which it solved every run, ``missing`` the number of other instances, of
-    families with two arms, or, for a method that ran on families with one arm alone, of these.
+    and over families with two arms if the family has two. ``instances`` is the number of instances
+    on which it solved every run, ``missing`` the number of other instances, of families with two
+    arms, or, for a method that ran on families with one arm alone, of families on which it ran.
     """
     every, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {each for each in families if len(study.tasks[families[each][0]].hands) > 1}
@@ -95,8 +95,8 @@ def list_family_gaps(study: Study) -> Rows:
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
     """Draw the gap to the best known reward, mean over runs, of each instance that a method solved
-    in every run, a panel for each family and a row for each method, without settings whose method
-    is there; None without such runs."""
+    in every run, a panel for each family and a row for each method, without joined learners and
+    settings whose method is there; None without such runs."""
     runs, rows = on_instances(study), study.methods
     methods = without_settings(rows[rows.index.isin(runs.method) & (rows.parts.map(len) == 1)])
     runs = runs[runs.method.isin(methods.index)]

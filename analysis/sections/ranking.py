@@ -1,4 +1,4 @@
-"""Section on the ranking: gaps and shares of methods, over all tasks and on each."""
+"""Section on the ranking: gaps and shares of methods, over tasks and on each task."""
 
 from __future__ import annotations
 
@@ -51,13 +51,12 @@ _EARLY = 1_000
     "least_p: -",
 )
 def list_against_learner(study: Study) -> Rows:
-    """Yield a row for each method and task: mean rewards, ticks, of the method and of the learner
-    (EC1, with two arms EC4), and the p-value of their difference.
+    """Yield a row for each method, except searches and this learner, and each task: mean rewards,
+    ticks, of the method and of the learner (EC1, with two arms EC4), and p of their difference.
 
-    For methods that solved every run; p is two-sided, of the exchange test, or, for a deterministic
-    method, whose reward counts as exact, of the bootstrap test, and is corrected over the tasks of
-    a method (Holm). The exchange test takes samples as independent, though runs have the same
-    seeds: with 100 runs of the learner and 20 of the other method, pairs would leave out 80.
+    Only for tasks on which both solved every run. p is two-sided, of the exchange test, or, for a
+    deterministic method, whose reward counts as exact, of the bootstrap test, and is corrected over
+    the tasks of a method (Holm). Runs with the same seed are not compared as pairs.
     """
     for label, method in study.methods[~study.methods.is_search].iterrows():
         cells, tests = [], []
@@ -85,8 +84,8 @@ def list_against_learner(study: Study) -> Rows:
 
 def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
     """Return a copy of runs, without their status, whose ``reward`` is the best of their first
-    ``trials`` trials, NaN if none of these succeeded or the run failed; runs without trials keep
-    their reward. Column ``gap`` stays as it is."""
+    ``trials`` trials, NaN if none of these succeeded or the run failed; runs without rewards of
+    trials keep their reward. Column ``gap`` stays as it is."""
     learned, best = improvements(study), list[float]()
     rewards = runs.reward.to_numpy(np.float64, na_value=math.nan)
     for run_id, reward in zip(runs.run_id, rewards, strict=True):
@@ -103,8 +102,8 @@ def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
     "forward_kinematics: -; cpu_s: -; runs; failed: -",
 )
 def list_ranking(study: Study) -> Rows:
-    """Yield a row for each method: its gap and share of the gain over all tasks, and its gap on
-    each; in the order of :func:`.board`, settings after their method.
+    """Yield a row for each method: its gap and share of the gain over tasks, and its gap on each
+    task that is not random; in the order of :func:`.board`, settings after their method.
 
     ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
     them, which is not ``ranked``, over the ``tasks`` that it solved. Also the gap after a thousand
@@ -137,9 +136,9 @@ def list_ranking(study: Study) -> Rows:
 
 
 def _ranked(study: Study) -> list[str]:
-    """Return the labels of all compared methods in the order of :func:`.board`; methods that it
-    lacks follow in the order of :attr:`.Study.methods`. But a setting or an ablation stands after
-    its method, if that method is in the list."""
+    """Return the labels of :func:`.board`, then of other compared methods, without joined learners,
+    in the order of :attr:`.Study.methods`; a setting or an ablation stands after its method, if
+    that method is in the list."""
     single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
     names = [*dict.fromkeys((*board(study).index, *single))]
     under = study.methods.under
@@ -165,9 +164,9 @@ def list_differences(study: Study) -> Rows:
 
     If :attr:`.Study.against` is empty, the compared method is the first of :func:`.board` where one
     parameter is varied; otherwise each method from a file is compared with the built-in methods
-    with the same use of the reward. Methods that failed a run there, settings and ablations are
-    left out. Intervals are for other runs on the same tasks; p is two-sided
-    (:func:`.stratified_test`), corrected over the rows (Holm).
+    with the same use of the reward. Methods that lack or failed a run there, and settings and
+    ablations of methods that ran, are left out. Intervals are for other runs on the same tasks; p
+    is two-sided (:func:`.stratified_test`), corrected over the rows of the compared method (Holm).
     """
     methods = study.methods
     chosen = [study.against] if study.against in compared(study) else []

@@ -27,8 +27,8 @@ from coartic.tasks.task import shipped_tasks
     "source: best known from; bound: proven bound",
 )
 def list_tasks(study: Study) -> Rows:
-    """Yield a row for each task with its best known reward, and the rewards of the corrective
-    process alone with the initial and the best hands, negative ticks."""
+    """Yield a row for each task of :func:`.one_by_one` with its best known reward, and the rewards
+    of the corrective process alone with the initial and the best hands, negative ticks."""
     for name, task in one_by_one(study).items():
         best, locked = study.optima.get(name), " and ".join(task.locked_base)
         alone = study.sequences(name).reward.dropna()
@@ -74,7 +74,7 @@ def draw_tasks(study: Study) -> Parts | None:
 
 @style.styled
 def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
-    """Draw start configuration and goals of some tasks, a panel for each."""
+    """Return a figure with start configuration and goals of some tasks, a panel for each."""
     tasks = titled_apart(tasks)
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))

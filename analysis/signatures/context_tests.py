@@ -2,7 +2,7 @@
 
 Configurations mix length unit (base) and rad (joints), as the joint-space distance of the model
 does. Permutation tests exchange whole runs, which are exchangeable if the context has no effect;
-they assume no distribution.
+the tests assume no distribution.
 """
 
 from __future__ import annotations
@@ -74,9 +74,9 @@ def posture_difference_below(
 
     ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, the share of bootstrap samples,
     with runs drawn within each context, whose :func:`standardised_posture_difference` is at least
-    ``bound`` (in SDs), or if not ``standardised`` whose :func:`distance_of_means` is; the observed
-    sample counts, too. Noise adds to distances, so that p is rather too large. NaN if a context has
-    a single run. Raises ValueError for other shapes.
+    ``bound`` (in SDs; NaN counts), or if not ``standardised`` whose :func:`distance_of_means` is;
+    one such sample is added. Noise adds to distances, so that p is rather too large. NaN if a
+    context has a single run. Raises ValueError for other shapes.
     """
     groups = _groups(first, second)
     if min(map(len, groups)) < 2:
@@ -99,8 +99,8 @@ def permutation_p(
     """Test that the distance of the mean configurations of two contexts exceeds chance, by a
     one-tailed permutation test of runs.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, 0 < p ≤ 1: exact if all
-    permutations are no more than ``resamples``, 1 if all runs are equal, NaN if a context has a
+    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, 0 < p ≤ 1: exact if the runs can
+    be divided in no more than ``resamples`` ways, 1 if all runs are equal, NaN if a context has a
     single run. Raises ValueError for other shapes.
     """
     first, second = _groups(first, second)
@@ -126,8 +126,10 @@ def permutation_p(
 
 def smallest_p(first: int, second: int, resamples: Resamples = RESAMPLES) -> float:
     """Return the smallest p that the permutation test of runs (:func:`permutation_p`) can give, for
-    the numbers of runs in two contexts."""
-    return 1 / min(math.comb(first + second, first), 1 + resamples)
+    the numbers of runs in two contexts, two or more each."""
+    divisions = math.comb(first + second, first)
+    alike = 2 if first == second else 1  # the exchange of both groups is as far apart
+    return alike / divisions if divisions <= resamples else 1 / (1 + resamples)
 
 
 @checked_arguments
@@ -158,8 +160,8 @@ def beyond_p(
     Returns
     -------
     float
-        p, 0 < p ≤ 1: twice the upper tail, as in all comparisons of two methods. NaN if a method
-        has a single run in a context.
+        p, 0 < p ≤ 1: twice the upper tail, 1 at most. NaN if a method has a single run in a
+        context.
 
     Examples
     --------

@@ -99,10 +99,9 @@ def ticks_slower(runs: Solutions) -> Array:
     n runs and G goals.
 
     r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h): the ticks of the
-    corrective process with the hand h(i, g) from the configuration at the hit before, less those
-    with the fastest hand.
-
-    A hand with more than 0 ticks is not the choice for this goal alone. Infinite if the reach with
+    corrective process with the hand h(i, g) from the configuration at the hit before, less the
+    ticks with the fastest hand; more than 0 for a hand that is not the fastest for this goal alone.
+    Infinite if the reach with
     the chosen hand ends without a hit.
     """
     goals = 1 + np.arange(len(runs.task.goals))
@@ -183,10 +182,10 @@ def as_in_isolation(runs: Solutions) -> Array:
 @checked_arguments
 def other_arm(runs: Solutions) -> Array:
     """Return for each run, shape ``(n,)``, the share of the way to its next goal that the idle hand
-    covers, a mean of :func:`preshaping` over the goals after which the idle hand hits a later goal.
+    covers, a mean of :func:`preshaping` over the goals where that is not NaN.
 
-    Negative where the idle hand moves away. NaN on a task for one hand, without an initial
-    solution, and for a run whose idle hand never hits a later goal.
+    Negative if on the whole the idle hand moves away. NaN on a task for one hand, without an
+    initial solution, and for a run without such a goal.
     """
     initial = initial_solution(runs.task)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:

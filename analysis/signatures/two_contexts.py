@@ -36,8 +36,8 @@ step."""
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     """Return ``(name, name, n)`` for each pair of tasks that differ only after their first goals: n
-    shared first goals have a following goal in both tasks. Pairs with n = 0, and with different
-    robots, starts, radii, hands or locked bases, are left out."""
+    is the number of shared first goals that another goal follows in both tasks. Pairs with n = 0,
+    and with different robots, starts, radii, hands or locked bases, are left out."""
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
         others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
@@ -60,11 +60,11 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
 
     ‖Nᵀ Δq‖ / √dim N and ‖Rᵀ Δq‖ / √dim R, for orthonormal bases N of the null space of the Jacobian
     J and R of the row space. ``difference`` Δq has shape ``(k,)``, length unit and rad mixed,
-    ``jacobian`` J shape ``(2, k)``, for the k joints that can move. A random direction has equal
-    parts in expectation. A difference between contexts is motor-equivalent if the first part
-    exceeds the second: another posture with the same position of the hand. Caveat: the radius of
-    the goal bounds the second part, and nothing bounds the first. NaN for a space of dimension 0.
-    Raises ValueError for other shapes.
+    ``jacobian`` J shape ``(2, k)``, for the k joints that can move. In a random direction the
+    squares of the parts have equal expectations. A difference between contexts is motor-equivalent
+    if the first part exceeds the second: another posture with the same position of the hand.
+    Caveat: the radius of the goal bounds the second part, and nothing bounds the first. NaN for a
+    space of dimension 0. Raises ValueError for other shapes.
     Source: Mattos, Latash and colleagues, Experimental Brain Research
     (doi:10.1007/s00221-015-4327-4, 10.1007/s00221-018-5215-5).
     """
@@ -111,7 +111,8 @@ class TwoContexts:
 
     @cached_property
     def configurations(self) -> tuple[Array, Array]:
-        """Configurations at the goal in each context, ``(runs, dof)``, length unit and rad."""
+        """Configurations of the runs with this hand at the goal in each context, ``(runs, dof)``,
+        length unit and rad."""
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         first, second = (
             runs.configurations[runs.hands[:, goal] == hand, goal]
@@ -127,7 +128,7 @@ class TwoContexts:
 
     @property
     def n(self) -> int:
-        """Number of runs in the two contexts together."""
+        """Number of runs with this hand in the two contexts together."""
         return sum(map(len, self.configurations))
 
     @property
@@ -159,8 +160,8 @@ class TwoContexts:
 
     @cached_property
     def p_same(self) -> float:
-        """P-value of the test that the posture difference is below :data:`SAME`, by the bootstrap:
-        below 5 % if its 90 % interval is. NaN if a context has a single run."""
+        """P-value of the bootstrap test that the posture difference is below :data:`SAME`
+        (:func:`.posture_difference_below`); NaN if a context has a single run."""
         rng = self._rng("sameness")
         return posture_difference_below(*self.configurations, SAME, rng, standardised=False)
 

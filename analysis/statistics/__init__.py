@@ -1,1 +1,1 @@
-"""Statistics of the report: means with intervals, tests, equivalence (docs/statistics.md)."""
+"""Statistics of the report: means with intervals, tests, running times (docs/statistics.md)."""

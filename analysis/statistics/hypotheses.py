@@ -1,9 +1,7 @@
 """Tests of means and shares, and Holm's correction for several tests.
 
 Two means have tests by exchange, a mean against a number the bootstrap, shares exact binomial
-tests; permutation tests of postures are in
-:mod:`coartic.analysis.signatures`. Samples, exact numbers and seeds are as in
-:mod:`coartic.estimates`.
+tests. Samples and seeds are as in :mod:`coartic.estimates`.
 
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 16;
 A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, chapter 4
@@ -62,13 +60,14 @@ def bootstrap_test(
     least as extreme) / (1 + resamples), never 0 (Davison & Hinkley 1997): the smallest p is 0.0001
     by default. ``"greater"``: one-tailed, the mean of ``values`` is higher.
 
-    Without spread, p is that of the sign test of as many values, but at least the smallest p. p is
-    NaN with fewer than two values, or without spread and difference.
+    ``least_p`` is the smallest p of the sign test of as many values, or of these resamples if that
+    is larger; without spread, p is ``least_p``, or 1 if one-tailed for the other side. The test
+    can give a smaller p than ``least_p``, for few values. p is NaN with fewer than two values, or
+    without spread and difference.
     """
     sample = vector(values) - vector([bound])[0]
     difference, n, shifted = float(sample.mean()), len(sample), centred(sample)
     size = float(np.abs(shifted).max())
-    # The smallest p of an exact test of as many values, by signs, is a bound.
     tails = 2 if alternative == "two-sided" else 1
     least = max(tails / 2**n, 1 / (1 + resamples))
     differs = abs(difference) > NEGLIGIBLE * np.abs(vector(values)).max()
@@ -134,7 +133,8 @@ def stratified_test(
     strata: Sequence[tuple[Array | float, Array | float]], resamples: int = RESAMPLES
 ) -> float:
     """Return the p-value, two-sided, of a difference of means that is itself a mean over strata,
-    such as tasks: pairs of samples, shapes ``(n,)`` and ``(m,)``, or a number that is exact.
+    such as tasks. A stratum is a pair of samples, shapes ``(n,)`` and ``(m,)``; an exact number can
+    stand for a sample.
 
     In each stratum labels are exchanged, as in :func:`exchange_test`; a sample that is compared
     with an exact number is resampled, as in :func:`bootstrap_test`. The statistic is the
@@ -184,9 +184,8 @@ def stratified_test(
 
 def _moments(pool: Array, places: NDArray[Any], n: int) -> tuple[Array, Array]:
     """Return the difference of means (first less second sample) and the variance of the difference
-    for each row of ``places``, shapes ``(rows,)``. A row has the indices, in
-    ``pool`` (the values of both samples), of one sample: the first if they are ``n``, else the
-    second."""
+    for each row of ``places``, shapes ``(rows,)``. A row has the indices, in ``pool`` (the values
+    of both samples), of one sample: the first if a row has ``n`` indices, else the second."""
     few = places.shape[1]
     values = pool[places]
     sums, squares = values.sum(axis=1), (values**2).sum(axis=1)
@@ -248,10 +247,10 @@ def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> N
 
 
 def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.int32]]:
-    """Yield parts of ``count`` exchanges between samples of ``n`` and ``m`` values, all possible
-    exchanges if ``exact``, else random ones: arrays ``(rows, min(n, m))``, with a row for each
-    exchange, the indices in the pool of ``n + m`` values that become the smaller sample (of two
-    equal ones the first). Equal arguments give equal indices."""
+    """Yield parts of ``count`` exchanges between samples of ``n`` and ``m`` values, the first of
+    all possible exchanges if ``exact``, else random ones: arrays ``(rows, min(n, m))``, with a row
+    for each exchange, the indices in the pool of ``n + m`` values that become the smaller sample
+    (of two equal ones the first). Equal arguments give equal indices."""
     rng, few = np.random.default_rng(SEED), n if n <= m else m
     every = combinations(range(n + m), few)
     for part in slices(count, max(1, IN_CACHE // (n + m))):
@@ -272,7 +271,8 @@ def share_test(count: _Count, total: _Count, share: _Share, alternative: Alterna
     """Test ``count`` of ``total`` runs against a share (0 to 1) by the exact binomial test.
 
     The value of the estimate is the difference ``count / total - share``; its ``p`` is one-tailed
-    for ``"greater"`` and ``"less"``. Raises ValueError if ``count`` exceeds ``total``.
+    for ``"greater"`` and ``"less"``. Raises ValueError if ``count`` exceeds ``total``, or ``total``
+    is 0.
     """
     p = float(scipy.stats.binomtest(count, total, share, alternative).pvalue)
     return Estimate(count / total - share, p=p, n=(total,))

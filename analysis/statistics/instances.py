@@ -6,9 +6,8 @@ the bootstrap resamples runs within tasks.
 For other tasks, the sample has runs within instances within families. The bootstrap is hierarchical
 (A. C. Davison & D. V. Hinkley 1997, Bootstrap Methods and their Application, section 3.8): it
 resamples instances within families, then runs within instances. Families are fixed and have the
-same weight. A mixed model does not fit: gaps to an optimum are skewed and bounded by 0,
-deterministic methods have no spread over runs, and the spread of other methods differs by a factor
-of ten between tasks.
+same weight. A mixed model does not fit: gaps to an optimum are skewed and bounded by 0, and their
+spread over runs differs between methods and tasks.
 """
 
 from __future__ import annotations
@@ -28,9 +27,9 @@ Scores = Mapping[str, Sequence[Numbers]]
 
 
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
-    """Return the mean over tasks of the mean over runs, with its stratified BCa interval, for
-    ``values`` of shape ``(runs,)`` on each task. Raises ValueError without tasks, and for a task
-    without runs."""
+    """Return the mean over tasks of the mean over runs, with the interval of
+    :func:`.mean_of_means`, for ``values`` of shape ``(runs,)`` on each task. Raises ValueError
+    without tasks, and for a task without runs."""
     strata = [*map(estimates.vector, values)]
     return estimates.mean_of_means(strata, [1 / len(strata) for _ in strata])
 
@@ -63,12 +62,11 @@ def other_tasks(scores: Scores) -> Estimate:
 
     Notes
     -----
-    A percentile interval, widened by √(k / (k − 1)) for the k instances of a family, as the
+    A percentile interval, widened by √(k / (k − 1)) for the k instances of a family, because the
     bootstrap underestimates the spread of a mean by this factor. The interval is a little too wide
     for few runs with much noise, which the means of instances contain already, and does not exceed
-    the means over families of the least and of the greatest score of a run. Families have the same
-    weight, and so have the instances of a family. No interval (NaN) if any family has fewer than
-    three instances.
+    the means over families of the least and of the greatest score of a run. No interval (NaN) if a
+    family has fewer than three instances.
     """
     if not scores or not all(scores.values()):
         raise ValueError("a mean over instances needs one instance of each family")

@@ -1,7 +1,6 @@
 """Running times: the costs at which runs reach targets, after COCO (Hansen et al. 2021).
 
-The ECDF of running times is the share of pairs of run and target reached within a budget, exact at
-every budget.
+The ECDF of running times is the share of pairs of run and target reached within a budget.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
     if not len(values):
         return np.array([math.inf]), np.zeros(1)
     last = np.append(values[1:] != values[:-1], True)
-    return values[last], np.minimum(np.cumsum(weights)[last], 1.0)  # 1 but for rounding
+    return values[last], np.minimum(np.cumsum(weights)[last], 1.0)  # 1 except for rounding
 
 
 def share_reached(times: RunningTimes) -> float:
@@ -57,11 +56,11 @@ def share_reached(times: RunningTimes) -> float:
 
 
 def budget_for(times: RunningTimes, share: float) -> Estimate:
-    """Return the least budget within which a share (0 to 1) of all pairs of run and target is
-    reached, infinite if no budget is enough.
+    """Return the least budget within which a share (above 0, up to 1) of all pairs of run and
+    target is reached, infinite if no budget is enough; each task has the same weight.
 
-    The percentile interval is of the bootstrap over runs within tasks, without widening, as budgets
-    can be infinite. No interval if a task has fewer than three runs.
+    The percentile interval is of the bootstrap over runs within tasks, not widened: budgets can be
+    infinite. No interval if a task has fewer than three runs.
     """
     values, weights, runs = _pairs(times)
 
