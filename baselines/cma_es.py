@@ -144,7 +144,7 @@ class GoalByGoal(Method):
 
     name = "cma-es/goal-by-goal"
     version = 2
-    tuned_on = CMAES.tuned_on
+    tuned_on = f"{CMAES.tuned_on}; ε: six random tasks of 14 goals"
     title = "CMA-ES, hands chosen goal by goal"
     citation = _CITATION
     information = OPTIMISER_INFORMATION

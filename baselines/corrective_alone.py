@@ -16,7 +16,7 @@ class GivenHands(Method):
     """The corrective process with the task's initial hands: trial 0 of a learner with all hands."""
 
     name = "corrective-alone/given"
-    tuned_on = "nothing: it has no constants but the paper's"
+    tuned_on = "nothing: all constants are the paper's"
     title = "Corrective process alone, the task's hands"
     citation = (
         "D. E. Whitney (1969). Resolved motion rate control of manipulators and human "

@@ -72,7 +72,7 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
             planned(posture(0.0, 1.0), posture(1.0)),
             "goal 1: a target moves the base in y, which is locked, by 1: entry 1 must be 0",
         ),
-        (planned(posture(1.0), posture(2.0), hand="left"), "the robot has no left hand"),
+        (planned(posture(1.0), posture(2.0), hand="left"), "has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
         *(
             ([Movement(goal, "right", "planned", WAY[0])], "it must be a whole number")

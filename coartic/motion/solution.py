@@ -424,7 +424,7 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
     if not isinstance(movement.hand, str) or movement.hand not in task.hands:
         known = " and ".join(map(repr, task.hands))
         hand = brief_value(movement.hand).strip("'")
-        raise SolutionError(f"the robot has no {hand} hand; it has {known}")
+        raise SolutionError(f"task {task.name!r} has no {hand} hand; it has {known}")
     if not isinstance(kind, str) or kind not in KINDS:
         raise SolutionError(f"unknown kind {brief_value(kind)}; known: {KINDS}")
     if kind == "path":

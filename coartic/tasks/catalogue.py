@@ -64,7 +64,7 @@ def load_task(name_or_path: str | Path) -> Task:
         if "/" in task.name and not is_own and task != instance(task.name):
             raise TaskError(
                 f"{name_or_path}: the task is called {task.name!r}, but it is not the instance of "
-                "that name. Give it another name, or write the instance anew: "
+                "that name. Give it another name, or write the instance again: "
                 f"coartic draw {task.name} --out FOLDER"
             )
         return task
