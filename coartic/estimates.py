@@ -67,8 +67,8 @@ class Estimate:
     resamples: int = 0
     """Number of resamples in which p was counted; 0 for an exact test or none."""
     least_p: float = math.nan
-    """Smallest p that the test can give for so many values; of a bootstrap test mostly the sign test's,
-    below which its own p can fall."""
+    """Smallest p that the test can give for so many values; of a bootstrap test mostly the smallest
+    p of the sign test, below which its own p can fall."""
 
     def columns(self, name: str) -> dict[str, float]:
         """Return three entries of a table's row: ``name``, the value, and ``name_low`` and
