@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
-from coartic.internal.limits import brief_value
+from coartic.internal.limits import brief_value, plain_values
 from coartic.internal.text import counted, did_you_mean, plain, short_repr
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def in_sentences(kind: type[T]) -> type[T]:
             name = next(iter(type(self).model_fields))
             raise TypeError(f"{type(self).__name__} takes arguments by name, such as {name}=...")
         try:
-            init(self, *args, **given)
+            init(self, *plain_values(args), **plain_values(given))
         except ValidationError as error:
             fields = [*type(self).__pydantic_fields__]
             raise ValueError(f"{type(self).__name__}: {explain_inline(error, fields)}") from None
