@@ -116,6 +116,8 @@ def score(
     model, shape = setting.model, setting.single_action_space.shape
     tasks = [setting.task_at(number) for number in range(len(setting.tasks))]
     policies = policy if isinstance(policy, Mapping) else {"policy": policy}
+    if taken := {"random actions", "corrective process", "best known"} & {*policies}:
+        raise ValueError(f"a policy is called {min(taken)!r}, as a row of the table: rename it")
     rewards, normal = {}, _normaliser(vec_normalize)
     for name, each in policies.items():
         if isinstance(each, Method):
@@ -289,10 +291,12 @@ def compare(rewards: Mapping[str, Numbers], best: Numbers) -> pd.DataFrame:
     ``gap``, ``gap_low``, ``gap_high`` and ``completed`` (:func:`score`). ``rewards``, by policy,
     have shapes ``(K, trials)`` for K tasks, NaN where a trial failed; ``best`` has the best known
     rewards, shape ``(K, 1)``, NaN where none is known. Raises ValueError for other shapes."""
+    if "best known" in rewards:
+        raise ValueError("a policy is called 'best known', as a row of the table: rename it")
     optimum = np.asarray(best)
     earnings = {name: np.asarray(each) for name, each in rewards.items()} | {"best known": optimum}
     shapes = [earned.shape for earned in earnings.values()]
-    if any(len(shape) != 2 or shape[0] != len(optimum) for shape in shapes):
+    if optimum.shape[1:] != (1,) or any(s[:1] != optimum.shape[:1] or len(s) != 2 for s in shapes):
         raise ValueError(f"rewards have shapes {shapes}; needed is a row for each task")
     rows, known = {}, np.isfinite(optimum[:, 0])
     for name, earned in earnings.items():

@@ -332,7 +332,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
         task, state = self.task_at(self.state.task.item(row)), self.state
         (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
-        figure = Figure(figsize=(6, 4))
+        figure = Figure(figsize=(6, 4), dpi=100)
         canvas: Any = FigureCanvasAgg(figure)
         axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
         draw_robot(axes, task, state.q[row, self._places_of(task.robot)], weight=1.5)

@@ -63,7 +63,7 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
         if listing.is_file() and not listing.is_symlink():
             # Names that lead elsewhere are not ours, and a folder is no file.
             for name in listing.read_text(encoding="utf-8", errors="replace").splitlines():
-                leads_elsewhere = Path(name).is_absolute() or ".." in name
+                leads_elsewhere = Path(name).is_absolute() or ".." in Path(name).parts
                 if not leads_elsewhere and not (folder / name).is_dir():
                     ours.add(name)
         for name in sorted({*ours, *names}):

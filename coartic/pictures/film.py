@@ -60,9 +60,10 @@ def write_film(
     if is_mp4 and not FFMpegWriter.isAvailable():
         raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
     check_output(path, replace=replace)
-    ticks = max(len(movement.configurations) for _, movement in movements)
-    if ticks == 0:
+    lengths = [len(movement.configurations) for _, movement in movements]
+    if 0 in lengths:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
+    ticks = max(lengths)
     # A frame shows a tick or more, and stands for whole hundredths of a second, as GIF has them.
     speed = max(ticks / LASTS_S, RATE)
     stride = max(1, math.ceil(speed / RATE - 1e-9))

@@ -285,9 +285,10 @@ class Store:
             JOIN cells AS old ON old.digest = now.digest AND old.code != now.code
             JOIN results ON results.cell = old.id AND suite_seed = suite.seed AND run < plan.runs
             WHERE old.id NOT IN (SELECT cell FROM plan) GROUP BY 1, 2, 3"""
-        return Counter(
-            {(name, version_of(old), version_of(now)): n for name, old, now, n in self._rows(query)}
-        )
+        found = Counter[tuple[str, str, str]]()
+        for name, old, now, count in self._rows(query):
+            found[name, version_of(old), version_of(now)] += count
+        return found
 
     def marks(self) -> dict[str, list[str]]:
         """Return, by method, warnings about runs of the plan, in sentences (:func:`.mark_of`): that
