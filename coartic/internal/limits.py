@@ -17,22 +17,23 @@ MOST_CELLS = 10_000
 MOST_RUNS = 1_000_000
 """Most runs of a cell."""
 MOST_TRIALS = 10_000_000
-"""Most trials of a run, whose rewards are kept."""
+"""Most trials of a run; the rewards of all of them are kept."""
 MOST_SECONDS = 1_000_000
 """Most seconds of a run: a system can wait for twice that at most."""
 MOST_SEED = 2**63 - 1
 """Largest seed of a suite."""
 MOST_RUN_SEED = 2**128 - 1
-"""Largest seed of a run: some are hashes."""
+"""Largest seed of a run."""
 MOST_BYTES = 10_000_000
-"""Most bytes of the file of a method."""
+"""Most bytes of a file that users write, unless a reader sets another limit."""
 WIDTHS = (1e-9, 100.0)
 """Least and greatest half width of a box of targets, length unit (base) and rad (joints)."""
 
 
 def check_limits(name: str, value: Any, least: float, most: float) -> None:
     """Raise ValueError, which calls the value ``name``, unless it is a number from ``least`` to
-    ``most``, both included, and whole if ``least`` is an ``int``. True and False are no numbers."""
+    ``most``, both included, and an integer (not 3.0) if ``least`` is an ``int``. True and False are
+    no numbers."""
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
     is_number = isinstance(value, kind) and not isinstance(value, bool)
@@ -50,8 +51,9 @@ def is_time(value: Any) -> bool:
 
 
 def plain_values(value: Any) -> Any:
-    """Return a value with scalars of Python in place of NumPy's, but a text in place of a time or a
-    span of time, some of which pass for numbers; also in lists, tuples and dictionaries, copied."""
+    """Return a value with ``x.item()`` in place of each scalar x of NumPy, also in copies of plain
+    lists, tuples and dictionaries; times and spans of time, of which some pass for numbers, become
+    texts."""
     import numpy as np
 
     if type(value) in (list, tuple):
@@ -111,7 +113,8 @@ def _refuse_entries(value: Any) -> None:
 
 
 def brief_value(value: object) -> str:
-    """Return the ``repr`` of a value as one printable line, cut to 80 characters."""
+    """Return the ``repr`` of a value as one printable line, cut to 80 characters; if ``repr``
+    fails, a text with the type of the value."""
     try:
         return plain(repr(value), 80)
     except Exception:  # an integer of more digits than Python writes, or an object of the user
