@@ -1,4 +1,4 @@
-"""Files for users: written whole or not at all, and never over what is not ours."""
+"""Files for users, each written whole or not at all."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ def check_inside(folder: Path, path: Path) -> None:
 
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
-    """Write ``data`` as file ``path``, whole or not at all; with ``replace`` in place of a file
-    that is there. Raises CoarticError as :func:`check_output`, and if writing fails."""
+    """Write ``data`` as a file, whole or not at all. Raises CoarticError as :func:`check_output`,
+    and if writing fails."""
     check_output(path, replace=replace)
     with errors_in_words(path):
         write_atomically(path, data)

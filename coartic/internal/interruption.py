@@ -1,7 +1,7 @@
 """End an interrupted command with one line, and exit code 130 or 143.
 
 Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt, so that each ``with`` ends its workers and
-removes its temporary folders. Runs that are stored stay stored.
+removes its temporary folders.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _words = ["Interrupted."]
 def catch_signals() -> None:
     """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) raise KeyboardInterrupt from now
     on, except in the 5 s after a KeyboardInterrupt that Python did not lose
-    (:func:`_interrupt_again`); unblock all signals. Ignored signals, as under ``nohup``, stay so."""
+    (:func:`_interrupt_again`); unblock all signals. A signal ignored, as by ``nohup``, stays so."""
 
     def interrupt(number: int, _: object) -> None:
         if not _heard or time.monotonic() > _heard[-1][1] + _CLEANING_S:
@@ -96,8 +96,7 @@ def end_if_interrupted() -> None:
 @contextmanager
 def blocked_signals() -> Iterator[None]:
     """Block the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) in the block of this context, also
-    for processes that start in the block, because Ctrl-C reaches all processes of a terminal; do
-    nothing on Windows."""
+    for processes that start in the block; do nothing on Windows."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

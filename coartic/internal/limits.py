@@ -45,15 +45,13 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def is_time(value: Any) -> bool:
-    """Return whether a value is a time or a span of time of NumPy (``datetime64``,
-    ``timedelta64``), or an array of either."""
+    """Return whether a value is a time or a span of time of NumPy, or an array of either."""
     return getattr(getattr(value, "dtype", None), "kind", "") in ("M", "m")
 
 
 def plain_values(value: Any) -> Any:
-    """Return a value with ``x.item()`` in place of each scalar x of NumPy, also in copies of plain
-    lists, tuples and dictionaries; times and spans of time, of which some pass for numbers, become
-    texts."""
+    """Return a value with ``x.item()`` in place of each scalar x of NumPy, also in copies of lists,
+    tuples and dictionaries; a text in place of a time or a span of time."""
     import numpy as np
 
     if type(value) in (list, tuple):
@@ -113,8 +111,8 @@ def _refuse_entries(value: Any) -> None:
 
 
 def brief_value(value: object) -> str:
-    """Return the ``repr`` of a value as one printable line, cut to 80 characters; if ``repr``
-    fails, a text with the type of the value."""
+    """Return the ``repr`` of a value as one printable line, cut to 80 characters, or, if ``repr``
+    fails, a text with its type."""
     try:
         return plain(repr(value), 80)
     except Exception:  # an integer of more digits than Python writes, or an object of the user

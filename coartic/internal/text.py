@@ -26,15 +26,14 @@ _MOST_FIGURES = 12  # of an array in a repr
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
     """Return text as one printable line (:func:`one_line`), without blanks at its ends; a line of
-    more than ``most`` characters is cut to that length and ends in ``…``. Text after the first 4
-    times ``most`` characters is left out."""
+    more than ``most`` characters is cut to that length and ends in ``…``. Only the first
+    4 ``most`` characters of the text count."""
     line = one_line(text.strip()[: 4 * most])  # an escape takes longer than what it shows
     return line if len(line) <= most else line[: most - 1] + "…"
 
 
 def error_line(error: BaseException) -> str:
-    """Return an exception as one printable line, such as ``ValueError: message``, cut to
-    :data:`LONGEST_REASON` characters."""
+    """Return an exception as one printable line (:func:`plain`), such as ``ValueError: text``."""
     try:
         text = str(error)
     except Exception:
@@ -149,8 +148,8 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
 
 
 def _refuse_unprintable(text: str) -> str:
-    """Return the text itself. Raises a validation error if one of its characters is not printable
-    (:func:`prints`), such as the end of a line."""
+    """Return the text itself. Raises a validation error if :func:`prints` refuses a character, such
+    as the end of a line."""
     if wrong := next((c for c in text if not prints(c)), ""):
         words = f"should be one line of printable text, without {escape(wrong)}"
         raise PydanticCustomError("not_plain", "{words}", {"words": words})

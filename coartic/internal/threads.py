@@ -27,9 +27,9 @@ ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
 
 @cache
 def worker_variables() -> dict[str, str]:
-    """Return environment variables, by name, to set for a process in which methods run: one thread,
-    and on x86-64 OpenBLAS's kernels for Nehalem and NumPy's loops without AVX-512 (whose names
-    depend on its version), so that all x86-64 processors round alike."""
+    """Return environment variables to set for a process in which methods run: one thread, and on
+    x86-64 OpenBLAS's kernels for Nehalem and NumPy's loops without AVX-512, so that x86-64
+    processors round alike."""
     if platform.machine() not in ("x86_64", "AMD64"):
         return ONE_THREAD
     major, minor = map(int, metadata.version("numpy").split(".")[:2])
@@ -89,9 +89,8 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     """Make this process a worker: the leader of a new group of processes (not on Windows), with the
-    first ``streams`` of input, output and errors connected to the null device. When the process
-    that started it by ``multiprocessing`` has ended, a thread removes ``folder``, if a folder is
-    given, and kills the group."""
+    first ``streams`` of input, output and errors connected to the null device. When its parent of
+    ``multiprocessing`` has ended, a thread removes ``folder``, if given, and kills the group."""
 
     def end_with_parent() -> None:
         if (parent := multiprocessing.parent_process()) is not None:

@@ -51,8 +51,7 @@ _LISTS = {
 
 def in_sentences(kind: type[T]) -> type[T]:
     """Change a pydantic class, in place, and return the class: wrong arguments raise ValueError
-    (:func:`explain_inline`), and a model's arguments without names TypeError; scalars of NumPy
-    count as :func:`.plain_values` says."""
+    (:func:`explain_inline`), and a model's arguments without names TypeError."""
     init: Any = kind.__init__
 
     @wraps(init)
@@ -71,8 +70,8 @@ def in_sentences(kind: type[T]) -> type[T]:
 
 
 def changed_values(thing: Any) -> dict[str, Any]:
-    """Return, by name, the values of a pydantic object's fields that have no default or differ from
-    it."""
+    """Return, by name, the values of a pydantic object's fields that have no default, or whose
+    value differs from the default."""
     return {
         name: getattr(thing, name)
         for name, field in type(thing).__pydantic_fields__.items()
@@ -153,8 +152,8 @@ def explain_call(error: ValidationError, keys: Sequence[str], given: dict[int | 
 
 def _explain_first(details: list[ErrorDetails], keys: Sequence[str]) -> tuple[list[str], int]:
     """Return a list of sentences on the first 20 problems, each sentence once, and the number of
-    further problems; lists that are too short count only where there is no other problem. ``keys``:
-    names of the keys that a file has, or of arguments in order."""
+    further problems; a list that is too short counts only alone. ``keys``: names of the keys that
+    a file has, or of arguments in order."""
     # A list is counted too short without its bad entries.
     details = [d for d in details if d["type"] != "too_short"] or details[:1]
     sentences = (plain(_explain_problem(detail, keys)) for detail in details[:_SHOWN])
@@ -167,9 +166,9 @@ def sentence_error(text: str) -> PydanticCustomError:
 
 
 def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
-    """Return a sentence about a problem, such as ``goals[0] is 3; it should be a list``. ``keys``:
-    the known keys, in the order of arguments; the sentence names the known key nearest to an
-    unknown key, and calls argument k (from 0) without a name ``keys[k]``."""
+    """Return a sentence about a problem. ``keys``: the known keys, in the order of arguments; the
+    sentence names the known key nearest to an unknown key, and calls argument k (from 0) without a
+    name ``keys[k]``."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
         if not key and isinstance(part, int) and part < len(keys):
