@@ -63,7 +63,7 @@ class VectorState(NamedTuple):
     reach: float
     """Half the width of the box of targets, length unit (base) and rad (joints)."""
     runs: NDArray[np.void]
-    """Runs of a lot of robots with each hand, shape ``(H, SLOTS)``."""
+    """Runs, with each hand, of a lot: robots of a kind that move together, shape ``(H, SLOTS)``."""
     at: NDArray[np.void]
     """Rows of the slots of these robots (:class:`Batch`)."""
     corrected: Array

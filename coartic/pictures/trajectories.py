@@ -38,8 +38,8 @@ class Trajectory:
     """Execution of the solution (:func:`coartic.execute`)."""
     configurations: Array
     """Configurations passed, shape ``(ticks, dof)``, length unit (base) and rad (joints): a row
-    for each control tick, the first row the start. A movement of k steps gives k + 1 rows, so the
-    first row of the next movement repeats its last row."""
+    for each control tick, the first row the start. A movement of k steps gives k + 1 rows: the
+    first row of the next movement repeats the last row."""
     hits: NDArray[np.int64]
     """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
     of its own has the row in which the robot stood; 0 before the first tick."""

@@ -64,8 +64,8 @@ class Score(NamedTuple):
 
 def mark_of(method: str, kind: str, names: Sequence[str]) -> str:
     """Return a warning about the runs of a method, in a sentence: with ``kind`` :data:`LATE` that
-    the files ``names``, 5 of which it names, were first loaded during a run, so that changes of
-    them are not seen; with :data:`EARLIER` that results on the tasks ``names`` depend on earlier
+    the files ``names``, 5 of them at most, were first loaded during a run, so that changes are
+    not seen; with :data:`EARLIER` that results on the tasks ``names`` depend on earlier
     runs."""
     if kind == EARLIER:
         return f"{method}: results depend on earlier runs (seen on {', '.join(names)})"
@@ -128,7 +128,7 @@ class Run:
     scores: dict[str, Score]
     """Scores by part (``solution``, ``initial``, ``replay``); empty if the run is not ok."""
     date: str
-    """Date and time at the end of the run, UTC."""
+    """Date and time at which the run was scored, UTC."""
 
     @property
     def cell(self) -> Cell:
