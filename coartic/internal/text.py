@@ -70,7 +70,7 @@ def counted(count: int, thing: str) -> str:
 def short_repr(thing: object, /, *texts: str, **facts: Any) -> str:
     """Return ``Class(text, fact=value)`` for an object, in one line, cut to :data:`LONGEST_LINE`
     characters: ``texts``, then each of ``facts`` by name: its ``repr``, cut to 80 characters, or of
-    an array the numbers, if they are one row of at most 12, else the shape."""
+    a value of NumPy the entries, if they are one row of at most 12, else the shape."""
     parts = list(texts)
     for name, value in facts.items():
         if not hasattr(value, "shape"):

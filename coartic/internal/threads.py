@@ -89,7 +89,7 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     """Make this process a worker: the leader of a new group of processes (not on Windows), with the
-    first ``streams`` of input, output and errors connected to the null device. When its parent of
+    first ``streams`` of input, output and errors connected to the null device. When its parent by
     ``multiprocessing`` has ended, a thread removes ``folder``, if given, and kills the group."""
 
     def end_with_parent() -> None:

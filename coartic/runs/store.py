@@ -673,8 +673,8 @@ def writing(folder: Path) -> Iterator[Store]:
 def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
     """Lock a folder for this process in the block of this context, or, with ``shared``, share the
     lock with other readers; do nothing where the folder cannot be opened, or the system or the disk
-    has no such locks. Raises CoarticError, which names ``command``, while another process holds the
-    lock."""
+    has no such locks. Raises CoarticError, which names ``command``, while the lock is held
+    elsewhere."""
     try:
         import fcntl
 
@@ -839,7 +839,7 @@ def _why_not_opened(path: Path) -> str:
 def _unpack(blob: bytes, trials: int | None) -> Array:
     """Return the rewards that a ``blob`` of table ``learning`` holds (:func:`reward_bytes`), shape
     ``(k,)`` with k up to ``trials``; NaN for a trial that failed or whose reward is not kept.
-    Raises ValueError for a damaged blob, and for more rewards than trials."""
+    Raises ValueError for a blob that cannot be unpacked or has more rewards than trials."""
     size = 4 * (1 + min(trials or 0, MOST_TRIALS))
     try:
         packed = zlib.decompressobj()
