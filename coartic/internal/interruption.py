@@ -72,7 +72,7 @@ def _interrupt_again(lost: UnraisableHookArgs) -> None:
 
 @contextmanager
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
-    """If KeyboardInterrupt ends the block of this context, call ``sentence`` and note the text that
+    """Call ``sentence`` if KeyboardInterrupt ends the block of this context, and note the text that
     it returns, for :func:`end_if_interrupted` to print; the exception passes."""
     try:
         yield

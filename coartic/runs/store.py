@@ -181,8 +181,8 @@ class Store:
     # The plan.
 
     def begin_as(self, other: Store) -> bool:
-        """If this store has no run, replace its content by a copy of another store's content, and
-        return True; else return False."""
+        """Replace the content of this store by a copy of another store's content, and return True,
+        if this store has no run; else return False."""
         if empty := not self.ids():
             other._db.backup(self._db)
         return empty
