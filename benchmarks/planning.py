@@ -24,7 +24,6 @@ from coartic.benchmarks.suites import (
     suites,
     tasks_of,
 )
-from coartic.internal.arguments import plain_scalar
 from coartic.internal.limits import (
     MOST_CELLS,
     MOST_RUNS,
@@ -32,6 +31,7 @@ from coartic.internal.limits import (
     MOST_TRIALS,
     brief_value,
     check_limits,
+    plain_values,
 )
 from coartic.internal.text import counted, unknown
 from coartic.internal.validation import FileData, explain_inline, sentence_error
@@ -81,7 +81,7 @@ def _file(value: object) -> object:
 
 
 _Files = tuple[Annotated[Path, BeforeValidator(_file)], ...]
-_plain = BeforeValidator(plain_scalar)
+_plain = BeforeValidator(plain_values)
 
 
 class Request(FileData):

@@ -78,12 +78,12 @@ def current_code(method: MethodInfo) -> str:
 
 def check_id(name: str, origin: str, registered: Registry) -> None:
     """Raise CoarticError for the id of a method from ``origin`` that has other characters than ids
-    have, is reserved, or is an id in ``registered``, a condition of the learner or one of
-    :data:`NAMES`, whatever the case of its letters."""
+    have or more than 80, is reserved (capitals matter), or is an id in ``registered``, a condition
+    of the learner or one of :data:`NAMES`, whatever the case of its letters."""
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(
             f"{origin}: the name {name!r} must begin with a letter or digit and have only letters, "
-            "digits, '.', '_', '+', '/' and '-', such as 'my-search'"
+            "digits, '.', '_', '+', '/' and '-', at most 80, such as 'my-search'"
         )
     why = ""
     if name.startswith(_RESERVED):

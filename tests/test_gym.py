@@ -6,6 +6,7 @@ import shutil
 import sys
 from functools import partial
 
+import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
@@ -241,8 +242,9 @@ def test_what_else_is_refused():
             call()
 
 
-def test_robots_side_by_side_have_the_pictures_of_each():
+def test_robots_side_by_side_have_the_pictures_of_each(monkeypatch):
     """Before a goal is hit, after it, and when trials have begun again."""
+    monkeypatch.setitem(matplotlib.rcParams, "figure.dpi", 50)
     one = gymnasium.make(TWO, render_mode="rgb_array")
     many = gymnasium.make_vec(TWO, num_envs=2, render_mode="rgb_array")
     assert gymnasium.make_vec(TWO, num_envs=2).render() is None
@@ -252,6 +254,7 @@ def test_robots_side_by_side_have_the_pictures_of_each():
     for hit in (0, 1):
         first, second = many.render()
         assert (first == second).all()
+        assert first.shape == (400, 600, 3)
         assert (one.render() == first).all(), hit
         one.step(action), many.step(np.tile(action, (2, 1)))
 

@@ -4,7 +4,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from coartic import CoarticError, Movement, Task, corrective_trial, movements_of, trajectory
-from coartic.pictures.film import set_stage
+from coartic.pictures.film import set_stage, write_film
 from tests.support.strategies import tiny_task
 
 TASK = Task(goals=[(3.0, 2.0), (4.5, 2.0)], q0=[0, 0, 2, -0.5, 0, 0, 1, 0.5, 0, 0])
@@ -52,6 +52,9 @@ def test_a_film_and_a_picture(tmp_path):
             mine.animate(tmp_path / name)
 
 
-def test_a_trajectory_where_the_hand_is_in_the_goal_has_no_row():
+def test_a_trajectory_where_the_hand_is_in_the_goal_has_no_row(tmp_path):
     idle = trajectory(tiny_task(goals=[[4.5, 0.1]]), [Movement(1, "right", "corrective")])
     assert (idle.configurations.shape, idle.hits.tolist()) == ((0, 10), [0])
+    moved = trajectory(TASK, corrective_trial(TASK, "RR").movements)
+    with pytest.raises(CoarticError, match="no movement to draw"):
+        write_film([("Idle", idle), ("Moved", moved)], tmp_path / "both.gif")

@@ -2,6 +2,8 @@
 
 import lzma
 import re
+import sqlite3
+from contextlib import closing
 
 import check_shipped
 import pytest
@@ -15,7 +17,7 @@ from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import find_run
 from coartic.benchmarks.runner import perform
 from coartic.runs.method_info import run_identity, version_of
-from coartic.runs.store import RUNS_FILE, open_store
+from coartic.runs.store import RUNS_FILE, open_store, writing
 from tests.support.suites import ROOT, InProcess
 
 SAME = ["dual-process/EC1", "random-search", "hill-climbing", "corrective-alone/given"]
@@ -62,6 +64,20 @@ def test_a_folder_of_4_0_0_is_resumed(old):
     assert set(kept.run_id[kept.method.isin(SAME)]) <= {*before.runs.run_id}
     assert check_runs(old).wrong == []
     assert performed(old, runs=4).done == 0
+
+
+def test_earlier_runs_of_a_version_are_counted_whatever_stands_for_it(old):
+    with closing(sqlite3.connect(old / RUNS_FILE)) as db:
+        rows = [name for _, name, *_ in db.execute("PRAGMA table_info(cells)")]
+        names = ", ".join(name for name in rows if name not in ("id", "code"))
+        (there,) = db.execute("SELECT id FROM cells WHERE method = 'cma-es/bandit'").fetchone()
+        copy = f"INSERT INTO cells ({names}, code) SELECT {names}, '1.1' FROM cells WHERE id = ?"
+        other = db.execute(copy, (there,)).lastrowid
+        db.execute("UPDATE results SET cell = ? WHERE cell = ? AND run = 0", (other, there))
+        db.commit()
+    with writing(old) as store:
+        store.replace_plan(planned(), store.made_with())
+        assert store.stale()["cma-es/bandit", "1.1", "1.2"] == 3
 
 
 def test_a_folder_of_4_0_0_and_one_of_now_have_the_same_runs(old, tmp_path):

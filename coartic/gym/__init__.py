@@ -1,8 +1,8 @@
-"""Tasks and families as environments of Gymnasium: a step is a goal, its reward minus the ticks.
+"""Tasks and families as environments of Gymnasium: a step reaches for a goal, its reward is minus
+the ticks.
 
-Importing this module registers ``coartic/Ascending-v2``, ``Descending-v2``, ``TwoArmed1-v2``,
-``TwoArmed2-v2``, and ``coartic/Task-v2`` for any other task or a family. It needs the extra
-``coartic[gym]``. Environments know tasks and motion; only scoring knows methods, which it compares.
+Importing this module registers the ids :data:`IDS`, such as ``coartic/Ascending-v2``, and
+``coartic/Task-v2`` for any other task or a family. The module needs the extra ``coartic[gym]``.
 """
 
 import gymnasium

@@ -27,15 +27,14 @@ IDS: dict[str, dict[str, Any]] = {
     "coartic/TwoArmed2-v2": {"task": "two-armed-2"},
     "coartic/Task-v2": {},
 }
-"""Options of the registered environments, by id."""
+"""Options with which the environments are registered, by id."""
 ADDED = ("OrderEnforcing", "PassiveEnvChecker", "Monitor", "VecMonitor")
-"""Wrappers that the libraries add by themselves; they change neither observations nor actions."""
+"""Wrappers that the libraries add by themselves, which change no observations and no actions."""
 
 
 class TaskEnv(Recorded, gymnasium.Env):
-    """Environment of one robot: options, observations, actions and rewards of
-    :class:`TaskVectorEnv`, whose trials begin with a reset only; ``render_mode`` may be
-    ``"rgb_array"``."""
+    """Environment of one robot, with the options, observations, actions and rewards of
+    :class:`TaskVectorEnv`; a trial begins with a reset only."""
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
 
@@ -55,9 +54,9 @@ class TaskEnv(Recorded, gymnasium.Env):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial, of the task or of a random instance of the family; return observation
-        ``(O,)`` and info. With ``seed`` None the generator goes on. Raises ValueError for any
-        option, and for a seed that is no whole number from 0. The info has ``task``, the task's
-        name, and ``is_success``, True if the trial has hit all goals."""
+        ``(O,)`` and info, a dictionary: ``task`` is the task's name, ``is_success`` True if the
+        trial has hit all goals. With ``seed`` None the random generator goes on. Raises ValueError
+        for any option, and for a seed that is no whole number from 0."""
         super().reset(seed=whole_seed(seed))
         check_no_options(options)
         self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
@@ -66,10 +65,10 @@ class TaskEnv(Recorded, gymnasium.Env):
     def step(
         self, action: ArrayLike
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Reach for the next goal by an action ``(A,)``; return observation ``(O,)``, reward (ticks
-        below 0), whether the trial has ended, False (no trial is truncated) and info (``task`` and
-        ``is_success``). Raises ResetNeeded if the trial had ended before or no trial was begun, and
-        ValueError for an action of another shape or that is not finite."""
+        """Reach for the next goal by an action ``(A,)``; return observation ``(O,)``, reward,
+        whether the trial has ended, False (no trial is truncated) and info, as :meth:`reset`.
+        Raises ResetNeeded if the trial had ended before or no trial was begun, and ValueError for
+        an action of another shape or that is not finite."""
         state = self.robots.state
         if not state.going[0]:
             raise ResetNeeded("no trial goes on: reset first")
@@ -100,7 +99,7 @@ def options_of(env: Any) -> dict[str, Any]:
 
 def robots_of(env: Any) -> TaskVectorEnv:
     """Return the :class:`TaskVectorEnv` that moves the robots of an environment of this package,
-    also one in wrappers. Raises TypeError for anything else."""
+    also of an environment in wrappers. Raises TypeError for anything else."""
     *_, inner = layers(env)
     robots = getattr(inner, "robots", inner)
     if not isinstance(robots, TaskVectorEnv):
@@ -111,8 +110,8 @@ def robots_of(env: Any) -> TaskVectorEnv:
 
 
 def layers(env: Any) -> list[Any]:
-    """List the wrappers of an environment, from the outermost inwards, and the environment
-    inside."""
+    """Return a list of the wrappers of an environment, from the outermost inwards, and the
+    environment inside."""
     found = [env]
     while isinstance(env, gymnasium.Wrapper | VectorWrapper) or hasattr(env, "venv"):
         env = env.venv if hasattr(env, "venv") else env.env
@@ -131,10 +130,10 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
 
     ``env`` is an id, such as ``"coartic/TwoArmed1-v2"``; ``options`` are options of
     :class:`TaskVectorEnv`. Trials start again by themselves, actions are clipped, and rewards are
-    minus the ticks, as shares of what the corrective process takes for the whole trial, at least -2
-    a step (:class:`~coartic.gym.stable_baselines.RobotEnvs`). Raises ValueError or TypeError for an
-    id of another package and for a wrong option, and CoarticError for a task that cannot be used,
-    and if Stable-Baselines3 is not installed.
+    minus the ticks, as shares of the ticks that the corrective process takes for the whole trial,
+    at least -2 a step (:class:`~coartic.gym.stable_baselines.RobotEnvs`). Raises ValueError or
+    TypeError for an unknown id and for a wrong option, and CoarticError for a task that cannot be
+    used, and if Stable-Baselines3 is not installed.
     """
     try:
         from coartic.gym.stable_baselines import RobotEnvs

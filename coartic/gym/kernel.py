@@ -59,11 +59,11 @@ class VectorState(NamedTuple):
     sides: Hands
     """The hands that all robots have, 0 left or 1 right, shape ``(H,)``."""
     ahead: int
-    """Number of goals that are seen beyond the next one."""
+    """Number of goals that are seen beyond the next goal."""
     reach: float
     """Half the width of the box of targets, length unit (base) and rad (joints)."""
     runs: NDArray[np.void]
-    """Runs of a lot of robots with each hand, shape ``(H, SLOTS)``."""
+    """Runs, with each hand, of a lot: robots of a kind that move together, shape ``(H, SLOTS)``."""
     at: NDArray[np.void]
     """Rows of the slots of these robots (:class:`Batch`)."""
     corrected: Array
@@ -110,8 +110,8 @@ def _aim_by_action(
 @inlined
 def _step_lot(count: int, robot: RobotRecord, state: VectorState) -> None:
     """Let the robots whose numbers are the first ``count`` of ``state.indices``, at most 72 and all
-    as in record ``robot``, reach for their next goal by ``state.actions``; change ``q``, ``goal``,
-    ``rewards`` and ``going`` of ``state`` in place."""
+    of the kind that record ``robot`` describes, reach for their next goal by ``state.actions``;
+    change ``q``, ``goal``, ``rewards``, ``going`` and work space of ``state`` in place."""
     for h in range(len(state.sides)):
         for i in range(count):
             n, run = state.indices[i], state.runs[h, i]
@@ -142,10 +142,8 @@ def _step_lot(count: int, robot: RobotRecord, state: VectorState) -> None:
 
 @entry
 def observe(*fields: Any) -> None:
-    """Fill in ``seen``, ``(N, O)``, in place, of a :class:`VectorState`, whose entries are
-    ``fields`` in order: for each robot 1 where a goal exists (the next one and those ahead), x and
-    y of these goals from the base, length unit, the joints, and, if observations are long enough, 1
-    for each joint that can move."""
+    """Fill in the observations ``seen`` of a :class:`VectorState`, in place, as
+    :class:`.TaskVectorEnv` says; ``fields`` are the entries of the state, in order."""
     state = VectorState(*fields)
     goals, joints = state.ahead + 1, len(state.joints)
     for n in range(len(state.task)):
@@ -167,7 +165,8 @@ def observe(*fields: Any) -> None:
 def step_robots(*fields: Any) -> int:
     """Let all robots whose trial goes on reach for their next goal; change the arrays ``fields``,
     the entries of a :class:`VectorState`, in place. Return the number of trials that make their
-    first step; -1 - n, without a movement, if the action of robot n (from 0) is not finite."""
+    first step; -1 - n, without a movement, if robot n, from 0, is the first whose action is not
+    finite."""
     state = VectorState(*fields)
     last, begun = len(state.task) - 1, 0
     for n in range(last + 1):

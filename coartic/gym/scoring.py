@@ -51,7 +51,7 @@ def score(
         An environment of this package, or its id. Of a family the instances of the test split are
         scored, or of the ``split`` that is given here. An environment in wrappers is taken as it
         is, with its own instances: policies see and do what the wrappers let them, and trials count
-        in ticks; wrappers learn nothing.
+        in ticks; wrappers that normalise learn nothing.
     policy : callable, agent, Method or mapping, optional
         Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
         ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
@@ -74,26 +74,26 @@ def score(
     DataFrame
         A row for each policy, for uniformly random actions, for the corrective process alone with
         the task's initial hands, and for the best solution known. Columns: ``reward``, the mean
-        over tasks, ticks; ``gap`` to the best known reward, a share of it, with its 95 % interval
-        ``gap_low`` to ``gap_high`` (BCa bootstrap) over tasks, or of one task over trials;
-        ``completed``, the share of trials that hit all goals: where it is below 1, reward and gap
-        are NaN. NaN also where nothing is known, or too few trials for an interval.
-        ``attrs["units"]`` has the units.
+        over tasks, ticks; ``gap`` to the best known reward, a share of it, over tasks where it is
+        known, with its 95 % interval ``gap_low`` to ``gap_high`` (BCa bootstrap) over tasks, or of
+        one task over trials; ``completed``, the share of trials that hit all goals: where it is
+        below 1, reward and gap are NaN. NaN also where nothing is known, or too few values for an
+        interval. ``attrs["units"]`` has the units.
 
     Raises
     ------
     ValueError, TypeError
-        The environment is not coartic's, an option is wrong, the policy is no policy, or an agent
-        whose spaces or wrappers differ from those of the environment; or observations would be
-        normalised twice, in ``env`` and by ``vec_normalize``.
+        The environment is not coartic's, an option is wrong, the policy is no policy, is called as
+        another row, or is an agent with other spaces or wrappers than the environment; or
+        observations would be normalised twice, in ``env`` and by ``vec_normalize``.
     OSError
         The file of ``vec_normalize`` cannot be read.
 
     Warns
     -----
     UserWarning
-        An agent has no environment, as after loading: nothing says whether it was trained in
-        ``VecNormalize``.
+        An agent has no environment, as after loading, and neither ``env`` nor ``vec_normalize``
+        normalises: nothing says whether it was trained in ``VecNormalize``.
 
     Examples
     --------
@@ -116,6 +116,8 @@ def score(
     model, shape = setting.model, setting.single_action_space.shape
     tasks = [setting.task_at(number) for number in range(len(setting.tasks))]
     policies = policy if isinstance(policy, Mapping) else {"policy": policy}
+    if taken := {"random actions", "corrective process", "best known"} & {*policies}:
+        raise ValueError(f"a policy is called {min(taken)!r}, as a row of the table: rename it")
     rewards, normal = {}, _normaliser(vec_normalize)
     for name, each in policies.items():
         if isinstance(each, Method):
@@ -141,12 +143,12 @@ def column(rewards: Iterable[float | None]) -> Array:
 
 
 def is_normaliser(env: Any) -> bool:
-    """Return whether an environment is a ``VecNormalize`` of Stable-Baselines3."""
+    """Return whether the class of an environment is called ``VecNormalize``."""
     return type(env).__name__ == "VecNormalize"
 
 
 def _normaliser(given: str | Path | Any) -> Any:
-    """Return the ``VecNormalize`` that is given, or that is in the file that is given; None for
+    """Return the ``VecNormalize`` that is given, itself or by the pickle file that has it; None for
     None. Raises OSError if the file cannot be read, and TypeError for anything else."""
     what = f"vec_normalize is {brief_value(given)}"
     if isinstance(given, str | Path):
@@ -162,9 +164,9 @@ def _normaliser(given: str | Path | Any) -> Any:
 
 
 def _acting(policy: Any, env: Any, normal: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """Return a function from observations of ``env`` to actions for a policy. ``normal``, a
-    ``VecNormalize``, normalises observations; for None, unless ``env`` does, the agent's own
-    environment. Raises TypeError for no policy, and an agent of other spaces or wrappers."""
+    """Return a function that gives the actions of a policy for observations of ``env``, which
+    ``normal``, a ``VecNormalize``, normalises; if ``normal`` is None and ``env`` has none, the
+    agent's own. Raises TypeError for no policy, and for an agent of other spaces or wrappers."""
     normalised = any(map(is_normaliser, layers(env)))
     if normal is None and not normalised:
         normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
@@ -237,8 +239,8 @@ def _rollout_as_it_is(
     act: Callable[[NDArray[np.float32]], ArrayLike], env: Any, tasks: int, seed: int
 ) -> Array:
     """Let ``act`` (:func:`_rollout`) make trials in an environment in wrappers, reset with
-    ``seed``, until each of its ``tasks`` tasks had one. Return the total reward of the first trial
-    on each task, ticks, shape ``(tasks, 1)``; NaN where it failed or was cut short."""
+    ``seed``, until each of its ``tasks`` tasks had a trial. Return the total reward of the first
+    trial on each task, ticks, shape ``(tasks, 1)``; NaN where the trial failed or was cut short."""
     robots, is_one = robots_of(env), isinstance(env, gymnasium.Env)
     totals, rewards = np.zeros(robots.num_envs), dict[int, float]()
 
@@ -266,8 +268,8 @@ def _rollout_as_it_is(
 
 @contextmanager
 def _as_learned(env: Any) -> Iterator[None]:
-    """Set ``training`` and ``update_running_mean`` of an environment and its wrappers to False in
-    the block of this context, so that they keep the means by which they normalise."""
+    """Set ``training`` and ``update_running_mean``, where an environment and its wrappers have
+    them, to False in the block of this context: the means by which wrappers normalise stay."""
     learning = [
         (each, name, getattr(each, name))
         for each in layers(env)
@@ -288,11 +290,14 @@ def compare(rewards: Mapping[str, Numbers], best: Numbers) -> pd.DataFrame:
     """Return a table with a row for each policy and one for the best known, columns ``reward``,
     ``gap``, ``gap_low``, ``gap_high`` and ``completed`` (:func:`score`). ``rewards``, by policy,
     have shapes ``(K, trials)`` for K tasks, NaN where a trial failed; ``best`` has the best known
-    rewards, shape ``(K, 1)``, NaN where none is known. Raises ValueError for other shapes."""
+    rewards, shape ``(K, 1)``, NaN where none is known. Raises ValueError for other shapes, and for
+    a policy ``best known``."""
+    if "best known" in rewards:
+        raise ValueError("a policy is called 'best known', as a row of the table: rename it")
     optimum = np.asarray(best)
     earnings = {name: np.asarray(each) for name, each in rewards.items()} | {"best known": optimum}
     shapes = [earned.shape for earned in earnings.values()]
-    if any(len(shape) != 2 or shape[0] != len(optimum) for shape in shapes):
+    if optimum.shape[1:] != (1,) or any(s[:1] != optimum.shape[:1] or len(s) != 2 for s in shapes):
         raise ValueError(f"rewards have shapes {shapes}; needed is a row for each task")
     rows, known = {}, np.isfinite(optimum[:, 0])
     for name, earned in earnings.items():
@@ -313,8 +318,8 @@ def compare(rewards: Mapping[str, Numbers], best: Numbers) -> pd.DataFrame:
 
 
 def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
-    """Return the reward, ticks below 0, of the solution that a method finds for a task; None if the
-    method does not apply, finds no solution, or the solution misses a goal."""
+    """Return the reward of the solution that a method finds for a task; None if the method does not
+    apply, finds no solution, or the solution misses a goal."""
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)
         return execute(task, result.solution, model=model).reward

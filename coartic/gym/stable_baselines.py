@@ -17,12 +17,12 @@ class RobotEnvs(VecEnv):
     """A vector environment of :mod:`coartic.gym` for Stable-Baselines3.
 
     Actions are clipped to the box. A trial that has ended starts again in the same step;
-    ``terminal_observation`` in its info is what was seen last, and ``episode`` has its reward in
-    ticks. Rewards are minus the ticks, as a share of the ticks that the corrective process alone
-    takes for the whole trial with the task's initial hands: the rewards of a trial with as many
-    ticks add up to -1. No step loses more than 2, not even a step in which the corrective process
-    fails. On a task that the corrective process cannot complete alone, rewards are shares of
-    ``coartic.method.optimisers.FAILED``, 1,000,000 ticks.
+    ``terminal_observation`` in its info is its last observation, and ``episode`` has its reward in
+    ticks. Rewards are minus the ticks, as a share of the ticks (at least 1) that the corrective
+    process alone takes for the whole trial with the task's initial hands: the rewards of a trial
+    with as many ticks add up to -1. No step loses more than 2. On a task that the corrective
+    process cannot complete alone, rewards are shares of ``coartic.method.optimisers.FAILED``,
+    1,000,000 ticks.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ class RobotEnvs(VecEnv):
         """Let all N robots reach for their next goal by the actions of :meth:`step_async`.
 
         Returns observations ``(N, O)``, rewards ``(N,)``, True for trials that have ended,
-        ``(N,)``, and N dictionaries, as :class:`RobotEnvs` says; ``episode`` has ``r`` (reward in
-        ticks), ``l`` (number of steps) and ``t`` (0).
+        ``(N,)``, and N dictionaries, empty for trials that go on, as :class:`RobotEnvs` says;
+        ``episode`` has ``r`` (reward in ticks), ``l`` (number of steps) and ``t`` (0).
         """
         costs = np.array([self._cost(task) for task in self.robots.state.task.tolist()])
         observations, rewards, ended, _, seen = self.robots.step(self._actions)

@@ -54,13 +54,13 @@ class Recorded:
 
 
 class TaskVectorEnv(Recorded, VectorEnv):
-    """Vector environment: N robots act side by side, in a fraction of the time of N
-    :class:`TaskEnv`.
+    """Vector environment: N robots act side by side, each in a trial of its own.
 
-    An episode is a trial, of as many steps as there are goals. It ends earlier where the corrective
-    process fails, which costs ``coartic.method.optimisers.FAILED``. A trial that has ended starts
-    again in the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and ``final_info``
-    have its last observation and infos. Only the draw of an instance of a family is random.
+    An episode is a trial, of as many steps as there are goals. The reward of a step is minus its
+    ticks, or -1,000,000 where the corrective process fails, which ends the trial. A trial that has
+    ended starts again in the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and
+    ``final_info`` have its last observation and infos. Only the draw of an instance of a family is
+    random.
 
     Parameters
     ----------
@@ -71,14 +71,14 @@ class TaskVectorEnv(Recorded, VectorEnv):
         instance of the family.
     split : {"development", "test", "fresh"}, optional
         Instances of the family: to train on (``"development"``, the default), to report on
-        (``"test"``), or of a ``year`` (``"fresh"``). They never mix.
+        (``"test"``), or of a ``year`` (``"fresh"``).
     count : int, optional
         How many instances of the split, from its first; by default 1,000 of the development split,
         10 of the test and fresh splits.
     year : int, optional
         Year of fresh instances, such as 2027.
     ahead : int
-        Goals in view beyond the next one.
+        Number of goals in view beyond the next goal.
     model : MotionModel
         Constants of movement.
     render_mode : {"rgb_array"}, optional
@@ -94,17 +94,17 @@ class TaskVectorEnv(Recorded, VectorEnv):
     Joints are the coordinates of the base (length unit) and the angles of the arms (rad) that can
     move, in the order of a configuration; in a family, of arms with the most links.
 
-    An observation has an entry for the next goal and for each of those ahead, 1 where there is
-    one; x and y of each from the base, length unit, 0 without a goal; and the joints. In a
+    An observation has an entry for the next goal and for each goal ahead, 1 if the goal exists,
+    else 0; x and y of each from the base, length unit, 0 without a goal; and the joints. In a
     family whose robots differ in links an entry for each joint follows, 1 where the robot can move
-    it.
+    the joint.
 
-    An action has an entry for the hand, where the robot has two, and one for each joint. The box is
-    from -1 to 1; entries beyond are clipped. With an entry up to 0.5 the hand is the one that the
-    corrective process brings to the goal by the shorter path in joint space, above 0.5 the other
-    hand. The target is the posture that the corrective process finds for this hand, or, where the
+    An action has an entry for the hand, where the task has two, and an entry for each joint. The
+    box is from -1 to 1; entries beyond are clipped. For each hand the corrective process finds a
+    posture at the goal. With an entry up to 0.5 the hand is the hand whose posture is nearer in
+    joint space, above 0.5 the other hand. The target is the posture of this hand, or, where the
     process fails, the present posture, plus :data:`REACH` times the entries of the joints: zeros do
-    what the corrective process does. Entries of joints that a robot does not have do nothing.
+    what the corrective process does. Entries of joints that a robot cannot move do nothing.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -257,8 +257,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
     def infos(self) -> dict[str, Any]:
         """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
-        and ``is_success``, True where the robot has hit all goals of its trial. After :meth:`step`
-        a trial that ended has started again: its last infos are in ``final_info`` of the step."""
+        and ``is_success``, True where the robot has hit all goals of its trial; before the first
+        reset it means nothing. After :meth:`step` a trial that ended has started again: its last
+        infos are in ``final_info`` of the step."""
         task = self.state.task
         return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 
@@ -293,10 +294,10 @@ class TaskVectorEnv(Recorded, VectorEnv):
     ) -> tuple[NDArray[np.float32], Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Let each robot reach for its next goal by its row of ``actions``, shape ``(N, A)``.
 
-        Returns observations ``(N, O)``, rewards ``(N,)``, ticks below 0, True where the trial has
-        ended, ``(N,)``, False for each (none is truncated), ``(N,)``, and a dictionary of infos. A
-        trial that has ended starts again in this step: its observation is the first of the next
-        trial; ``final_obs`` of the infos has the last observation of the trial that ended. Raises
+        Returns observations ``(N, O)``, rewards ``(N,)``, True where the trial has ended, ``(N,)``,
+        False for each (none is truncated), ``(N,)``, and a dictionary of infos. A trial that has
+        ended starts again in this step: its observation is the first of the next trial;
+        ``final_obs`` of the infos has the last observation of the trial that ended. Raises
         ResetNeeded before the first reset, and ValueError for actions of another shape or that are
         not finite.
         """
@@ -332,7 +333,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
         task, state = self.task_at(self.state.task.item(row)), self.state
         (left, bottom), (right, top) = box(task, task.q0, margin=1.0)
-        figure = Figure(figsize=(6, 4))
+        figure = Figure(figsize=(6, 4), dpi=100)
         canvas: Any = FigureCanvasAgg(figure)
         axes = figure.add_subplot(aspect="equal", xlim=(left, right), ylim=(bottom, top))
         draw_robot(axes, task, state.q[row, self._places_of(task.robot)], weight=1.5)
@@ -357,8 +358,8 @@ def check_no_options(options: Mapping[str, Any] | None) -> None:
 
 
 def whole_seed(seed: Any) -> int | None:
-    """Return a seed, a whole number from 0, as an int, or None for None. Raises ValueError for
-    anything else."""
+    """Return a seed, a whole number from 0 to 2**128 - 1, as an int, or None for None. Raises
+    ValueError for anything else."""
     if seed is None:
         return None
     check_limits("seed", seed, 0, MOST_RUN_SEED)

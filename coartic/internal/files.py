@@ -1,4 +1,4 @@
-"""Files for users: written whole or not at all, and never over what is not ours."""
+"""Files for users, each written whole or not at all."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from coartic.errors import CoarticError
 from coartic.internal.text import plain
 
 LISTING = ".coartic-files"
-"""In a folder: the files that a command wrote into it, a path a line."""
+"""File in a folder that lists the files that a command wrote there, or began to, a path a line."""
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write ``data`` as a file, in place of a file of that name; if that fails, the earlier file
-    stays as it was. Raises OSError if it cannot be written."""
+    """Write ``data`` as file ``path``, in place of an earlier file; if writing fails, the earlier
+    file stays as it was, and OSError is raised."""
     part = path.with_name(f".coartic-{os.getpid()}-{path.name}")
     try:
         part.unlink(missing_ok=True)
@@ -31,10 +31,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write ``files``, contents by path below the folder, which is made if it is missing. Files
     that an earlier call wrote there are replaced, or removed if they are not among ``files``.
-
-    Raises CoarticError, before a file is written, if a file that no earlier call wrote has such a
-    path or if the folder cannot be written, and if writing fails.
-    """
+    Raises CoarticError as :func:`make_folder`, before a file is written, and if writing fails."""
     before = make_folder(folder, files)
 
     def list_files(names: Collection[str]) -> None:
@@ -53,9 +50,9 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
-    """Make a folder, if it is missing, and return the paths, below it, of files that earlier calls
-    of :func:`publish` wrote there. Raises CoarticError if it cannot be written, if another file has
-    a path among ``names``, or if such a path is a link or leads out of the folder by a link."""
+    """Make a folder, if it is missing, and return the paths of files, below the folder, that
+    :data:`LISTING` there lists. Raises CoarticError if the folder cannot be written, if another
+    file has a path among ``names``, or if a path of either is a link or leads out of the folder."""
     ours, listing = set[str](), folder / LISTING
     with errors_in_words(folder):
         if os.path.lexists(folder) and not folder.is_dir():
@@ -63,7 +60,7 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
         if listing.is_file() and not listing.is_symlink():
             # Names that lead elsewhere are not ours, and a folder is no file.
             for name in listing.read_text(encoding="utf-8", errors="replace").splitlines():
-                leads_elsewhere = Path(name).is_absolute() or ".." in name
+                leads_elsewhere = Path(name).is_absolute() or ".." in Path(name).parts
                 if not leads_elsewhere and not (folder / name).is_dir():
                     ours.add(name)
         for name in sorted({*ours, *names}):
@@ -80,14 +77,14 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
 
 
 def _check_rights(folder: Path) -> None:
-    """Raise PermissionError if this user may not make files in a folder."""
+    """Raise PermissionError if the user of this process may not make files in a folder."""
     if not os.access(folder, os.W_OK | os.X_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 def check_inside(folder: Path, path: Path) -> None:
-    """Raise CoarticError if ``path``, below ``folder``, is a symbolic link, or leads out of the
-    folder by one; the path need not exist."""
+    """Raise CoarticError if ``path``, which need not exist, is a symbolic link, or leads out of
+    ``folder``, such as by a link."""
     inside = Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
     if path.is_symlink() or not inside:
         raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
@@ -102,15 +99,15 @@ def write_output(path: Path, data: bytes, *, replace: bool) -> None:
 
 
 def check_ending(path: Path, endings: Collection[str]) -> None:
-    """Raise CoarticError unless the name of a file ends in one of ``endings``, in small letters,
-    such as ``.svg``; ``.SVG`` passes, too."""
+    """Raise CoarticError unless the suffix of a path, such as ``.svg`` or ``.SVG``, is one of
+    ``endings``, which are in small letters."""
     if path.suffix.lower() not in endings:
         raise CoarticError(f"{path}: the name must end in {' or '.join(endings)}")
 
 
 def check_output(path: Path, *, replace: bool) -> None:
     """Raise CoarticError if a file may not be written: its folder is missing or not writable, its
-    path is a folder, a link or a device, or the file exists and ``replace`` is False."""
+    path is a link or no regular file, or the file exists and ``replace`` is False."""
     with errors_in_words(path):
         if not path.parent.is_dir():
             raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
@@ -126,7 +123,8 @@ def check_output(path: Path, *, replace: bool) -> None:
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
     """Return the name of a file or folder, which need not exist, as a path. Raises CoarticError,
-    which calls the name ``what``, if it is neither text nor path, is empty, or is not possible."""
+    which calls the name ``what``, if the name is neither text nor path, is a blank text, or cannot
+    be a name here."""
     if not isinstance(name, str | os.PathLike):
         raise CoarticError(f"{what} is {plain(repr(name), 80)}: needed is a text or a path")
     if isinstance(name, str) and not name.strip():

@@ -1,7 +1,7 @@
-"""End an interrupted command with one sentence, and exit code 130 or 143.
+"""End an interrupted command with one line, and exit code 130 or 143.
 
-Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt, so that each ``with`` ends workers and removes
-temporary folders. Runs that are stored stay stored.
+Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt, so that each ``with`` ends its workers and
+removes its temporary folders.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _words = ["Interrupted."]
 
 
 def catch_signals() -> None:
-    """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP), unblocked, raise KeyboardInterrupt
-    from now on, except in the 5 s after a signal that did. A signal that this process was started
-    to ignore, as under ``nohup``, stays ignored."""
+    """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) raise KeyboardInterrupt from now
+    on, except in the 5 s after a KeyboardInterrupt that Python did not lose
+    (:func:`_interrupt_again`); unblock all signals. A signal ignored, as by ``nohup``, stays so."""
 
     def interrupt(number: int, _: object) -> None:
         if not _heard or time.monotonic() > _heard[-1][1] + _CLEANING_S:
@@ -47,9 +47,10 @@ def catch_signals() -> None:
 
 
 def _interrupt_again(lost: UnraisableHookArgs) -> None:
-    """Repeat a KeyboardInterrupt that Python could not pass on from a destructor or a callback,
-    such as LLVM's; report any other lost exception. A signal that comes before this hook returns
-    would be lost, too, so it is sent three times, and ignored once it was raised."""
+    """Repeat a KeyboardInterrupt of a signal that Python could not pass on from a destructor or a
+    callback, such as LLVM's; report any other lost exception. A signal that comes before this hook
+    returns would be lost, too: so the signal is sent three times, and ignored once it has raised
+    KeyboardInterrupt."""
     if lost.exc_type is not KeyboardInterrupt or not _heard:
         sys.__unraisablehook__(lost)
         return
@@ -71,8 +72,8 @@ def _interrupt_again(lost: UnraisableHookArgs) -> None:
 
 @contextmanager
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
-    """If the block of this context is interrupted, call ``sentence`` and note the text that it
-    returns, which :func:`end_if_interrupted` prints at the end of the process."""
+    """Call ``sentence`` if KeyboardInterrupt ends the block of this context, and note the text that
+    it returns, for :func:`end_if_interrupted` to print; the exception passes."""
     try:
         yield
     except KeyboardInterrupt:
@@ -81,13 +82,13 @@ def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
 
 
 def end_if_interrupted() -> None:
-    """Exit if a signal has interrupted this process: print ``Interrupted.`` and the sentences of
-    :func:`interruptible` on stderr, and exit with code 130 after Ctrl-C, else 143. If none has,
-    return. Either way these signals are ignored from now on."""
+    """Exit if a signal has interrupted this process: print ``Interrupted.`` and the texts noted by
+    :func:`interruptible` on stderr, and exit with code 130 if the first signal was Ctrl-C, else
+    143. Otherwise return. The signals :data:`ENDING` are ignored from now on."""
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     if _heard:
-        with suppress(OSError):  # nobody may be there to read it
+        with suppress(OSError):  # stderr may be closed
             os.write(2, f"{' '.join(_words)}\n".encode())
         sys.exit(130 if _heard[0][0] == signal.SIGINT else 143)
 
@@ -95,7 +96,7 @@ def end_if_interrupted() -> None:
 @contextmanager
 def blocked_signals() -> Iterator[None]:
     """Block the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) in the block of this context, also
-    for processes that start in it, because Ctrl-C reaches all processes of a terminal."""
+    for processes that start in the block; do nothing on Windows."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -1,4 +1,5 @@
-"""Packages that import a name when it is asked for: the compiler takes a while, and few need it."""
+"""Packages that import a name when it is asked for: the compiler takes a while to import, and few
+commands need it."""
 
 from __future__ import annotations
 
@@ -12,8 +13,8 @@ from typing import Any
 def import_lazily(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return the functions ``__getattr__`` and ``__dir__`` for module ``package``, whose names are
-    imported on first use. ``homes`` has the module in which each name is defined, by name.
+    """Return the functions ``__getattr__`` and ``__dir__`` for module ``package``, which imports
+    names on first use. ``homes`` has, by name, the module in which the name is defined.
     ``__getattr__`` raises AttributeError for any other name."""
     module = sys.modules[package]
 
@@ -31,7 +32,7 @@ def import_lazily(
 
 
 def moved(old: str, new: str) -> None:
-    """Import module ``new`` and make it answer to its former name ``old``, too, with a
-    DeprecationWarning."""
+    """Warn (DeprecationWarning) that module ``old`` is called ``new`` now, and import ``new`` under
+    its former name, too."""
     warnings.warn(f"{old} is {new} now", DeprecationWarning, stacklevel=3)
     sys.modules[old] = import_module(new)

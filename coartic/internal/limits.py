@@ -17,35 +17,50 @@ MOST_CELLS = 10_000
 MOST_RUNS = 1_000_000
 """Most runs of a cell."""
 MOST_TRIALS = 10_000_000
-"""Most trials of a run, whose rewards are kept."""
+"""Most trials of a run; the rewards of all of them are kept."""
 MOST_SECONDS = 1_000_000
 """Most seconds of a run: a system can wait for twice that at most."""
 MOST_SEED = 2**63 - 1
 """Largest seed of a suite."""
 MOST_RUN_SEED = 2**128 - 1
-"""Largest seed of a run: some are hashes."""
+"""Largest seed of a run."""
 MOST_BYTES = 10_000_000
-"""Most bytes of the file of a method."""
+"""Most bytes of a file that users write, unless a reader sets another limit."""
 WIDTHS = (1e-9, 100.0)
 """Least and greatest half width of a box of targets, length unit (base) and rad (joints)."""
 
 
 def check_limits(name: str, value: Any, least: float, most: float) -> None:
     """Raise ValueError, which calls the value ``name``, unless it is a number from ``least`` to
-    ``most``, both included, and whole if ``least`` is an ``int``. True and False are no numbers."""
+    ``most``, both included, and an integer (not 3.0) if ``least`` is an ``int``. True and False are
+    no numbers."""
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
     is_number = isinstance(value, kind) and not isinstance(value, bool)
-    if not is_number or is_span(value) or not least <= value <= most:
+    if not is_number or is_time(value) or not least <= value <= most:
         raise ValueError(
             f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
             f"from {least:{'' if whole else 'g'}} to {most:{',' if isinstance(most, int) else 'g'}}"
         )
 
 
-def is_span(value: Any) -> bool:
-    """Return whether a value is a span of time of NumPy (``timedelta64``), or an array of them."""
-    return getattr(getattr(value, "dtype", None), "kind", "") == "m"
+def is_time(value: Any) -> bool:
+    """Return whether a value is a time or a span of time of NumPy, or an array of either."""
+    return getattr(getattr(value, "dtype", None), "kind", "") in ("M", "m")
+
+
+def plain_values(value: Any) -> Any:
+    """Return a value with ``x.item()`` in place of each scalar x of NumPy, also in copies of lists,
+    tuples and dictionaries; a text in place of a time or a span of time."""
+    import numpy as np
+
+    if type(value) in (list, tuple):
+        return type(value)(map(plain_values, value))
+    if type(value) is dict:
+        return {name: plain_values(each) for name, each in value.items()}
+    if isinstance(value, np.generic):
+        return str(value) if is_time(value) else value.item()
+    return value
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
@@ -71,7 +86,8 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
     except ValueError:
         raise ValueError("should be real numbers, in rows of one length") from None
     if array.dtype == object and all(
-        isinstance(each, numbers.Real) and not is_span(each) for each in array.flat
+        isinstance(each, numbers.Real) and not isinstance(each, bool) and not is_time(each)
+        for each in array.flat
     ):
         with suppress(OverflowError):  # an integer beyond 1e308
             array = array.astype(np.float64)  # a nullable column of pandas
@@ -81,21 +97,22 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
 
 
 def _refuse_entries(value: Any) -> None:
-    """Raise ValueError for an array with masked entries, or a list or tuple that contains such an
-    array, True or False at any depth."""
+    """Raise ValueError for an array with masked entries, and for a list or tuple that contains, at
+    any depth, such an array, True, False or an array of bools."""
     import numpy as np
 
     if isinstance(value, list | tuple):
         for each in value:
-            if isinstance(each, bool):
-                raise ValueError(f"should be real numbers, without {each}")
+            if isinstance(each, bool) or getattr(getattr(each, "dtype", None), "kind", "") == "b":
+                raise ValueError("should be real numbers, without True or False")
             _refuse_entries(each)
     elif isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise ValueError("should have no masked entries")
 
 
 def brief_value(value: object) -> str:
-    """Return the ``repr`` of a value as one printable line, cut to 80 characters."""
+    """Return the ``repr`` of a value as one printable line, cut to 80 characters, or, if ``repr``
+    fails, a text with its type."""
     try:
         return plain(repr(value), 80)
     except Exception:  # an integer of more digits than Python writes, or an object of the user

@@ -17,22 +17,23 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 LONGEST_LINE = 500
-"""Characters of a title, a description, a citation or the ``repr`` of an object."""
+"""Most characters of a title, a description, a citation or the ``repr`` of an object."""
 LONGEST_REASON = 2000
-"""Characters of a reason that is kept."""
+"""Most characters of a reason that is kept."""
 _MOST_NAMED = 12  # in a sentence
 _MOST_FIGURES = 12  # of an array in a repr
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
     """Return text as one printable line (:func:`one_line`), without blanks at its ends; a line of
-    more than ``most`` characters is cut to that length and ends in ``…``."""
+    more than ``most`` characters is cut to that length and ends in ``…``. Only the first
+    4 ``most`` characters of the text count."""
     line = one_line(text.strip()[: 4 * most])  # an escape takes longer than what it shows
     return line if len(line) <= most else line[: most - 1] + "…"
 
 
 def error_line(error: BaseException) -> str:
-    """Return an exception as one printable line, ``ValueError: message``."""
+    """Return an exception as one printable line (:func:`plain`), such as ``ValueError: text``."""
     try:
         text = str(error)
     except Exception:
@@ -68,8 +69,8 @@ def counted(count: int, thing: str) -> str:
 
 def short_repr(thing: object, /, *texts: str, **facts: Any) -> str:
     """Return ``Class(text, fact=value)`` for an object, in one line, cut to :data:`LONGEST_LINE`
-    characters: ``texts``, then the ``repr``, cut to 80 characters, of each of ``facts`` by name. An
-    array that is not one row of at most 12 numbers is shown by its shape."""
+    characters: ``texts``, then each of ``facts`` by name: its ``repr``, cut to 80 characters, or of
+    a value of NumPy the entries, if they are one row of at most 12, else the shape."""
     parts = list(texts)
     for name, value in facts.items():
         if not hasattr(value, "shape"):
@@ -97,8 +98,8 @@ RENAMED = {
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return ``; did you mean 'a'?`` with the one of ``names`` nearest to ``name``; an empty text
-    if none is near. Nearest are names that begin with ``name``, capitals and punctuation aside,
+    """Return ``; did you mean 'a'?`` with the nearest of ``names`` to ``name``; an empty text if no
+    name is near. Nearest are names that begin with ``name``, capitals and punctuation aside,
     then names that are spelt alike, then names that end in the same word. For the earlier id of a
     renamed method among ``names`` the text is ``; its present id is 'a'``."""
     if RENAMED.get(name) in (names := list(names)):
@@ -134,8 +135,8 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """Return a sentence that no ``kind``, such as ``task``, is called ``name``, with the nearest of
-    ``names``, or, if none is near, with all names, or the first 12 of more than 13; for a file of
-    another program return a sentence that coartic does not read it."""
+    ``names``, or, if no name is near, with all names, or the first 12 of more than 13; for a file
+    of another program return a sentence that coartic does not read it."""
     if isinstance(name, str) and (words := foreign_file(name)):
         return f"{words}."
     several = list(names)
@@ -147,7 +148,7 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
 
 
 def _refuse_unprintable(text: str) -> str:
-    """Return the text itself. Raises a validation error if a character in it is not printable, such
+    """Return the text itself. Raises a validation error if :func:`prints` refuses a character, such
     as the end of a line."""
     if wrong := next((c for c in text if not prints(c)), ""):
         words = f"should be one line of printable text, without {escape(wrong)}"
@@ -156,6 +157,6 @@ def _refuse_unprintable(text: str) -> str:
 
 
 printable = AfterValidator(_refuse_unprintable)
-"""Refuses what is not one line of printable text."""
+"""Validator that refuses text that is not one printable line."""
 Line = Annotated[str, Field(max_length=LONGEST_LINE), printable]
-"""Line of printable text, such as a title or a citation."""
+"""Printable line, such as a title, of at most :data:`LONGEST_LINE` characters."""

@@ -22,14 +22,14 @@ from coartic.internal.interruption import ENDING
 MOST_JOBS = 10_000
 _POOLS = "OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "NUMBA_NUM", "VECLIB_MAXIMUM"
 ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
-"""Environment variables of a worker, which has one thread, as BLAS threads of workers compete."""
+"""Environment variables by which a worker has one thread: BLAS threads of workers compete."""
 
 
 @cache
 def worker_variables() -> dict[str, str]:
     """Return environment variables to set for a process in which methods run: one thread, and on
-    x86-64 OpenBLAS's kernels for Nehalem and NumPy's loops without AVX-512 (whose names depend on
-    its version), so that all processors round alike."""
+    x86-64 OpenBLAS's kernels for Nehalem and NumPy's loops without AVX-512, so that x86-64
+    processors round alike."""
     if platform.machine() not in ("x86_64", "AMD64"):
         return ONE_THREAD
     major, minor = map(int, metadata.version("numpy").split(".")[:2])
@@ -40,9 +40,9 @@ def worker_variables() -> dict[str, str]:
 
 
 def threads_for(jobs: int) -> int:
-    """Return the number of threads or processes that ``jobs`` means: ``jobs`` itself, or for -1 the
-    number of cores that the process may use. Raises ValueError for anything else that is no whole
-    number from 1 to 10,000."""
+    """Return the number of threads or processes that ``jobs`` means: ``jobs`` itself, a whole
+    number from 1 to 10,000, or for -1 the number of cores that the process may use. Raises
+    ValueError for anything else."""
     if not (isinstance(jobs, Integral) and jobs == -1):
         from coartic.internal.limits import check_limits  # which needs NumPy
 
@@ -56,8 +56,8 @@ def threads_for(jobs: int) -> int:
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
     """Call ``work`` with consecutive slices that together cover the indices 0 to ``count`` - 1, in
     parallel: at least ``least`` indices each, unless one slice has all, and at most as many slices
-    as ``OMP_NUM_THREADS`` says, or, if it is not set, as the process may use cores. Returns when
-    all calls have ended; raises what ``work`` raises."""
+    as ``OMP_NUM_THREADS`` says, or, if it has no number, as the process may use cores. Returns when
+    all calls have ended; an error that ``work`` raises passes."""
     if count < 2 * least:
         work(slice(0, count))
         return
@@ -88,9 +88,9 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
-    """Make this process a worker: the leader of a new group of processes, with the first
-    ``streams`` of input, output and errors connected to the null device. When the parent process
-    has ended, a thread removes ``folder``, if one is given, and kills the group."""
+    """Make this process a worker: the leader of a new group of processes (not on Windows), with the
+    first ``streams`` of input, output and errors connected to the null device. When its parent by
+    ``multiprocessing`` has ended, a thread removes ``folder``, if given, and kills the group."""
 
     def end_with_parent() -> None:
         if (parent := multiprocessing.parent_process()) is not None:
@@ -109,8 +109,8 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
 
 
 def end_group(pid: int) -> None:
-    """Kill the group of processes that process ``pid`` leads, if it leads one, and process ``pid``;
-    do nothing if neither exists."""
+    """Kill the group of processes that process ``pid`` leads, and process ``pid``; pass over either
+    that does not exist or may not be killed."""
     for end in (getattr(os, "killpg", None), os.kill):
         if end is not None:
             with contextlib.suppress(OSError):

@@ -22,7 +22,8 @@ _TEXTS = re.compile(
 )
 """Texts and comments of TOML."""
 _MANY_PARTS = re.compile(r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){100}")
-"""A name of more than 100 parts, which takes Python minutes to read, in TOML without texts."""
+"""Beginning of a name of more than 100 parts, in TOML without texts; far longer names take Python
+minutes to read."""
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
@@ -49,7 +50,7 @@ def check_file(
     path: str | Path, *, error: type[CoarticError] = CoarticError, most: int = MOST_BYTES
 ) -> None:
     """Raise an exception of class ``error``, which names the file, if it is missing, may not be
-    read, is a folder, a pipe or a device, or has more than ``most`` bytes."""
+    read, is no regular file, or has more than ``most`` bytes."""
     shown = plain(str(path), LONGEST_LINE)
     try:
         found = Path(path).stat()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
-from coartic.internal.limits import brief_value
+from coartic.internal.limits import brief_value, plain_values
 from coartic.internal.text import counted, did_you_mean, plain, short_repr
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ _LISTS = {
 
 
 def in_sentences(kind: type[T]) -> type[T]:
-    """Change a pydantic class, in place, and return it: wrong arguments raise ValueError with a
-    sentence for each problem; a model's arguments without names raise TypeError."""
+    """Change a pydantic class, in place, and return the class: wrong arguments raise ValueError
+    (:func:`explain_inline`), and a model's arguments without names TypeError."""
     init: Any = kind.__init__
 
     @wraps(init)
@@ -60,7 +60,7 @@ def in_sentences(kind: type[T]) -> type[T]:
             name = next(iter(type(self).model_fields))
             raise TypeError(f"{type(self).__name__} takes arguments by name, such as {name}=...")
         try:
-            init(self, *args, **given)
+            init(self, *plain_values(args), **plain_values(given))
         except ValidationError as error:
             fields = [*type(self).__pydantic_fields__]
             raise ValueError(f"{type(self).__name__}: {explain_inline(error, fields)}") from None
@@ -70,8 +70,8 @@ def in_sentences(kind: type[T]) -> type[T]:
 
 
 def changed_values(thing: Any) -> dict[str, Any]:
-    """Return, by name, the values of a pydantic object's fields that differ from the default of the
-    field or whose field has no default."""
+    """Return, by name, the values of a pydantic object's fields that have no default, or whose
+    value differs from the default."""
     return {
         name: getattr(thing, name)
         for name, field in type(thing).__pydantic_fields__.items()
@@ -81,8 +81,9 @@ def changed_values(thing: Any) -> dict[str, Any]:
 
 
 def equal_contents(a: Any, b: Any) -> Any:
-    """Return whether two objects are of one class and equal in all fields, arrays by their entries,
-    NaN as NaN: the ``__eq__`` of classes with arrays. NotImplemented for objects of two classes."""
+    """Return whether two objects of one class are equal in all fields that count, arrays by shape
+    and entries, in which NaN and masked entries are equal: the ``__eq__`` of classes with arrays.
+    NotImplemented for objects of two classes."""
     import numpy as np
 
     def plain(value: Any) -> Any:
@@ -103,13 +104,13 @@ def equal_contents(a: Any, b: Any) -> Any:
 
 @in_sentences
 class FileData(BaseModel):
-    """Content of a file, which cannot be changed and has known keys only."""
+    """Content of a file, whose fields cannot be set and whose unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     __eq__ = equal_contents
 
     def __repr__(self) -> str:
-        """Return the class with the values that differ from the defaults, in one line."""
+        """Return, in one line, the class with the values that are not defaults."""
         return short_repr(self, **changed_values(self))
 
     def __str__(self) -> str:
@@ -117,9 +118,9 @@ class FileData(BaseModel):
 
 
 def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
-    """Return lines ``source: sentence``, one for each of the first 20 problems in ``error`` of file
-    ``source``, and, if there are more, a last line with their number. ``keys`` are the keys that
-    the file may have in any of its tables."""
+    """Return lines ``source: sentence`` on the first 20 problems in ``error`` of file ``source``
+    (:func:`_explain_first`), and, if there are more, a last line with the number of further
+    problems. ``keys`` are the keys that the file may have in any of its tables."""
     sentences, more = _explain_first(error.errors(include_url=False), list(keys))
     lines = [f"{plain(source)}: {sentence}" for sentence in sentences]
     if more:
@@ -128,15 +129,15 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
-    """Return a sentence for each of the first 20 problems of an object's arguments, joined by
-    semicolons. ``keys`` are the names of the arguments that it takes, in their order."""
+    """Return sentences on the first 20 problems of an object's arguments (:func:`_explain_first`),
+    joined by semicolons. ``keys`` are the names of the arguments of its class, in order."""
     return "; ".join(_explain_first(error.errors(include_url=False), keys)[0])
 
 
 def explain_call(error: ValidationError, keys: Sequence[str], given: dict[int | str, Any]) -> str:
-    """Return a sentence for each of the first 20 wrong arguments of a call, joined by semicolons;
-    an argument that may be of several kinds has one sentence. ``keys`` are the names of the
-    arguments in order, ``given`` the arguments, by place from 0 or by name."""
+    """Return sentences on the first 20 problems of a call's arguments (:func:`_explain_first`),
+    joined by semicolons; an argument of none of several kinds has one sentence. ``keys`` are the
+    names of the arguments in order, ``given`` the arguments, by place from 0 or by name."""
     problems: dict[tuple[int | str, ...], ErrorDetails] = {}
     for detail in error.errors(include_url=False):
         place = detail["loc"]
@@ -151,7 +152,8 @@ def explain_call(error: ValidationError, keys: Sequence[str], given: dict[int | 
 
 def _explain_first(details: list[ErrorDetails], keys: Sequence[str]) -> tuple[list[str], int]:
     """Return a list of sentences on the first 20 problems, each sentence once, and the number of
-    further problems. ``keys``: names of the keys that a file has, or of arguments in order."""
+    further problems; a list that is too short counts only alone. ``keys``: names of the keys that
+    a file has, or of arguments in order."""
     # A list is counted too short without its bad entries.
     details = [d for d in details if d["type"] != "too_short"] or details[:1]
     sentences = (plain(_explain_problem(detail, keys)) for detail in details[:_SHOWN])
@@ -164,9 +166,9 @@ def sentence_error(text: str) -> PydanticCustomError:
 
 
 def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
-    """Return one sentence about a problem, with its key. ``keys``: the known keys, in the order of
-    arguments; the sentence names the known key nearest to an unknown key, and calls argument k
-    (from 0) without a name ``keys[k]``."""
+    """Return a sentence about a problem. ``keys``: the known keys, in the order of arguments; the
+    sentence names the known key nearest to an unknown key, and calls argument k (from 0) without a
+    name ``keys[k]``."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
         if not key and isinstance(part, int) and part < len(keys):

@@ -1,2 +1,2 @@
-"""Pictures of the robot, movements tick by tick, and films of them. They know executed solutions,
-not who found them."""
+"""Pictures of the robot, movements tick by tick, and films of movements. Modules here know executed
+solutions, not who found them."""

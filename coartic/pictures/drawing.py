@@ -1,7 +1,7 @@
 """The robot and its goals, by the conventions of the paper's figures.
 
-Open squares mark the left arm, closed circles the right one, open circles the goals
-with their number above (paper, Figures 1, 4 and 6).
+Open squares mark the left arm, closed circles the right arm, open circles with a number the goals
+(paper, Figures 1, 4 and 6).
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def draw_robot(
 ) -> Callable[[Array], None]:
     """Draw the base and the arms of the task's hands in configuration ``q``, shape ``(dof,)``;
     return a function that moves the drawing to another configuration. ``weight`` scales the width
-    of lines; ``alpha`` is the opacity, from 0 to 1. Set the limits of ``axes`` yourself: the base
-    does not widen them."""
+    of lines, ``alpha`` is their opacity, from 0 to 1, ``colour`` their colour. Set the limits of
+    ``axes`` yourself: the base does not widen them."""
     base = Polygon(
         task.robot.base_outline(q),
         facecolor=(_BASE_GREY, 0.25 * alpha),
@@ -107,7 +107,8 @@ def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Ar
     """Return the lower left and the upper right corner, shape ``(2,)``, length unit, of a box
     around the goals and the robot in ``configurations``, shape ``(..., dof)``.
 
-    ``margin`` is the free border, length unit, for arms of length 4; it scales with the arms.
+    ``margin`` is the free border, length unit, for arms of length 4; it scales with the shorter
+    arm.
     """
     margin *= task.robot.scale
     points = [

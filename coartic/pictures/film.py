@@ -1,7 +1,7 @@
 """Movements tick by tick as a GIF or an MP4, in the colours of the play page.
 
-Open squares mark the left arm, closed circles the right one; goals are numbered circles,
-filled from the tick at which they are hit, when the film pauses. Thin lines trace both hands.
+Open squares mark the left arm, closed circles the right arm; goals are numbered circles, filled
+from the tick at which they are hit, when the film pauses. Pale lines trace the hands.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from coartic.pictures.trajectories import Trajectory
 
 LASTS_S = 10.0
-"""Seconds that the longest movement takes; one of fewer ticks than frames takes less."""
+"""About the seconds, without pauses, of the longest movement; of fewer than 125 ticks less."""
 PAUSE_S, HOLD_S = 0.5, 2.5
-"""Seconds that the film stands where a goal is hit, and at the end."""
+"""About the seconds that the film stands where a goal is hit, and at the end."""
 COLOURS = "#0072b2", "#c04a00"
 RATE = 12.5  # frames per second, at most: a GIF's file grows with its frames
 _DPI = 100
@@ -47,22 +47,23 @@ def write_film(
     width: int = 800,
     replace: bool = False,
 ) -> tuple[int, float]:
-    """Write a film, ``width`` pixels wide, of movements side by side, all from their first tick;
-    return the number of frames that differ, and the ticks that are shown in a second.
+    """Write a film, ``width`` pixels wide (MP4: rounded down to even), of movements side by side,
+    all from their first tick; return the number of frames that differ, and the ticks that are shown
+    in a second.
 
-    ``movements`` are pairs of a title and a trajectory. A movement that ends before the longest one
-    then stands still. Raises CoarticError for movements without a tick, for an ending other than
-    .gif and .mp4, for MP4 without ffmpeg, and if the file cannot be written, or is there without
-    ``replace``.
-    """
+    ``movements`` are pairs of a title and a trajectory. A movement that ends before the longest
+    movement then stands still. Raises CoarticError for a movement without a tick, for an ending
+    other than .gif and .mp4, for MP4 without ffmpeg, and if the file cannot be written, or is there
+    without ``replace``."""
     check_ending(path, [".gif", ".mp4"])
     is_mp4 = path.suffix.lower() == ".mp4"
     if is_mp4 and not FFMpegWriter.isAvailable():
         raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
     check_output(path, replace=replace)
-    ticks = max(len(movement.configurations) for _, movement in movements)
-    if ticks == 0:
+    lengths = [len(movement.configurations) for _, movement in movements]
+    if 0 in lengths:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
+    ticks = max(lengths)
     # A frame shows a tick or more, and stands for whole hundredths of a second, as GIF has them.
     speed = max(ticks / LASTS_S, RATE)
     stride = max(1, math.ceil(speed / RATE - 1e-9))

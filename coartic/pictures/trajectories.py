@@ -1,4 +1,4 @@
-"""A solution tick by tick: what :func:`coartic.motion.solution.execute` scores, spelled out."""
+"""A solution tick by tick: the movements that :func:`coartic.motion.solution.execute` scores."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class Trajectory:
     """Execution of the solution (:func:`coartic.execute`)."""
     configurations: Array
     """Configurations passed, shape ``(ticks, dof)``, length unit (base) and rad (joints): a row
-    each control tick, the first one the start. A movement of k steps gives k + 1 rows, the last
-    one the tick that detects its end, so the next movement's first row repeats it."""
+    for each control tick, the first row the start. A movement of k steps gives k + 1 rows: the
+    first row of the next movement repeats the last row."""
     hits: NDArray[np.int64]
     """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
     of its own has the row in which the robot stood; 0 before the first tick."""
@@ -67,7 +67,7 @@ class Trajectory:
 
     @property
     def reward(self) -> int:
-        """Total reward: -1 a tick."""
+        """Total reward: minus the ticks."""
         return -self.execution.ticks
 
     def hand_path(self, hand: Hand) -> Array:
@@ -139,10 +139,10 @@ class Trajectory:
         width: Annotated[int, Field(ge=200, le=3840)] = 560,
         replace: bool = False,
     ) -> None:
-        """Write a film of the movement, ``width`` pixels wide, as a file ``.gif`` or, where ffmpeg
-        is installed, ``.mp4``; with ``replace`` a file that is there is written over. Raises
-        CoarticError for another ending, if no control tick was made, and if the file cannot be
-        written, or is there and ``replace`` is False."""
+        """Write a film of the movement, ``width`` pixels wide (MP4: rounded down to even), as a
+        file ``.gif`` or, where ffmpeg is installed, ``.mp4``; with ``replace`` a file that is there
+        is written over. Raises CoarticError for another ending, if no control tick was made, and if
+        the file cannot be written, or is there and ``replace`` is False."""
         from coartic.pictures.film import write_film
 
         title = f"{self.task.name}, {self.execution.hands}"

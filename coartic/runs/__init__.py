@@ -1,2 +1,2 @@
-"""Runs as they are planned and stored. The room knows a method by its name, version and
+"""Runs as they are planned and stored. Modules here know a method by its name, version and
 parameters, not how it works."""

@@ -45,8 +45,8 @@ def version_of(code: str) -> str:
 
 def run_identity(run_id: str) -> tuple[str, str]:
     """Return what identifies a run, from its id: the hex digits at its beginning, and the version
-    for which the code at its end stands (:func:`version_of`). Ids of equal pairs name the same run,
-    whatever version of coartic stored it."""
+    for which the code at its end stands (:func:`version_of`). Ids of equal pairs name the same
+    run."""
     digits, _, code = run_id.partition("-")
     return digits, version_of(code)
 
@@ -62,11 +62,11 @@ class MethodInfo:
     information: tuple[str, ...]
     """Information that the method declares."""
     stochastic: bool
-    """True if the seed matters; a method without it is run once on a task."""
+    """True if the seed matters; other methods are run once on a task."""
     defaults: dict[str, Any]
-    """Default of each parameter; None for a parameter without a default."""
+    """Default of each parameter, by name; None for a parameter without a default."""
     origin: str
-    """``built in``, or the path of a method file."""
+    """``built in``, or the path of a method file, as a printable line."""
     code: str
     """Versions of model and method, such as ``1.2``; for a method file, the hash of what its
     results come from (:mod:`coartic.benchmarks.own_code`)."""
@@ -93,8 +93,8 @@ class MethodInfo:
         return self.where, self.name, "" if self.is_ours else self.code
 
     def load(self) -> type[Method]:
-        """Import the method and return its class; a process imports it once for each ``code``, and
-        notices no change of the file. Raises CoarticError if the method is not there."""
+        """Import the method and return its class (:func:`load_method`); a process imports it once
+        for each ``code``, and notices no change of the file."""
         return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
@@ -109,15 +109,15 @@ class MethodInfo:
         return dict(self._ask("complete", parameters))
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
-        """Return the reason why the method with parameters does not apply to a task; None if it
-        applies. Raises CoarticError for wrong parameters."""
+        """Return the reason why the method with parameters (None: defaults) does not apply to a
+        task; None if it applies. Raises CoarticError as :func:`answer`."""
         reason = self._ask("why_not", parameters or {}, *outline_of(task))
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:
-        """Return a dictionary: ``quick`` has parameters with which a check takes seconds,
-        ``config`` two settings of Pydantic: ``extra`` is ``"forbid"`` if unknown parameters are
-        refused, ``frozen`` is True if parameters cannot be changed."""
+        """Return a dictionary: ``quick`` has :attr:`.Method.quick`, ``config`` two settings of
+        Pydantic: ``extra`` is ``"forbid"`` if unknown parameters are refused, ``frozen`` is True if
+        parameters cannot be set."""
         return dict(self._ask("rules"))
 
     def _ask(self, question: str, *arguments: Any) -> Any:
@@ -138,8 +138,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     ``"complete"``, ``"why_not"`` or ``"rules"``.
 
     ``arguments`` are parameters (none for ``"rules"``), then for ``"why_not"`` the entries of an
-    outline. Raises CoarticError for parameters that do not fit, and if ``why_not`` of the method
-    fails; other errors that a method's own check of parameters raises pass through.
+    outline. Raises CoarticError for parameters that do not fit, and if the method cannot say
+    whether it applies; other errors that a method's own check of parameters raises pass.
     """
     if question == "rules":
         config = method.Parameters.model_config
@@ -188,7 +188,8 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return the default of each parameter as plain data, None for a parameter without one."""
+    """Return the default of each parameter as plain data, by name; None for a parameter without a
+    default."""
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
         for name, field in method.Parameters.model_fields.items()
@@ -199,8 +200,8 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 @cache
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
     """Return the class of the method with id ``name`` from ``where``, a module or the path of a
-    file, which another ``code``, a hash of it, makes the process import again. Raises CoarticError
-    if it is not there."""
+    method file, which is imported once for each id and ``code``, a hash. Raises CoarticError if no
+    method there has this id; an error of the import passes."""
     is_file = where.endswith(".py")
     module = load_file(Path(where)) if is_file else importlib.import_module(where)
     for method in methods_in(module) if is_file else module.METHODS:
@@ -223,8 +224,8 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 
 def load_file(path: Path) -> ModuleType:
-    """Import a method file, also one that was imported before, and return the module; an error of
-    the file is raised as it is. Its folder is added to ``sys.path``, for modules from there."""
+    """Import a method file, again if it was imported before, and return the module; an error of the
+    file passes. The folder of the file is added to ``sys.path``, for modules from there."""
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))

@@ -22,18 +22,19 @@ from coartic.tasks.task import Task
 
 @dataclass(frozen=True)
 class Cell:
-    """A method with its parameters on a task: everything that a result depends on, but the seed."""
+    """A method with its parameters on a task, and its budget of trials."""
 
     task: Task
     method: MethodInfo
     parameters: dict[str, Any]
-    """All parameters of the method, by name."""
+    """Parameters of the method, by name (:meth:`.MethodInfo.complete`)."""
     trial_budget: int | None = None
     """Most trials of a run, without the search for initial hands; None for any number."""
 
     @property
     def setting(self) -> str:
-        """Parameters that differ from the defaults, such as ``noise_sd=0.1``; empty for none."""
+        """Parameters that differ from the defaults, as a text, such as ``noise_sd=0.1``; an empty
+        text for none."""
         defaults = self.method.defaults
         return in_words(
             {
@@ -56,7 +57,7 @@ class Cell:
     @cached_property
     def digest(self) -> str:
         """Hash, 64 hex digits, of task, method, parameters, model and trial budget; not of the
-        method's code, nor of a time limit, which can prevent a result, and cannot change one."""
+        method's code, nor of a time limit."""
         return hash_of(
             {
                 "task": self.definition,
@@ -76,14 +77,14 @@ class Job:
     seed: int
     """Seed of the suite."""
     numbers: Sequence[int]
-    """Numbers of the runs, from 0 within the cell; in a plan a range. A job of runs 50 to 99 is a
-    part of the job of runs 0 to 99, which a results folder then stores in its plan."""
+    """Numbers of the runs, from 0 within the cell; in a plan a range. A job of runs 50 to 99 is
+    stored in the plan of a results folder as the job of runs 0 to 99."""
     time_limit_s: float | None = None
-    """CPU time of all these runs together, s."""
+    """Most CPU time of all these runs together, s; None if no limit is set."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
     suite_trials: int | None = None
-    """Trials of a run by the suite's file, where the command asks for a number of its own; or
+    """Trials of a run by the suite's file, where the command asks for a number of its own; else
     None."""
     question: tuple[str, str] | None = None
     """Title and description of a suite of the user's own, run on its own tasks; or None."""
@@ -109,8 +110,8 @@ def cell_of(
 ) -> Cell:
     """Return the cell of a method on a task, with these parameters and defaults for all others.
 
-    ``trials`` becomes the default number of trials if the method has this parameter; a number in
-    ``parameters`` goes before it. Raises CoarticError for parameters that the method does not take.
+    ``trials`` becomes the default number of trials if the method has parameter ``trials``; a number
+    in ``parameters`` goes before it. Raises CoarticError for parameters that the method refuses.
     """
     if trials is not None and "trials" in method.defaults:
         method = replace(method, defaults=method.defaults | {"trials": trials})
@@ -119,7 +120,7 @@ def cell_of(
 
 
 def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
-    """Return tasks by name. Equal tasks count once. Raises CoarticError for two different tasks of
+    """Return tasks by name; equal tasks count once. Raises CoarticError for two different tasks of
     one name."""
     named = dict[str, Task]()
     for task in tasks:

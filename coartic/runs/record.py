@@ -32,19 +32,18 @@ PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 first trial of a learner) and ``replay`` (one noiseless greedy trial after learning)."""
 PARTS = tuple(PREFIXES)
 LATE = "late_imports"
-"""Entry of the details of a run: files of the user's that a run of its process first loaded, too
-late to count as the code of its method."""
+"""Entry of the details of a run: files of the user's that a run of its process was the first to
+load, too late to count as the code of its method."""
 EARLIER = "earlier_runs"
-"""Entry of the details of a run that came out otherwise after another run: its task, in a list."""
+"""Entry of the details of a run whose result differed after another run: its task, in a list."""
 _MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
 _MOST_NUMBERS = 400_000
-"""Most entries of the targets and waypoints of a solution, each of at most 25 characters."""
+"""Most numbers in the start, targets and waypoints of a solution, of at most 25 characters each."""
 LONGEST_SOLUTION = 25 * _MOST_NUMBERS
 """Most characters of the stored paths of a solution."""
 MOST_STEPS = 1_000_000
-"""Most movement steps of a solution through its targets in order; solutions of the paper's tasks
-have some thousands."""
+"""Most movement steps of a solution from the start straight through its targets and waypoints."""
 
 
 class Score(NamedTuple):
@@ -65,8 +64,9 @@ class Score(NamedTuple):
 
 def mark_of(method: str, kind: str, names: Sequence[str]) -> str:
     """Return a warning about the runs of a method, in a sentence: with ``kind`` :data:`LATE` that
-    the files ``names`` were first loaded during a run, so that changes of them are not seen; with
-    :data:`EARLIER` that results on the tasks ``names`` depend on earlier runs."""
+    the files ``names``, 5 of them at most, were first loaded during a run, so that changes are
+    not seen; with :data:`EARLIER` that results on the tasks ``names`` depend on earlier
+    runs."""
     if kind == EARLIER:
         return f"{method}: results depend on earlier runs (seen on {', '.join(names)})"
     some = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
@@ -82,20 +82,20 @@ class Times:
     """Time and memory of a run. Runs of one job share the time of the job evenly."""
 
     wall_s: float | None = None
-    """Wall time, s; None if the worker died and its start is unknown."""
+    """Wall time, s; None if unknown."""
     cpu_s: float | None = None
-    """CPU time, s."""
+    """CPU time, s; None if unknown."""
     warm: bool | None = None
-    """True if the process had run the method before."""
+    """True if the process had run the method before; None if unknown."""
     together: int = 1
     """Number of runs of the job."""
     process_peak_mb: float | None = None
-    """Most memory of the worker so far, MiB, with all its earlier runs."""
+    """Most memory of the worker so far, MiB, with all its earlier runs; None if unknown."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a run as its method states it, in plain data, before it is scored."""
+    """The result of a run, without scores."""
 
     status: Status
     """``ok``, ``infeasible``, ``solver-failed``, ``timeout`` or ``crashed``."""
@@ -104,11 +104,11 @@ class Outcome:
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
     """Movements by part (``solution``, ``initial``, ``replay``), not yet executed and scored."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Further data that the method keeps, such as corrective movements by trial."""
+    """Further data that the method or the process keeps, by name, such as :data:`EARLIER`."""
     used: tuple[str, ...] = ()
     """Declared information that the method used."""
     meter: Meter | None = None
-    """Counts of trials, of evaluations and of movements; None if the worker died."""
+    """Counts of trials, of evaluations and of movements; None if the worker gave no answer."""
     rewards: list[Annotated[int, Field(gt=-(2**31), lt=2**31)] | None] = field(default_factory=list)
     """Reward of each trial; None if the trial failed or its reward is not kept."""
     times: Times = Times()
@@ -128,7 +128,7 @@ class Run:
     scores: dict[str, Score]
     """Scores by part (``solution``, ``initial``, ``replay``); empty if the run is not ok."""
     date: str
-    """Date and time at the end of the run, UTC."""
+    """Date and time at which the run was scored, UTC."""
 
     @property
     def cell(self) -> Cell:
@@ -169,8 +169,8 @@ class Run:
 
     @property
     def counts(self) -> Any:
-        """Counts of the run (:class:`~coartic.method.Meter`), without values (None) if the worker
-        died."""
+        """Counts of the run, by the names of :class:`~coartic.method.Meter`, each None if the
+        worker gave no answer."""
         return self.outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter())))
 
     @property
@@ -187,13 +187,13 @@ class Run:
 
     @property
     def late_corrections(self) -> int | None:
-        """Corrective movements in the last tenth of a learner's trials; None if they were not
-        counted."""
+        """Corrective movements in the last tenth of a learner's trials after trial 0; None if they
+        were not counted."""
         return self._corrections(-1)
 
     def _corrections(self, place: int) -> int | None:
-        """Return the corrective movements of a learner in a tenth of its trials after trial 0 (1 to
-        10; -1 is the last); None unless the method stored a list of 11 counts by this name."""
+        """Return the corrective movements of a learner in tenth ``place``, from 1 (-1: the last),
+        of its trials after trial 0; None unless the details have a list of 11 counts."""
         counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
         if not isinstance(counts, list) or len(counts) != 11:
             return None
@@ -207,8 +207,8 @@ class Run:
         return meter is not None and self.outcome.rewards.count(None) > meter.failed_trials
 
     def downsample(self) -> Run:
-        """Return a copy of the run with the rewards of its best trial and of the trials that were
-        better than all earlier trials, and None for other trials."""
+        """Return a copy of the run with the rewards of its best trial and of each trial that was
+        better than all earlier trials, and None as the reward of other trials."""
         best, solved, kept = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
             better = reward is not None and reward > best
@@ -218,8 +218,8 @@ class Run:
 
     @cached_property
     def result(self) -> str:
-        """Hash, 16 hex digits, of status, movements with their ticks and configurations, and
-        rewards of all trials; not of times and counts."""
+        """Hash, 16 hex digits, of status, movements with their ticks and configurations, and the
+        rewards that are kept; not of times and counts."""
         movements = [[part, *each] for part in PARTS for each in self.movement_data(part)]
         content = json.dumps([self.outcome.status, *movements]).encode()
         return hashlib.sha256(content + reward_bytes(self.outcome.rewards)).hexdigest()[:16]
@@ -306,10 +306,10 @@ COLUMNS = (
      "versions of model and method, such as `1.2`; of a method file a hash of its code"),
     ("packages", "TEXT", "", "hash of the versions of Python and of libraries"),
 )  # fmt: skip
-"""Columns of view ``runs``, which has a row for each run of the plan; SQL, data frames and
-documentation follow from them. Each has its name; its type in SQL, with ``NOT NULL`` if every run
-has a value; the attribute of :class:`Run` that table ``results`` stores, empty for a column of
-another table; and a sentence of the documentation."""
+"""Columns of view ``runs``, which has a row for each stored run of the plan; SQL, data frames and
+documentation follow from them. Each has its name; its type in SQL, with ``NOT NULL`` if table
+``results`` has a value for every run; the attribute of :class:`Run` that table ``results`` stores,
+empty for a column of another table; and a phrase of the documentation."""
 
 
 def movement_data(movement: Movement) -> list[Any]:
@@ -317,8 +317,8 @@ def movement_data(movement: Movement) -> list[Any]:
     send, hashes count and folders store movements.
 
     The path is JSON: the target, or the waypoints of a movement of kind ``path``, without the sign
-    of -0.0; None stands for missing ticks and a missing target. Raises TypeError, ValueError or
-    AttributeError for a movement that has no such form.
+    of -0.0; None stands for missing ticks and a missing target. Raises an error, such as TypeError
+    or ValueError, for a movement that has no such form.
     """
     m, place = movement, movement.target
     if m.waypoints is not None:
@@ -331,8 +331,8 @@ def movement_data(movement: Movement) -> list[Any]:
 
 
 def movement_from(data: Sequence[Any]) -> Movement:
-    """Return a movement from the list that :func:`movement_data` returns. Raises TypeError,
-    ValueError or IndexError for other data."""
+    """Return a movement from the list that :func:`movement_data` returns. Other data may raise
+    TypeError, ValueError or IndexError."""
     goal, hand, kind, ticks, text = data
     place = None if text is None else real_array("a path", json.loads(text))
     if kind == "path" and place is not None:
@@ -364,8 +364,8 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
-    """Return the error of a solution with more than 10,000 movements, 400,000 numbers or
-    :data:`MOST_STEPS` steps; None for any other solution."""
+    """Return the error of a solution with more than 10,000 movements, :data:`_MOST_NUMBERS` numbers
+    or :data:`MOST_STEPS` steps between configurations; None for any other solution."""
     if len(solution) > _MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
     corners = [task.q0]

@@ -21,7 +21,7 @@ PACKED = ".sqlite.xz"
 
 def open_shipped(suite: str) -> AbstractContextManager[Store]:
     """Open the shipped results of a suite, unpacked in memory. Raises CoarticError if the suite has
-    no shipped results, or if their file was changed."""
+    no shipped results, or if their file was changed or cannot be read."""
     path = SHIPPED_FOLDER / f"{suite}{PACKED}"
     try:
         hashes = shipped_hashes()
@@ -36,9 +36,8 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
 
 
 def open_results(folder: Path) -> AbstractContextManager[Store]:
-    """Open a results folder for reading, or by the name ``shipped`` the shipped results of suite
-    ``comparison``. Raises CoarticError for a folder without results in this version's format, while
-    a run writes into it, and for shipped results that were changed."""
+    """Open a results folder for reading (:func:`open_store`), or, by the name ``shipped``, the
+    shipped results of suite ``comparison`` (:func:`open_shipped`)."""
     return open_shipped("comparison") if str(folder) == SHIPPED else open_store(folder)
 
 

@@ -2,7 +2,7 @@
 
 ``plan`` has a row for each cell that the last ``coartic run`` asked for; ``cells`` has these cells
 and the cells of earlier commands. ``results`` has a row for each run, ``movements`` for each
-movement of its solutions, ``learning`` the rewards of its trials. The views ``runs`` and
+movement of its parts, ``learning`` the rewards of its trials. The views ``runs`` and
 ``solutions`` show the runs of the plan; docs/results.md lists their columns. One process writes, a
 batch of finished runs at a time; whatever interrupts it, a batch is there whole or not at all.
 """
@@ -171,7 +171,7 @@ class _Surroundings(BaseModel):
 
 
 class Store:
-    """The runs of one results folder, from :func:`open_store` or :func:`writing`."""
+    """The runs of one results folder."""
 
     def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
         self.folder = folder
@@ -181,16 +181,16 @@ class Store:
     # The plan.
 
     def begin_as(self, other: Store) -> bool:
-        """If this store has no run, replace its content by a copy of another store's, and return
-        True; else return False."""
+        """Replace the content of this store by a copy of another store's content, and return True,
+        if this store has no run; else return False."""
         if empty := not self.ids():
             other._db.backup(self._db)
         return empty
 
     def replace_plan(self, plan: Sequence[Job], made_with: Mapping[str, Any]) -> None:
-        """Put a plan in place of the earlier plan, whose runs stay in the file. ``made_with`` has
-        versions, platform, commit, ``command`` and ``date`` of this command, by name. Raises
-        CoarticError if the folder holds another suite."""
+        """Put a plan, a list of jobs, in place of the earlier plan, whose runs stay in the file.
+        ``made_with`` has versions, platform, commit, ``command`` and ``date`` of this command, by
+        name. Raises CoarticError if the folder holds another suite."""
         first = plan[0]
         environment = dict(made_with)
         if first.suite_trials is not None:
@@ -221,7 +221,7 @@ class Store:
 
     def plan(self) -> list[Job]:
         """Return the plan of the folder, a list of the jobs of the last suite; ``where`` of their
-        methods is empty. Raises CoarticError if no plan is stored yet, or if it was changed since.
+        methods is empty. Raises CoarticError if no plan is stored yet, or if it is not as written.
         """
         with explain_errors(self.folder):
             suite = self._suite()
@@ -255,8 +255,9 @@ class Store:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """Write all changes of this block, or none if it fails. A block within another block is a
-        part of that block. Raises CoarticError if the disk is full or the file is gone."""
+        """Write all changes of the block of this context, or none if the block fails. A block
+        within another block is a part of the outer block. Raises CoarticError for an error of
+        SQLite, such as a full disk."""
         if self._db.in_transaction:
             yield
             return
@@ -274,24 +275,25 @@ class Store:
 
     def present(self) -> list[tuple[int, int, str, float | None]]:
         """Return the runs of the plan that the folder has: for each run the position of its job in
-        the plan, its number, its status and its time limit in s, None for no limit."""
+        the plan, from 0, its number, its status and its time limit in s, None for no limit."""
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
     def stale(self) -> Counter[tuple[str, str, str]]:
-        """Return the number of runs of the plan that are there from another version or code of
-        their method, by a triple: id of the method, that version, and the version in the plan."""
+        """Return the number of runs of the plan that the folder has from another version or code of
+        their method, by a triple: id of the method, other version, and version in the plan."""
         query = """SELECT now.method, old.code, now.code, count(*)
             FROM suite JOIN plan JOIN cells AS now ON now.id = plan.cell
             JOIN cells AS old ON old.digest = now.digest AND old.code != now.code
             JOIN results ON results.cell = old.id AND suite_seed = suite.seed AND run < plan.runs
             WHERE old.id NOT IN (SELECT cell FROM plan) GROUP BY 1, 2, 3"""
-        return Counter(
-            {(name, version_of(old), version_of(now)): n for name, old, now, n in self._rows(query)}
-        )
+        found = Counter[tuple[str, str, str]]()
+        for name, old, now, count in self._rows(query):
+            found[name, version_of(old), version_of(now)] += count
+        return found
 
     def marks(self) -> dict[str, list[str]]:
-        """Return, by method, warnings about runs of the plan, in sentences (:func:`.mark_of`): that
-        files were loaded too late, or that results depend on earlier runs."""
+        """Return, by id of a method, warnings about its runs of the plan, in sentences
+        (:func:`.mark_of`): that files were loaded too late, or results depend on earlier runs."""
         found = defaultdict[str, list[str]](list)
         for kind in (LATE, EARLIER):
             query = f"""SELECT DISTINCT method, value FROM asked, json_each(details, '$.{kind}')
@@ -301,8 +303,8 @@ class Store:
         return dict(found)
 
     def imports(self) -> dict[str, list[str]]:
-        """Return, by method from a file, the packages that its file imports, over all runs of the
-        plan, each as a name with a version."""
+        """Return, by id of a method from a file, the packages that its file imports, over all runs
+        of the plan, each as a name with a version."""
         query = """SELECT DISTINCT method, value FROM asked
             JOIN environments ON environments.id = environment, json_each(content, '$.imports')
             WHERE json_type(content, '$.imports') = 'array' ORDER BY method, value"""
@@ -310,27 +312,28 @@ class Store:
         return {method: [plain(str(value), 100) for _, value in of] for method, of in rows}
 
     def others(self) -> Counter[int]:
-        """Return numbers of runs in the folder that the plan does not ask for, by the seed of their
-        suite; runs of another version or code of their method (:meth:`stale`) are among them."""
+        """Return the number of runs in the folder that the plan does not ask for, by the seed of
+        their suite, with the runs of another version or code of their method (:meth:`stale`)."""
         query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
             GROUP BY suite_seed"""
         return Counter(dict(self._rows(query)))
 
     def ids(self, prefix: str = "") -> list[str]:
-        """Return the ids of all runs that begin with ``prefix``, of earlier plans as well."""
+        """Return the ids that begin with ``prefix``, of all runs, also of earlier plans."""
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
     def results(self) -> list[tuple[str, str]]:
-        """Return the id of each run of the plan that the folder has, in their order, with the hash
-        of its outcome."""
+        """Return the id of each run of the plan that the folder has, in the order of the plan, with
+        the hash of its outcome."""
         return self._rows("SELECT run_id, result FROM asked ORDER BY position, run")
 
     # Writing and reading runs.
 
     def write(self, runs: Iterable[Run]) -> None:
-        """Write finished runs, all of them or none, in place of earlier runs with their ids. Raises
-        CoarticError if the disk is full or a run does not fit the tables."""
+        """Write finished runs, all of them or none, in place of earlier runs of the same cells,
+        seeds and numbers. Raises CoarticError if the disk is full or a run does not fit the
+        tables."""
         with self.transaction():
             for run in runs:
                 try:
@@ -342,7 +345,7 @@ class Store:
 
     def run(self, run_id: str) -> Run:
         """Return a run by its id; ``suite`` of its job and ``where`` of its method are empty.
-        Raises CoarticError if the folder has no such run, or if the id belongs to another run."""
+        Raises CoarticError if the folder has no such run, or its rows do not fit its id."""
         with explain_errors(self.folder):
             row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
             if row is None:
@@ -388,8 +391,8 @@ class Store:
             return run
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``, a row for each run of the plan, in order, as a data frame with the
-        columns :data:`.COLUMNS` (nullable types)."""
+        """Return view ``runs``, a row for each run of the plan that the folder has, in order, as a
+        data frame with the columns :data:`.COLUMNS` (nullable types)."""
         return self._frame(_RUNS)
 
     def solutions(self) -> pd.DataFrame:
@@ -400,7 +403,7 @@ class Store:
         return self._frame(_SOLUTIONS)
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of a part (``solution``, ``initial`` or ``replay``) by run id, of
+        """Return, by run id, the movements of a part (``solution``, ``initial`` or ``replay``) of
         the first ``most`` ok runs of each cell of the plan; runs without the part are left out."""
         query = """SELECT run_id, goal, hand, kind, ticks, path FROM
             (SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
@@ -416,8 +419,8 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield, for each run of the plan that made trials, its id and the rewards of its trials,
-        shape ``(trials,)``; NaN stands for a trial that failed or whose reward is not kept."""
+        """Yield, for each run of the plan with rewards of trials, its id and its k rewards, shape
+        ``(k,)``; NaN stands for a trial that failed or whose reward is not kept."""
         query = """SELECT run_id, rewards, trials FROM asked
             JOIN learning ON result_id = asked.id ORDER BY position, run"""
         with explain_errors(self.folder):
@@ -435,7 +438,7 @@ class Store:
         return row
 
     def _write_run(self, run: Run) -> None:
-        """Write a run into the tables, in place of an earlier run with its id."""
+        """Write a run into the tables, in place of an earlier run of its cell, seed and number."""
         cell, code = self._cell(run.cell)
         key = cell, run.job.seed, run.number
         query = "SELECT id FROM results WHERE cell = ? AND suite_seed = ? AND run = ?"
@@ -460,7 +463,7 @@ class Store:
 
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
         """Return a cell from its row of table ``cells``; ``where`` of its method is empty. Raises
-        ValueError or TaskError if coartic cannot have written the row."""
+        an error, such as ValueError or TaskError, if coartic cannot have written the row."""
         method = {name: row[name] for name in _OF_METHOD} | {
             "name": row["method"],
             "defaults": json.loads(row["defaults"]),
@@ -481,8 +484,8 @@ class Store:
         return cell
 
     def _check_lengths(self, condition: str = "", *values: object) -> None:
-        """Raise CoarticError, before movements are read, if the paths of a solution have more than
-        10,000,000 characters together; of all runs, or of runs that satisfy an SQL ``condition``,
+        """Raise CoarticError if the paths of a part of a run have more than 10,000,000 characters
+        together, in all rows of table ``movements``, or in rows that satisfy an SQL ``condition``,
         with ``values`` for its question marks."""
         query = f"""SELECT max(length) FROM (SELECT sum(length(path)) AS length FROM movements
             {condition} GROUP BY result_id, part)"""
@@ -491,8 +494,8 @@ class Store:
                 raise ValueError("a solution is too long")
 
     def _plan_hash(self) -> str:
-        """Return the hash, 64 hex digits, of the last suite: settings, command, date, environment,
-        cells."""
+        """Return the hash, 64 hex digits, of the stored plan: settings of the suite, command, date,
+        environment and cells."""
         return hash_of([[*row] for query in _PLANNED for row in self._db.execute(query)])
 
     def _environment(self, content: dict[str, Any]) -> int:
@@ -517,8 +520,8 @@ class Store:
         return self._insert("cells", _cell_row(cell)), cell.method.code
 
     def _insert(self, table: str, row: Mapping[str, Any]) -> int:
-        """Insert a row, values by column, into a table; return its id. Lists and dictionaries
-        become JSON."""
+        """Insert a row, values by column, into a table; return the id of the row. Lists, tuples
+        and dictionaries become JSON."""
         names = ", ".join(f'"{name}"' for name in row)
         marks = ", ".join("?" for _ in row)
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
@@ -562,8 +565,8 @@ class Store:
             return pd.concat(parts, ignore_index=True)
 
     def _wait_for(self, statement: str) -> None:
-        """Execute a statement; while another program locks the file, try again, later with a
-        warning."""
+        """Execute a statement; while another program locks the file, try again, with a warning
+        before the third time."""
         for tries in itertools.count():
             if tries == 2:
                 warnings.warn(
@@ -585,7 +588,7 @@ def _as_text(value: Any) -> Any:
 
 
 def _cell_row(cell: Cell) -> dict[str, Any]:
-    """Return the row of a cell in table ``cells``, without its id."""
+    """Return the row of a cell in table ``cells``, values by column, without its id."""
     method = vars(cell.method)
     return {name: method[name] for name in _OF_METHOD} | {
         "digest": cell.digest,
@@ -603,8 +606,8 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
     """Open a results folder for reading in the block of this context. Raises CoarticError if the
-    folder has no results, or results in the format of another version, and while a ``coartic run``
-    writes into it."""
+    folder has no results, or results in another format, and while a ``coartic run`` writes into
+    it."""
     path = folder / RUNS_FILE
     with explain_errors(folder):
         try:
@@ -639,9 +642,9 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[Store]:
-    """Open a results folder for writing in the block of this context, by this process alone, and
-    make a missing folder. Raises CoarticError if the folder holds something else or cannot be
-    written, and while another process writes into it."""
+    """Open a results folder for writing in the block of this context, by this process alone
+    (:func:`lock`), and make a missing folder. Raises CoarticError if the folder holds something
+    else or cannot be written, and while another process writes into it."""
     with explain_errors(folder):
         visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
         if not (folder / RUNS_FILE).exists() and any(visible):
@@ -669,8 +672,9 @@ def writing(folder: Path) -> Iterator[Store]:
 @contextmanager
 def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
     """Lock a folder for this process in the block of this context, or, with ``shared``, share the
-    lock with other readers, where the system and the disk have such locks. Raises CoarticError,
-    which names ``command``, while another process holds the lock."""
+    lock with other readers; do nothing where the folder cannot be opened, or the system or the disk
+    has no such locks. Raises CoarticError, which names ``command``, while the lock is held
+    elsewhere."""
     try:
         import fcntl
 
@@ -699,8 +703,8 @@ def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") ->
 
 
 def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
-    """Return a connection to a ``file:`` address or ``:memory:`` that waits ``timeout_s`` for a
-    lock."""
+    """Return a connection to a ``file:`` address or ``:memory:`` that waits ``timeout_s``, seconds,
+    for a lock."""
     connection = sqlite3.connect(where, timeout=timeout_s, isolation_level=None, uri=True)
     connection.row_factory = sqlite3.Row
     connection.execute("PRAGMA trusted_schema = OFF")
@@ -711,7 +715,7 @@ def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
 
 def _check_files(folder: Path) -> None:
     """Raise CoarticError if ``runs.sqlite``, or a file that SQLite keeps next to it, is a symbolic
-    link, through which SQLite would change another file, or no regular file; missing files pass."""
+    link or no regular file; missing files pass."""
     for ending in ("", "-journal", "-wal", "-shm"):
         path = folder / f"{RUNS_FILE}{ending}"
         if path.is_symlink():
@@ -725,9 +729,9 @@ def _check_files(folder: Path) -> None:
 
 
 def _has_tables(connection: sqlite3.Connection) -> bool:
-    """Return True if the file has the tables of coartic, and False if the file is empty. Additions
-    of other programs pass, except triggers. Raises CoarticError for any other file, and ValueError
-    for a row that names a missing row: no view would show its run."""
+    """Return True if the file is marked as coartic's in this format, and False if the file has no
+    tables. Additions of other programs pass, except triggers. Raises CoarticError for any other
+    file, and ValueError for a row that names a missing row."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     there = {kind for (kind,) in connection.execute("SELECT type FROM sqlite_master")}
@@ -766,9 +770,9 @@ _UNREADABLE = (
 def explain_errors(folder: Path) -> Iterator[None]:
     """Turn an error of the block of this context into a CoarticError that names the file: of the
     system (the file that it names, else ``runs.sqlite`` in ``folder``), of SQLite, a CoarticError
-    (unchanged if it names the folder), and any ValueError, LookupError, TypeError, OverflowError or
-    RecursionError, which are taken for content that coartic does not write. Other errors pass.
-    """
+    (kept, as one line, if it names the folder), and any ValueError, LookupError, TypeError,
+    OverflowError, RecursionError or error of zlib, which are taken for content that coartic does
+    not write. Other errors pass."""
     try:
         yield
     except (CoarticError, *_UNREADABLE) as error:
@@ -798,7 +802,7 @@ _SENTENCES = {
 
 
 def _explain(path: Path, error: Exception) -> str:
-    """Return a sentence that the file ``path`` cannot be used, and why, from the error raised."""
+    """Return the sentence of :func:`explain_errors` on an error of the file ``path``."""
     said = plain(str(error), 200) or type(error).__name__
     if isinstance(error, CoarticError):
         said = one_line(str(error))
@@ -835,7 +839,7 @@ def _why_not_opened(path: Path) -> str:
 def _unpack(blob: bytes, trials: int | None) -> Array:
     """Return the rewards that a ``blob`` of table ``learning`` holds (:func:`reward_bytes`), shape
     ``(k,)`` with k up to ``trials``; NaN for a trial that failed or whose reward is not kept.
-    Raises ValueError for a damaged blob, and for more rewards than trials."""
+    Raises ValueError for a blob that cannot be unpacked or has more rewards than trials."""
     size = 4 * (1 + min(trials or 0, MOST_TRIALS))
     try:
         packed = zlib.decompressobj()
