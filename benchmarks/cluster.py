@@ -53,7 +53,7 @@ class Dask:
 
         When iterated, raises CoarticError if the scheduler is missing or lost or has no worker for
         10 minutes, if a worker has another version or code of a method or cannot perform jobs, and
-        if this machine lacks the extra ``cluster``. Versions of coartic itself are not compared.
+        if this machine lacks the extra ``cluster``.
         """
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed

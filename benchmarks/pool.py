@@ -8,9 +8,9 @@ unless they have left its group. If the common folder is removed or full, answer
 suite ends.
 
 The system counts the CPU time of a process in all its threads, and ends the process when a job has
-used up its limit (not on Windows): how busy the machine is does not count. The CPU time of
-processes that a method starts is not counted. A job that waits forever is ended later, by wall
-time, and repeated once, because the machine may have slept; a job that waits twice has timed out.
+used up its limit (not on Windows). The CPU time of processes that a method starts is not counted.
+A job that waits forever is ended later, by wall time, and repeated once, because the machine may
+have slept; a job that waits twice has timed out.
 """
 
 from __future__ import annotations
@@ -82,9 +82,9 @@ class Local:
 
     A job is ended after its limit of CPU time (a day without a limit), and in any case after three
     times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
-    time is repeated once; then its runs have timed out. The time in which kernels are compiled
-    before a job does not count. ``verbose`` shows what methods print, and log from level INFO on,
-    and the tracebacks of their crashes. Raises ValueError for numbers out of bounds.
+    time is repeated once; then its runs have timed out. Kernels are compiled before this time.
+    ``verbose`` shows what methods print, log (from INFO on) and raise. Raises ValueError for
+    numbers out of bounds.
     """
 
     @checked_arguments
@@ -199,8 +199,8 @@ class Workers:
                 worker.end()
 
     def worker_for(self, method: tuple[str, str, str]) -> Worker:
-        """Return the worker that waits for jobs if its method is ``method``
-        (:attr:`MethodInfo.key`); otherwise end it, and return a new worker, not yet started."""
+        """Return the worker that waits for jobs if it has this method (:attr:`MethodInfo.key`);
+        otherwise end it, and return a new worker, not yet started."""
         waits, self._idle = self._idle, None
         if waits is not None:
             if waits.method == method:
@@ -408,7 +408,7 @@ def _limit_cpu_time(limit_s: float) -> None:
 def _bound_resources(workers: int) -> None:
     """Limit the memory of this process, one of ``workers`` that share 80 % of the machine's memory
     (at least 1 GiB each), and the size of each of its files to 256 MiB, where the system has such
-    limits: a method mostly gets an error before the machine swaps or the disk is full."""
+    limits."""
     try:
         import resource
 

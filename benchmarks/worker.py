@@ -43,6 +43,7 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 _OUTCOMES = TypeAdapter(list[Outcome])
 _ENVIRONMENT = TypeAdapter(dict[Literal["libraries", "imports"], dict[Line, Line] | list[Line]])
 _LONGEST_DETAILS = 10_000_000
+_OF_FORM = ValueError, TypeError, ArithmeticError, AttributeError, LookupError, RecursionError
 
 
 def process_peak_mb() -> float | None:
@@ -62,8 +63,8 @@ def fail(
     wall_s: float | None = None,
     cpu_s: float | None = None,
 ) -> list[Outcome]:
-    """Return an outcome with this status and reason for each run of a job whose worker gave no
-    usable answer. ``wall_s`` and ``cpu_s``, times of the job, s, are shared evenly by its runs."""
+    """Return an outcome for each run of a job whose worker gave no usable answer. ``wall_s`` and
+    ``cpu_s``, times of the job, s, are shared evenly by its runs."""
     runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
     return [Outcome(status, reason, times=times) for _ in job.numbers]
@@ -95,7 +96,7 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
         if len(outcomes) == len(job.numbers):
             return outcomes
         why = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
-    except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
+    except _OF_FORM as error:
         why = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
 
@@ -222,14 +223,7 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
         }
         session.check_solution(parts["solution"])
         details = _plain_details(result.details)
-    except (
-        TypeError,
-        ValueError,
-        OverflowError,
-        AttributeError,
-        LookupError,
-        RecursionError,
-    ) as error:
+    except _OF_FORM as error:
         raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
     return {"parts": parts, "details": details}
 
