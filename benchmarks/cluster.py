@@ -35,7 +35,7 @@ class Dask:
     address : str
         Address that the scheduler prints, such as ``tcp://127.0.0.1:8786``.
     say : callable
-        Function that is called with a sentence before a wait for a first worker.
+        Function that is called with a sentence before a wait for workers.
 
     Examples
     --------
@@ -47,9 +47,9 @@ class Dask:
         self.workers = 1  # their number can change: jobs are as large as methods allow
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with the outcomes of its runs, in the order in which jobs finish. If a
-        worker dies, another worker performs its jobs; the outcomes of a job on which worker after
-        worker dies are ``crashed``.
+        """Yield each job with the outcomes of its runs, as jobs finish. If a worker dies, another
+        worker performs its jobs; the outcomes of a job on which worker after worker dies are
+        ``crashed``.
 
         When iterated, raises CoarticError if the scheduler is missing or lost or has no worker for
         10 minutes, if a worker has another version or code of a method or cannot perform jobs, and

@@ -66,7 +66,7 @@ def check_method(
     """Check every law of a method, and return the laws in order, kept and broken. The method runs
     on ``tasks``, by default the shipped tasks; tasks to which it does not apply are left out, and
     without any task left the last law, ``solution``, is broken. ``verbose`` shows prints, logs and
-    errors of the method (:class:`.Local`)."""
+    crashes of the method."""
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 
@@ -210,7 +210,7 @@ def _laws_of_declaration(info: MethodInfo) -> list[Law]:
 
 def _hopeless_task(like: Task) -> Task:
     """Return a copy of a task with a locked base and one goal at (9000, 9000), length units: out of
-    reach of arms of a usual length."""
+    reach of usual arms near the origin."""
     return like.model_copy(
         update={
             "name": "hopeless",

@@ -37,13 +37,12 @@ def include_folders(
     out: Path,
     tasks: Collection[str] | None = None,
 ) -> list[Job]:
-    """Copy the runs of other folders into ``out``; store there, and return, the joined plan.
+    """Copy the runs of other folders' plans into ``out``; store there, and return, the joined plan.
 
     ``plan`` has one job at least; folder ``shipped`` stands for the shipped results. The joined
-    plan has the cells of ``plan`` and the cells with a run 0 of the folders, of these only cells on
-    ``tasks`` if any are named. Missing runs are left to :func:`.perform`. A warning names an
-    unfinished folder, and a folder with fewer runs of other cells than ``plan`` asks for of its
-    own.
+    plan has the cells of ``plan`` and, on ``tasks`` (None: on all), cells with a run 0 of the
+    folders. Missing runs are left to :func:`.perform`. A warning names an unfinished folder, and a
+    folder with fewer runs of another stochastic cell than ``plan`` asks for of its own.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
     at 0, if the folders do not go together, if a folder does not pass the checks of ``coartic

@@ -77,13 +77,13 @@ _NEXT_JOB = b"\0next job\0"  # in the output of a process
 
 
 class Local:
-    """Executor that performs jobs in at most ``jobs`` processes on this machine, by default one a
-    core.
+    """Executor that performs jobs in processes on this machine, at most ``jobs`` at once (-1: one
+    a core).
 
     A job is ended after its limit of CPU time (a day without a limit), and in any case after three
     times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
-    time is repeated once; then its runs have timed out. Kernels are compiled before this time.
-    ``verbose`` shows what methods print, log (from INFO on) and raise. Raises ValueError for
+    time is repeated once; then its runs have timed out. Most kernels are compiled before this time.
+    ``verbose`` shows what methods print, log (from INFO on) and crash with. Raises ValueError for
     numbers out of bounds.
     """
 
@@ -230,8 +230,8 @@ class Worker:
         self._reader = threading.Thread(target=_read, args=(output, self._printed), daemon=True)
 
     def give(self, jobs: Sequence[Job]) -> None:
-        """Send jobs to the process, start it if it is new, and compile the kernels of the first
-        job's task in this process, too. If the process cannot start, nothing is raised, and
+        """Send jobs to the process, start it if it is new, and compile kernels for the first job's
+        task in this process, too. If the process cannot start, nothing is raised, and
         :attr:`exit_code` is 1."""
         self.jobs.extend(jobs)
         self.since_s = self._since_cpu_s = math.inf
@@ -298,8 +298,8 @@ class Worker:
 
     @property
     def last_output(self) -> str:
-        """How the process ended, and the last three lines that it printed in the current job (if
-        not ``verbose``), as in ``(exit code 1): LINES``."""
+        """End of the process, and the last three lines that it printed in the current job (if not
+        ``verbose``), as in ``(exit code 1): LINES``."""
         code = self.exit_code or 0
         if self._reader.is_alive():
             self._reader.join(_END_S)
@@ -386,7 +386,7 @@ def _perform_jobs(folder: Path, pipe: Any, prints: Any, workers: int, verbose: b
 
 def _answer_to(job: Job) -> bytes:
     """Perform a job, and return its outcomes as JSON, an outcome ``crashed`` for each run if JSON
-    cannot hold them; the system ends this process at the job's limit of CPU time."""
+    cannot hold them. The job's limit of CPU time is set (:func:`_limit_cpu_time`)."""
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
     outcomes = perform_job(job)
     _limit_cpu_time(0)

@@ -60,8 +60,8 @@ def now() -> str:
 
 
 def made_with() -> dict[str, Any]:
-    """Return :func:`current_environment` with the ``command`` that started this process, a list of
-    words (``a notebook`` in a notebook), and the ``date``, UTC."""
+    """Return :func:`current_environment` with ``command``, this process's program and arguments, a
+    list of words (``a notebook`` in a notebook), and the ``date``, UTC."""
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
     return current_environment() | {"command": command, "date": now()}

@@ -55,7 +55,7 @@ _Number = Annotated[int, Field(ge=1, strict=True)]
 
 
 class Move(FileData):
-    """A change that makes tasks of a task, each with another place of one goal."""
+    """Displacements of one goal of a task, which make tasks of the task."""
 
     goal: _Number
     """Number of the goal, from 1."""

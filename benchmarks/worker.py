@@ -1,7 +1,7 @@
 """Let a method solve a task in a worker process, and state the outcome as plain data.
 
 A method can run any code: the parent process, which imports no method file, checks the form of
-what it states, and executes and scores its solution.
+what the method states, and executes and scores the solution.
 """
 
 from __future__ import annotations

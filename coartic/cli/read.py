@@ -93,9 +93,9 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     """Print the ranking of a study as a table, then pairs of a word and a text.
 
     The table has ranked methods: some with the smallest gaps, the learner and random search; and,
-    ranked or not, methods with a gap from files and of the labels ``asked`` for which no other row
-    stands. The pairs say why methods are not ranked, what was found on coarticulation and cost, how
-    runs differ from the paper's, which failed, and ``more``.
+    ranked or not, if they have a gap, methods from files, and methods of the labels ``asked`` for
+    which no other row stands. The pairs say why methods are not ranked, what was found on
+    coarticulation and cost, how runs differ from the paper's, which failed, and ``more``.
     """
     from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
