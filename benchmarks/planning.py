@@ -141,9 +141,9 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     ------
     CoarticError
         A name is unknown or taken, a number or a parameter is refused, ``trials``, ``runs`` or a
-        family file has no effect, a task or method that is named has no job, a cell has two numbers
-        of runs, or a method does not apply to a task of its block (without a wildcard; otherwise,
-        and for added tasks and methods, it is left out).
+        family file has no effect, a task or method that is named has no runs of any number, a cell
+        has two numbers of runs, or a method does not apply to a task of its block (without a
+        wildcard; otherwise, and for added tasks and methods, it is left out).
     """
     request = request_for(**options)
     if not isinstance(suite, Suite):

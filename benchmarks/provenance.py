@@ -113,5 +113,5 @@ def _say_arithmetic(pipe: Any) -> None:
         hashlib.sha256(b"".join(np.asarray(each).tobytes() for each in computed)).hexdigest()[:8]
         for computed in (by_numpy, by_libm)
     ]
-    with contextlib.suppress(OSError):  # nobody waits for it: the command was interrupted
+    with contextlib.suppress(OSError):  # the command was interrupted
         pipe.send("NumPy {}, libm {}".format(*hashes))

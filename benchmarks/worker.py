@@ -43,7 +43,8 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 _OUTCOMES = TypeAdapter(list[Outcome])
 _ENVIRONMENT = TypeAdapter(dict[Literal["libraries", "imports"], dict[Line, Line] | list[Line]])
 _LONGEST_DETAILS = 10_000_000
-_OF_FORM = ValueError, TypeError, ArithmeticError, AttributeError, LookupError, RecursionError
+_MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError, RecursionError
+"""Errors of malformed data."""
 
 
 def process_peak_mb() -> float | None:
@@ -96,7 +97,7 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
         if len(outcomes) == len(job.numbers):
             return outcomes
         why = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
-    except _OF_FORM as error:
+    except _MALFORMED as error:
         why = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
 
@@ -223,7 +224,7 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
         }
         session.check_solution(parts["solution"])
         details = _plain_details(result.details)
-    except _OF_FORM as error:
+    except _MALFORMED as error:
         raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
     return {"parts": parts, "details": details}
 
