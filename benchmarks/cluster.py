@@ -27,8 +27,8 @@ _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
 class Dask:
-    """Executor that performs jobs on the workers of a Dask scheduler, on which this version of
-    coartic should be installed.
+    """Executor that performs jobs on the workers of a Dask scheduler, which should have this
+    version of coartic.
 
     Parameters
     ----------

@@ -206,8 +206,7 @@ def perform(
     that fail are stored and counted, and raise nothing; runs that crashed, or timed out under a
     lower limit, are performed again by the next call. An interruption keeps finished runs. For each
     method of a file, an ok run of this call is made again after a run with another seed (alone if
-    all take more than a minute); warnings say what is doubtful, such as other results
-    (:func:`.doubts_of`).
+    all take more than a minute); warnings say what is doubtful, such as other results.
 
     Parameters
     ----------
