@@ -27,15 +27,15 @@ _GOES_ON = "Finished runs are kept; repeat the command to resume."
 
 
 class Dask:
-    """Executor that performs jobs on the workers of a Dask scheduler, which must have this version
-    of coartic.
+    """Executor that performs jobs on the workers of a Dask scheduler, which should have this
+    version of coartic.
 
     Parameters
     ----------
     address : str
         Address that the scheduler prints, such as ``tcp://127.0.0.1:8786``.
     say : callable
-        Function that is called with a sentence, such as that no worker is connected.
+        Function that is called with a sentence before a wait for workers.
 
     Examples
     --------
@@ -47,13 +47,13 @@ class Dask:
         self.workers = 1  # their number can change: jobs are as large as methods allow
 
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
-        """Yield each job with the outcomes of its runs, in the order in which jobs finish. If a
-        worker dies, another worker performs its jobs; the outcomes of a job on which worker after
-        worker dies are ``crashed``.
+        """Yield each job with the outcomes of its runs, as jobs finish. If a worker dies, another
+        worker performs its jobs; the outcomes of a job on which worker after worker dies are
+        ``crashed``.
 
         When iterated, raises CoarticError if the scheduler is missing or lost or has no worker for
         10 minutes, if a worker has another version or code of a method or cannot perform jobs, and
-        if this machine lacks the extra ``cluster``. The version of coartic itself is not compared.
+        if this machine lacks the extra ``cluster``.
         """
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed
@@ -113,13 +113,13 @@ class Dask:
 
 
 _kept = threading.local()
-"""Worker process of each thread of a Dask worker, kept for the next job of its method."""
+"""Its ``workers`` hold the process of a thread of a Dask worker for the next job of a method."""
 
 
 def _remote(job: Job) -> list[Outcome]:
     """Perform a job on the machine of a Dask worker, in another process, and return the outcomes of
     its runs with the environment of this machine. Raises CoarticError if the method has another
-    version or code on this machine, and if no process can work."""
+    version or code on this machine or its file cannot be used, and if no process can work."""
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method = job.cell.method
     here = current_code(method)

@@ -1,7 +1,7 @@
 """Check a new method or task against the rules, for contributors.
 
-The runs of a method are checked within a limit of CPU time, in one process for all of them and in
-another process.
+The runs of a method, each with a limit of CPU time, are made in a worker process, and one run again
+in another process.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ class Law(NamedTuple):
 
 
 def _law(name: str, problems: Iterable[str], finding: str) -> Law:
-    """Return a law that is broken if there is a problem; then the first problem is its finding."""
+    """Return law ``name``: broken if there are ``problems``, and its finding is then the first of
+    them, else ``finding``."""
     problem = next(iter(problems), None)
     return Law(name, problem is None, problem or finding)
 
@@ -62,10 +63,10 @@ def _law(name: str, problems: Iterable[str], finding: str) -> Law:
 def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[Law]:
-    """Check every law of a method by runs on tasks, and return the laws in order, kept and broken.
-    ``tasks`` are the shipped tasks by default; tasks to which the method does not apply are left
-    out, and without any task left the last law, ``solution``, is broken. ``verbose`` shows prints
-    and logs of the method, and the tracebacks of its crashes."""
+    """Check every law of a method, and return the laws in order, kept and broken. The method runs
+    on ``tasks``, by default the shipped tasks; tasks to which it does not apply are left out, and
+    without any task left the last law, ``solution``, is broken. ``verbose`` shows prints, logs and
+    crashes of the method."""
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 
@@ -102,7 +103,7 @@ def _laws_of_runs(
 ) -> Iterator[Law]:
     """Yield the laws on the runs of a method: ``solution``, ``determinism``, ``no hidden state``,
     ``limits``, ``information`` and ``failure``. ``runs`` holds the runs by kind, such as ``first``,
-    and name of the task; ``checked_with`` names the parameters."""
+    and name of the task; ``checked_with`` has words on the parameters, or is empty."""
 
     def of_kind(kind: str) -> dict[str, Outcome]:
         return {task: run.outcome for (each, task), run in runs.items() if each == kind}
@@ -208,8 +209,8 @@ def _laws_of_declaration(info: MethodInfo) -> list[Law]:
 
 
 def _hopeless_task(like: Task) -> Task:
-    """Return a copy of a task with a locked base and one goal out of reach of its hands, which
-    validation would refuse."""
+    """Return a copy of a task with a locked base and one goal at (9000, 9000), length units: out of
+    reach of usual arms near the origin."""
     return like.model_copy(
         update={
             "name": "hopeless",
@@ -223,8 +224,8 @@ def _hopeless_task(like: Task) -> Task:
 
 def check_task_file(path: Path, registered: Registry) -> list[Law]:
     """Check every law of a task file, and return the laws in order: ``valid``, ``name``, ``distinct
-    goals``, ``solvable``, ``methods``; for an invalid file the first alone. ``registered``: known
-    methods; at least one has to apply to the task."""
+    goals``, ``solvable``, ``methods``; for an invalid file ``valid`` alone. ``registered``: known
+    methods, of which one at least has to apply to the task."""
     try:
         task = load_task(path)
     except TaskError as error:

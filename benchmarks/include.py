@@ -1,9 +1,9 @@
 """Include the runs of other folders: shipped results, or results of another machine or person.
 
-Folders go together if they have the same suite, seed and trial budget, the same task for each name
-and the same version or code of each method. Versions of coartic and of libraries, and machines, may
-differ. Every folder has to pass the checks of ``coartic verify``, but for runs that it lacks; the
-hash of their file guards the shipped results.
+Folders go together if they have the same suite, seed and trial budget, the same task for each name,
+the same version or code of each method and the same parameters of each of its settings. Versions of
+coartic and of libraries, and machines, may differ. A folder has to pass the checks of ``coartic
+verify``, though it may lack runs.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ def include_folders(
     out: Path,
     tasks: Collection[str] | None = None,
 ) -> list[Job]:
-    """Copy the runs of other folders into ``out``; store there, and return, the plan of all runs.
+    """Copy the runs of other folders' plans into ``out``; store there, and return, the joined plan.
 
-    ``shipped`` names the shipped results. The returned plan has the cells of ``plan`` and of the
-    folders; if ``tasks`` are named, the folders give only cells on these tasks. Runs of ``plan``
-    that no folder has are missing in ``out``: :func:`.perform` makes them. A warning names an
-    unfinished folder, and a folder with fewer runs than ``plan`` asks for.
+    ``plan`` has one job at least; folder ``shipped`` stands for the shipped results. The joined
+    plan has the cells of ``plan`` and, on ``tasks`` (None: on all), cells with a run 0 of the
+    folders. Missing runs are left to :func:`.perform`. A warning names an unfinished folder, and a
+    folder with fewer runs of another stochastic cell than ``plan`` asks for of its own.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
-    at 0, if the folders do not go together, if one does not pass the checks of ``coartic verify``,
-    and if two folders have different results of a run. Then only shipped results may have been
-    copied.
+    at 0, if the folders do not go together, if a folder does not pass the checks of ``coartic
+    verify``, and if two folders, or a folder and ``out``, have different results of a run. Then
+    only shipped results may have been copied.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
@@ -88,8 +88,8 @@ def include_folders(
 def _join(
     plan: Sequence[Job], sources: Mapping[str, Store], tasks: Collection[str] | None
 ) -> list[Job]:
-    """Return the plan with the cells of the sources (stores by name), with ``tasks`` only cells on
-    these tasks. A cell has the runs that the plan asks for, and the runs that follow in
+    """Return the plan with the cells of the sources (stores by name), with ``tasks`` only their
+    cells on these tasks. A cell has the runs that the plan asks for, and the runs that follow in
     the sources without a gap. Raises CoarticError for a contradiction (:func:`_check_together`)."""
     whole = {name: source.plan() for name, source in sources.items()}
     plans = {
@@ -128,10 +128,10 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of a source whose plan has runs that the joined plan lacks, and of a source with a cell
-    of a stochastic method, not asked for, that has fewer runs than the command asks for of other
-    cells. ``asked``: numbers of runs by digest of
-    the cell; ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
+    """Warn of a source whose plan has runs that the joined plan lacks, or else a cell of a
+    stochastic method, not in ``asked``, of which the joined plan has fewer runs than the largest
+    number in ``asked``. ``asked``: numbers of runs asked for, by digest of the cell; ``plans``:
+    plans by name of the source; ``jobs``: joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
@@ -161,9 +161,10 @@ def _named(jobs: Sequence[Job]) -> str:
 
 
 def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
-    """Raise CoarticError if two jobs differ in suite, seed or trial budget, in the definition of a
-    task of one name, in the version or code of a method, or in a parameter of a cell. ``parts``
-    holds jobs by their origin, such as a folder; ``first`` stands for a part without jobs."""
+    """Raise CoarticError if the first jobs of two parts differ in suite, seed or trial budget, or
+    two jobs in the definition of a task of one name, in the version or code of a method, or in a
+    parameter of one label on one task. ``parts`` holds jobs by their origin, such as a folder;
+    ``first`` stands for a part without jobs."""
     first_said: dict[str, tuple[str, object]] = {}
 
     def agree(where: str, what: str, value: object, hint: str = "") -> None:
@@ -192,13 +193,13 @@ def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, 
     """Copy the runs of a source's plan that the target lacks; enter ``name``, the source's folder,
     for each of them in ``origin``, by :func:`.run_identity` of its id. Raises CoarticError if the
     target has another result of a run."""
-    there = {run_identity(run_id): (run_id, result) for run_id, result in target.results()}
-    results = source.results()
+    there = {run_identity(run_id): run_id for run_id in target.ids()}
+    results, held_results = source.results(), dict(target.results())
     for first in range(0, len(results), _WRITTEN_AT_ONCE):
         runs = list[Run]()
         for run_id, result in results[first : first + _WRITTEN_AT_ONCE]:
-            held, held_result = there.get(run_identity(run_id), ("", ""))
-            if held and held_result == result:
+            held = there.get(run_identity(run_id), "")
+            if held_results.get(held) == result:
                 continue
             run = source.run(run_id)
             if not held:

@@ -1,7 +1,7 @@
 """Import a method file in its own process, which answers questions about the methods in plain data.
 
-Nothing that a file does on import (another working folder, patches, limits, an exit) affects the
-process that runs suites.
+Changes that a file makes to its process on import (another working folder, patches, limits, an
+exit) do not affect the process that runs suites.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ _KINDS: dict[str, TypeAdapter[Any]] = {
     "why_not": TypeAdapter(str | None),
     "rules": TypeAdapter(dict[str, dict[str, Any]]),
 }
-"""Kind of the answer to a question."""
+"""Kind of the answer, by question."""
 
 
 def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
-    """Start a process that imports a method file, and return a function that asks the process about
-    a method. ``shown`` is the name of the file in messages. The function takes the id of a method,
-    a question of :class:`MethodInfo` and its arguments; the question ``methods``, with an empty id,
-    is the first: it imports the file, and gives the declarations of all methods. The function
-    raises CoarticError for an error, for an answer of another kind, and for no answer in 5 minutes.
-    The process, with all processes that it starts, ends with this process. Raises CoarticError if
-    no process begins."""
+    """Start a process for a method file, and return a function that asks the process about a
+    method. ``shown`` is the name of the file in messages. The function takes the id of a method, a
+    question of :func:`.answer` and its arguments; the question ``methods``, with an empty id, comes
+    first: it imports the file, and gives the declarations of all methods. The function raises
+    CoarticError for an error there, for an answer of another kind, and for no answer in 5 minutes.
+    The process, with all processes of its group, ends with this process. Raises CoarticError if no
+    process begins."""
     try:
         pipe, theirs = multiprocessing.Pipe()
         answers = theirs, path, shown
@@ -96,9 +96,10 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
 
 
 def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
-    """Answer questions (:func:`begin_reader`) that come through a pipe as JSON, ``[NUMBER, METHOD,
-    QUESTION, ARGUMENTS...]``, by ``[NUMBER, "answer", ANSWER]`` or ``[NUMBER, "error", SENTENCE]``,
-    until the pipe is closed. A child that the file has forked ends instead of answering."""
+    """Answer questions on the file ``path``, ``shown`` in messages: through a pipe come JSON
+    ``[NUMBER, METHOD, QUESTION, ARGUMENTS...]``, and go ``[NUMBER, "answer", ANSWER]`` or
+    ``[NUMBER, "error", SENTENCE]``, until it is closed. A child that the file has forked ends
+    instead of answering."""
     begin_worker()
     reader = os.getpid()
     methods: dict[str, type[Method]] = {}
@@ -134,8 +135,8 @@ def _methods_of_module(
     module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
 ) -> Iterator[MethodInfo]:
     """Yield the declarations of ``methods``, the classes that ``module`` defines, with their code;
-    ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, a wrong
-    declaration, and a file that cannot be read."""
+    ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, for
+    declared texts or information of a wrong form, and for a file that cannot be read."""
     for method in methods:
         where = f"{origin}: {method.__name__}"
         for attribute in ("name", "title", "citation", "tuned_on"):

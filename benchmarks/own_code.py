@@ -1,4 +1,4 @@
-"""Find what results of a method file come from: the files and packages that its import loaded.
+"""Find what results of a method file come from: files and packages that its process has loaded.
 
 The process that has imported the file looks at them; built-in methods have a version in their
 place (:attr:`coartic.method.Method.version`).
@@ -28,18 +28,19 @@ from coartic.model import MODEL_VERSION
 from coartic.motion.compile import PACKAGE
 
 OUR_PACKAGES = {"coartic", "analysis", "baselines", "benchmarks"}
-"""The packages of this project, which are next to each other."""
+"""Names of the packages of this project."""
 _LARGEST_DATA = 2**30  # bytes of a declared file
 
 
 def code_of(method: type[Method], file: Path) -> str:
-    """Return the hash, 12 hexadecimal digits, of all that a method file's results come from.
+    """Return a hash, 12 hexadecimal digits, of what the results of a method from a file come from.
 
-    It covers the versions of the method, of the model and of the built-in methods that the file
-    imports; the file, its declared data, and every file of the user's that its import loaded; names
-    and versions of the installed packages that these files import, without those that coartic
-    needs. In Python code comments, blank lines and widths of indentation do not count, nor do
-    places of files. Raises OSError or CoarticError for a file that cannot be read.
+    The hash covers the file, the data files that the method declares, and the user's files that
+    this process has loaded (:func:`own_files`); versions of the method and the model, and of the
+    built-in methods that these files import; names and versions of installed packages that these
+    files import, except packages that coartic needs. Comments in Python code do not count
+    (:func:`content_of`), nor do places of files. Raises OSError or CoarticError for a file that
+    cannot be read.
     """
     files = {*own_files(), str(file)}
     texts = [content_of(path) for path in files]
@@ -55,7 +56,7 @@ def code_of(method: type[Method], file: Path) -> str:
 
 def imported_packages(file: str) -> list[str]:
     """Return a line with name and version for each installed package that a method file, or a
-    user's file that it loaded, imports, without the packages that this project itself needs."""
+    user's file that this process has loaded, imports, except packages that this project needs."""
     return _packages(_imported_by(frozenset({*own_files(), file})))
 
 
@@ -67,24 +68,25 @@ def _imported_by(files: Collection[str]) -> set[str]:
 
 
 def own_files(known: Collection[str] = ()) -> set[str]:
-    """Return the paths of the user's files that this process has loaded: files of all modules
-    except modules named in ``known``, of the standard library, of installed packages and of this
-    project."""
+    """Return the paths of the user's files that this process has loaded: existing files of all
+    modules except modules named in ``known``, of the standard library, of installed packages and of
+    this project."""
     found = {path for name, path in _loaded().items() if name not in known}
     return {path for path in found if not _is_installed(path) and os.path.exists(path)}
 
 
 def libraries() -> dict[str, str]:
-    """Return the version of each installed package that this process has loaded, by name."""
+    """Return, by name, the versions of installed packages, without coartic, from whose importable
+    names, such as ``yaml``, this process has loaded modules (:func:`_is_installed`)."""
     tops = {name.partition(".")[0] for name, path in _loaded().items() if _is_installed(path)}
     names = sorted({name for top in tops for name in _distributions().get(top, ())})
     return {name: metadata.version(name) for name in names}
 
 
 def content_of(path: str) -> bytes:
-    """Return the content of a file that counts in a hash: of a Python file its tokens without
-    comments, blank lines and widths of indentation, the same under every version of Python; of any
-    other file all bytes. Raises OSError for a file that cannot be read."""
+    """Return the bytes of a file that count in a hash: of a Python file its tokens without
+    comments, blank lines and widths of indentation, an f-string as one token; of any other file all
+    bytes. Raises OSError for a file that cannot be read."""
     content = Path(path).read_bytes()
     if not path.endswith(".py"):
         return content
@@ -105,8 +107,8 @@ def content_of(path: str) -> bytes:
 
 
 def _between(lines: list[bytes], start: tuple[int, int], end: tuple[int, int]) -> bytes:
-    """Return the text in ``lines`` from ``start`` up to ``end``, each the number of a line, from 1,
-    and of a letter in it, from 0."""
+    """Return the text in ``lines``, UTF-8, from ``start`` to before ``end``, each the number of a
+    line, from 1, and of a letter in it, from 0."""
     text = [line.decode(errors="replace") for line in lines[start[0] - 1 : end[0]]]
     text[-1] = text[-1][: end[1]]
     text[0] = text[0][start[1] :]
@@ -114,8 +116,8 @@ def _between(lines: list[bytes], start: tuple[int, int], end: tuple[int, int]) -
 
 
 def _loaded() -> dict[str, str]:
-    """Return the absolute path of the file of each loaded module by its name, except this project's
-    modules."""
+    """Return, by name, the absolute path of the file of each loaded module that has a file, except
+    this project's modules."""
     files = {
         name: os.path.abspath(path)
         for name, module in [*sys.modules.items()]
@@ -129,8 +131,8 @@ def _loaded() -> dict[str, str]:
 
 @cache
 def _is_installed(path: str) -> bool:
-    """Return True for the path of a file of the standard library or of an installed package, False
-    for any other file, also of a package installed in editable mode."""
+    """Return True for a path in a folder of the standard library or of installed packages, False
+    for any other path, as in a package installed in editable mode."""
     if {"site-packages", "dist-packages"} & {*Path(path).parts}:
         return True
     standard = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
@@ -140,15 +142,15 @@ def _is_installed(path: str) -> bool:
 
 @cache
 def _distributions() -> dict[str, list[str]]:
-    """Return, for each name that can be imported, such as ``yaml``, a list of the names of the
-    installed packages that have it, such as ``["PyYAML"]``."""
+    """Return, for each name that installed packages have for import, such as ``yaml``, the names of
+    these packages, such as ``["PyYAML"]``."""
     return dict(metadata.packages_distributions())
 
 
 def _imports(path: str) -> Iterator[str]:
-    """Yield the full name of each module or attribute that a Python file imports anywhere, such as
-    ``numpy.linalg``, and of each attribute of ``coartic`` that the file uses, such as
-    ``coartic.learn``. Relative imports are left out; nothing of a file that cannot be read."""
+    """Yield the full name of each module or attribute that a statement of a Python file imports,
+    such as ``numpy.linalg``, and of each attribute of ``coartic`` that the file uses, such as
+    ``coartic.learn``; no relative imports, and nothing of a file that is gone or malformed."""
     try:
         tree = ast.parse(Path(path).read_bytes())
     except (OSError, SyntaxError):  # it was removed or changed since it was imported
@@ -168,7 +170,8 @@ def _imports(path: str) -> Iterator[str]:
 
 def _built_in_versions(imported: Iterable[str]) -> list[str]:
     """Return a line with id and version for each built-in method that ``imported`` names reach: the
-    methods of an imported module, or, for a module without methods, of its whole folder."""
+    methods of the module of a name, or, for a module of ``coartic.baselines`` or
+    ``coartic.learner`` without methods, all methods there."""
     names = {coartic.HOME.get(name.removeprefix("coartic."), name) for name in imported}
     modules = set[str]()
     for name in names:
@@ -181,8 +184,8 @@ def _built_in_versions(imported: Iterable[str]) -> list[str]:
 
 
 def _packages(imported: Iterable[str]) -> list[str]:
-    """Return a line with name and version for each installed package that the ``imported`` modules
-    belong to, without the packages that this project itself needs."""
+    """Return a line with name and version for each installed package that has the first part of one
+    of the ``imported`` names, except packages that this project needs."""
     tops = {name.partition(".")[0] for name in imported} - OUR_PACKAGES - sys.stdlib_module_names
     needs = [each for each in metadata.requires("coartic") or () if "extra ==" not in each]
     ours = {_plain_name(re.split(r"[^\w.-]", each)[0]) for each in needs}

@@ -1,4 +1,4 @@
-"""Plan a suite: from a suite and a request to jobs, with all parameters of every run."""
+"""Plan a suite: from a suite and a request to jobs, with the parameters of every run."""
 
 from __future__ import annotations
 
@@ -57,7 +57,8 @@ def _task_or_name(value: Any) -> Task | str:
 
 
 def _runs_asked(value: Any) -> int | range | None:
-    """Return a number of runs, a range (step 1) or None. Raises an error for any other value."""
+    """Return an allowed number of runs, an allowed range of runs (step 1) or None. Raises an error
+    for any other value."""
     is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:
@@ -89,14 +90,14 @@ class Request(FileData):
 
     tasks: tuple[Annotated[Any, PlainValidator(_task_or_name)], ...] = ()
     """Names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, task files, and tasks
-    (Task); by default all tasks of the suite. A task that the suite does not have is run with every
-    method of ``methods``, or of the suite, that applies to the task."""
+    (Task); by default all tasks of the suite. An instance or a task of your own that the suite does
+    not have is run with every method of ``methods``, or of the suite, that applies to it."""
     methods: tuple[str, ...] = ()
     """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite.
     A method that the suite does not have is run on every task of the suite that it applies to."""
     method_files: _Files = ()
     """Files with your own methods. If neither ``methods`` nor the suite names a method of a file,
-    all methods of the file run, together with the methods named."""
+    also by a wildcard, all methods of the file run, together with the other methods."""
     family_files: _Files = ()
     """Files with your own families."""
     runs: Annotated[Any, PlainValidator(_runs_asked)] = None
@@ -104,11 +105,11 @@ class Request(FileData):
     ``range(50, 100)`` is a part of the runs, for a job of an array."""
     trials: Annotated[TrialCount, _plain] | None = None
     """Trials of each run, for methods that have this parameter; by default the number of the
-    suite."""
+    suite, or else of the method."""
     seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True), _plain] = 0
     """Seed of the suite."""
     time_limit_s: Annotated[Seconds, _plain] | None = None
-    """CPU time of a run, s; by default the limit of the suite."""
+    """Most CPU time of a job, s; by default the limit of the suite."""
     trial_budget: Annotated[TrialCount, _plain] | None = None
     """Most physical trials of a run, whatever its method."""
 
@@ -122,26 +123,27 @@ def request_for(**options: Any) -> Request:
 
 
 def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
-    """Plan every run of a suite.
+    """Plan the runs of a suite, or of a part of it.
 
     Parameters
     ----------
     suite : str, Path or Suite
-        A shipped suite by name, or a suite file (``.toml``).
+        A suite, a shipped suite by name, or a suite file (``.toml``).
     options
         The fields of :class:`Request`, such as ``tasks``, ``methods``, ``runs`` and ``trials``.
 
     Returns
     -------
     list of Job
-        A job for each cell, with all parameters of the method and the numbers of the runs.
+        A job for each cell (a method with parameters on a task), with the numbers of its runs.
 
     Raises
     ------
     CoarticError
-        A name is unknown, a number is out of bounds, options contradict each other or have no
-        effect, a task or method that is named has no run, or a method does not apply to a task of
-        its block (without a wildcard; otherwise, and for added tasks and methods, it is left out).
+        A name is unknown or taken, a number or a parameter is refused, ``trials``, ``runs`` or a
+        family file has no effect, a task or method that is named has no runs of any number, a cell
+        has two numbers of runs, or a method does not apply to a task of its block (without a
+        wildcard; otherwise, and for added tasks and methods, it is left out).
     """
     request = request_for(**options)
     if not isinstance(suite, Suite):
@@ -151,13 +153,7 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
 
 def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     """Return the jobs that a request asks for, one for each cell that has runs; ``registered`` has
-    all known methods. In a block with a wildcard, and for tasks and methods that the request adds,
-    a method is left out where it does not apply.
-
-    Raises CoarticError for unknown names, for a task whose name is taken, for other methods that do
-    not apply, for parameters that a method does not take, for two numbers of runs of a cell, for
-    more than :data:`MOST_CELLS` cells, and for a task, a method or an option without effect.
-    """
+    all known methods. Raises CoarticError as :func:`plan_suite` does."""
     asked = {name: methods_named(name, registered) for name in request.methods}
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     names, own, task_named = _asked_tasks(suite, request)
@@ -221,8 +217,8 @@ def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> li
 
 
 def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
-    """Raise CoarticError if ``trials``, ``runs`` or a family file of a request has no effect on its
-    jobs."""
+    """Raise CoarticError if ``trials``, ``runs`` (except 1) or a family file of a request has no
+    effect on its jobs."""
     methods = {job.cell.method.name: job.cell.method for job in jobs}
     if request.trials and not any("trials" in each.defaults for each in methods.values()):
         raise CoarticError(f"trials has no effect: no parameter of {', '.join(methods)} is trials")
@@ -244,9 +240,9 @@ def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
 def _asked_tasks(
     suite: Suite, request: Request
 ) -> tuple[dict[str, None], dict[str, Task], TaskNamed]:
-    """Return the names of the tasks that a request asks for; the tasks that it brings, which the
-    suite does not have, by name; and a function that gives a task by its name. Raises CoarticError
-    for a task whose name belongs to another task."""
+    """Return the names of the tasks that a request asks for, as keys; by name, the user's tasks and
+    the instances among them that the suite lacks; and a function that returns a task by its name.
+    Raises CoarticError for a task whose name belongs to another task."""
     for path in request.family_files:
         check_kind(str(path), "family")
     of_tasks = [each.rpartition("/")[0] for each in request.tasks if isinstance(each, str)]
@@ -321,8 +317,8 @@ def _job_of(
     runs: int | None = None,
 ) -> Job:
     """Return the job of a method with parameters on a task. Runs and trials come from the request,
-    or else from the block (``runs``, ``parameters``), or else from the suite. A method that is not
-    stochastic has run 0 alone, and no run if ``request.runs`` does not begin at 0."""
+    or else from the block (``runs``, ``parameters``), the suite or, trials, the method. A method
+    that is not stochastic has run 0 alone, and no run if ``request.runs`` does not begin at 0."""
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
         parameters.pop("trials", None)

@@ -1,16 +1,16 @@
 """Perform jobs in worker processes on this machine, with a limit of CPU time for each job.
 
 A process performs jobs of one method, one after the other. It works in its own folder and writes
-each answer into a file there, which is complete or missing: nothing that a method does, breaks or
-prints affects other methods; of what it prints the end is kept. A process that ends loses its
-current job; a new process performs the other jobs. Processes that a worker has started end with the
-worker, unless they have left its group. If the common folder is removed or full, answers are lost,
-and the suite ends.
+each answer into a file there, which is complete or missing: what a method breaks in its process
+affects no other method; of what it prints the end is kept. A process that ends loses its current
+job; a new process performs the other jobs. Processes that a worker has started end with the worker,
+unless they have left its group. If the common folder is removed or full, answers are lost, and the
+suite ends.
 
 The system counts the CPU time of a process in all its threads, and ends the process when a job has
-used up its limit: other work on the machine changes no result. The CPU time of processes that a
-method starts is not counted. A job that waits forever is ended later, by wall time, and repeated
-once, as the machine may have slept; a job that waits twice has timed out.
+used up its limit (not on Windows). The CPU time of processes that a method starts is not counted.
+A job that waits forever is ended later, by wall time, and repeated once, because the machine may
+have slept; a job that waits twice has timed out.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import write_atomically
 from coartic.internal.interruption import blocked_signals
+from coartic.internal.limits import MOST_SECONDS, check_limits
 from coartic.internal.text import error_line, plain
 from coartic.internal.threads import (
     begin_worker,
@@ -76,17 +77,19 @@ _NEXT_JOB = b"\0next job\0"  # in the output of a process
 
 
 class Local:
-    """Executor that performs jobs in processes on this machine, ``jobs`` at once, by default one a
-    core.
+    """Executor that performs jobs in processes on this machine, at most ``jobs`` at once (-1: one
+    a core).
 
     A job is ended after its limit of CPU time (a day without a limit), and in any case after three
     times that in wall time plus ``timeout_s``. A job that has waited so long without using its CPU
-    time is repeated once; then its runs have timed out. The time in which coartic's kernels are
-    compiled does not count. ``verbose`` shows what methods print and log, and their tracebacks.
+    time is repeated once; then its runs have timed out. Most kernels are compiled before this time.
+    ``verbose`` shows what methods print, log (from INFO on) and crash with. Raises ValueError for
+    numbers out of bounds.
     """
 
     @checked_arguments
     def __init__(self, jobs: int = -1, *, timeout_s: float = 60.0, verbose: bool = False) -> None:
+        check_limits("timeout_s", timeout_s, 0.0, MOST_SECONDS)
         self.workers = threads_for(jobs)
         self.timeout_s = timeout_s
         self.verbose = verbose
@@ -102,7 +105,8 @@ class Local:
 
 class Workers:
     """Worker processes with the options of ``local``, and the folder of their answers. With
-    ``stays`` a worker without jobs waits for further jobs of its method."""
+    ``stays`` a worker without jobs, one at most, waits up to a minute for further jobs of its
+    method."""
 
     def __init__(self, local: Local, *, stays: bool = False) -> None:
         self.local, self.stays = local, stays
@@ -120,14 +124,14 @@ class Workers:
     def perform(
         self, jobs: Sequence[Job], *, in_order: bool = False
     ) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield each job with the outcomes of its runs, in the order in which jobs finish. The jobs
-        of a method are divided among all workers; with ``in_order`` one worker performs them all,
-        in their order while none has to be repeated.
+        """Yield each job with the outcomes of its runs, as jobs finish. The jobs of a method are
+        divided among as many workers as may work at once; with ``in_order`` one worker performs
+        them all, in their order, while its process lives.
 
-        A job whose process ends is repeated once if the process was late, was killed, or could not
-        write an answer; otherwise, and the second time, its outcomes are ``timeout`` or
-        ``crashed``. Raises CoarticError if five processes in a row end before their first job, and
-        if answers cannot be written.
+        A job during which its process ends is repeated once if the process was late, was killed by
+        SIGKILL, lost its server or could not write an answer; otherwise, and the second time, its
+        outcomes are ``timeout`` or ``crashed``. Raises CoarticError if five processes in a row end
+        before their first job, and if answers cannot be written.
         """
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
@@ -155,7 +159,7 @@ class Workers:
                     if exit_code is None and worker.jobs and not (spins or worker.is_late):
                         continue
                     workers.remove(worker)
-                    if exit_code is None and not worker.jobs and self.stays:
+                    if exit_code is None and not (worker.jobs or self._idle) and self.stays:
                         self._idle = worker
                         continue
                     worker.end()
@@ -195,8 +199,8 @@ class Workers:
                 worker.end()
 
     def worker_for(self, method: tuple[str, str, str]) -> Worker:
-        """Return the worker that waits for jobs if it has this method; otherwise end it, and return
-        a new worker, not yet started."""
+        """Return the worker that waits for jobs if it has this method (:attr:`MethodInfo.key`);
+        otherwise end it, and return a new worker, not yet started."""
         waits, self._idle = self._idle, None
         if waits is not None:
             if waits.method == method:
@@ -214,7 +218,7 @@ class Worker:
         self.jobs = deque[Job]()
         """Jobs without an answer."""
         self.since_s = math.inf
-        """Clock at the beginning of the first of these jobs, s."""
+        """Clock at the beginning of the first of these jobs, s; infinite until it has begun."""
         self._timeout_s, self._since_cpu_s = local.timeout_s, math.inf
         self._answered = 0
         self._folder = Path(tempfile.mkdtemp(dir=folder))
@@ -226,8 +230,8 @@ class Worker:
         self._reader = threading.Thread(target=_read, args=(output, self._printed), daemon=True)
 
     def give(self, jobs: Sequence[Job]) -> None:
-        """Send jobs to the process, start it if it is new, and compile the kernels of the first
-        job's task in this process, too. If the process cannot start, nothing is raised, and
+        """Send jobs to the process, start it if it is new, and compile kernels for the first job's
+        task in this process, too. If the process cannot start, nothing is raised, and
         :attr:`exit_code` is 1."""
         self.jobs.extend(jobs)
         self.since_s = self._since_cpu_s = math.inf
@@ -259,14 +263,14 @@ class Worker:
 
     @property
     def spins(self) -> bool:
-        """True if the current job has used 2 s of CPU time more than its limit: its method ignores
-        the signal that ends the process."""
+        """True if the current job has used more than 2 s of CPU time beyond its limit (a day
+        without a limit): its method ignores the signal that ends the process."""
         limit_s = (self.jobs and self.jobs[0].time_limit_s) or _LONGEST_S
         return self.cpu_s > self._since_cpu_s + limit_s + _SPINS_S
 
     @property
     def cpu_s(self) -> float:
-        """CPU time of the process so far, s; 0 before its start, after its end, and where the
+        """CPU time of the process so far, s; 0 before its start, once it is gone, and where the
         system does not report it (Linux does)."""
         if self.process.pid is not None:
             with contextlib.suppress(AttributeError, OSError, OverflowError):
@@ -282,7 +286,7 @@ class Worker:
     def answers(self) -> Iterator[tuple[Job, list[Outcome]]]:
         """Yield each job that has been answered since the last call, in order, with the outcomes of
         its runs. The job leaves :attr:`jobs`, and the clock of the next job (:attr:`since_s`)
-        starts; the clock of the first job starts in the first call after the process has begun."""
+        starts; the clock of the first job starts in the first call after the job has begun."""
         if self.since_s == math.inf and (self._folder / _BEGUN).exists():
             self.since_s, self._since_cpu_s = time.monotonic(), self.cpu_s
         while self.jobs and (answer := self._folder / str(self._answered)).is_file():
@@ -294,8 +298,8 @@ class Worker:
 
     @property
     def last_output(self) -> str:
-        """The end of the process, and the last three lines that it wrote in the current job, as in
-        ``(exit code 1): LINES``."""
+        """End of the process, and the last three lines that it printed in the current job (if not
+        ``verbose``), as in ``(exit code 1): LINES``."""
         code = self.exit_code or 0
         if self._reader.is_alive():
             self._reader.join(_END_S)
@@ -320,7 +324,7 @@ class Worker:
         return fail(job, "crashed", f"the worker process ended {self.last_output}")
 
     def end(self) -> None:
-        """End the process and all processes that it has started."""
+        """End the process and all processes of its group, which it has started."""
         if self.process.pid is not None:
             end_group(self.process.pid)
             self.process.join(_END_S)
@@ -328,16 +332,17 @@ class Worker:
 
 def _read(output: connection.Connection, kept: bytearray) -> None:
     """Read what a process prints into pipe ``output`` until no process can write there any more;
-    ``kept`` always holds the last 4000 bytes."""
+    keep the last 4000 bytes in ``kept``, which is changed in place."""
     with output:
         while text := os.read(output.fileno(), 2**16):
             kept[:] = (kept + text)[-_PRINTED:]
 
 
 def _perform_jobs(folder: Path, pipe: Any, prints: Any, workers: int, verbose: bool) -> None:
-    """Perform lists of jobs that come through ``pipe``, in one of ``workers`` processes; write an
-    answer to each job into ``folder``, files ``0``, ``1`` and so on, and ``begun`` when the first
-    job of a list begins. Prints go into pipe ``prints``, if ``verbose`` to the terminal."""
+    """Perform lists of jobs that come through ``pipe``, in one of ``workers`` processes, until it
+    is closed or no list comes for a minute; write an answer to each job into ``folder``, files
+    ``0``, ``1`` and so on, and ``begun`` when the first job of a list begins. Prints go into pipe
+    ``prints``, if ``verbose`` to the terminal."""
     os.environ.pop("PYTHONSAFEPATH", None)  # see start_process
     begin_worker(folder.parent, streams=1 if verbose else 3)
     if verbose:
@@ -381,7 +386,7 @@ def _perform_jobs(folder: Path, pipe: Any, prints: Any, workers: int, verbose: b
 
 def _answer_to(job: Job) -> bytes:
     """Perform a job, and return its outcomes as JSON, an outcome ``crashed`` for each run if JSON
-    cannot hold them; the system ends this process at the job's limit of CPU time."""
+    cannot hold them. The job's limit of CPU time is set (:func:`_limit_cpu_time`)."""
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
     outcomes = perform_job(job)
     _limit_cpu_time(0)
@@ -402,8 +407,8 @@ def _limit_cpu_time(limit_s: float) -> None:
 
 def _bound_resources(workers: int) -> None:
     """Limit the memory of this process, one of ``workers`` that share 80 % of the machine's memory
-    (at least 1 GiB each), and the size of its files to 256 MiB, so that a method gets an error
-    before the machine swaps or the disk is full."""
+    (at least 1 GiB each), and the size of each of its files to 256 MiB, where the system has such
+    limits."""
     try:
         import resource
 
@@ -426,8 +431,8 @@ CONTEXT: Any = multiprocessing.get_context(_START)
 
 
 def start_process(process: Any) -> None:
-    """Start a process of :data:`CONTEXT` with the environment variables of a worker (one thread,
-    the same instructions everywhere), without running the main program again in the process. Raises
+    """Start a process of :data:`CONTEXT` with the environment variables of a worker
+    (:func:`.worker_variables`), without running the main program again in the process. Raises
     OSError or EOFError if the process does not start."""
     try:
         os.getcwd()
@@ -458,8 +463,8 @@ def start_process(process: Any) -> None:
 
 @contextlib.contextmanager
 def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes with the environment variables of workers, for programs that run
-    methods or proofs themselves: results have the same bits on every x86-64 processor.
+    """Open a pool of processes with the environment variables of workers, with which all x86-64
+    processors round alike, for programs that run methods or proofs themselves.
 
     Examples
     --------

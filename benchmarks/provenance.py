@@ -60,8 +60,8 @@ def now() -> str:
 
 
 def made_with() -> dict[str, Any]:
-    """Return :func:`current_environment` with the ``command`` that started this process, a list of
-    words (``a notebook`` in a notebook), and the ``date``, UTC."""
+    """Return :func:`current_environment` with ``command``, this process's program and arguments, a
+    list of words (``a notebook`` in a notebook), and the ``date``, UTC."""
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
     return current_environment() | {"command": command, "date": now()}
@@ -69,8 +69,8 @@ def made_with() -> dict[str, Any]:
 
 def _commit_of_checkout() -> dict[str, Any] | None:
     """Return the commit of the checkout that the code runs from, as ``id``, and as ``dirty``
-    whether files of the commit were changed since (new files do not count); None for an installed
-    package or without Git."""
+    whether it was changed since (files that Git does not track do not count); None for an installed
+    package or if Git fails."""
     # A GIT_DIR of the caller, such as a hook, must not replace this checkout.
     clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
 
@@ -90,8 +90,8 @@ def _commit_of_checkout() -> dict[str, Any] | None:
 
 def arithmetic() -> str:
     """Return a fingerprint of how workers round, ``NumPy HASH, libm HASH``: hashes of the bits of
-    some results, computed in a process that is started like a worker; empty if no process starts.
-    Where a hash is the same, that library rounds alike."""
+    some results, computed in a process that is started like a worker; empty if it does not answer.
+    Where a hash is the same, that library rounds these results alike."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
     process = CONTEXT.Process(target=_say_arithmetic, args=(theirs,), daemon=True)
     try:
@@ -103,8 +103,8 @@ def arithmetic() -> str:
 
 
 def _say_arithmetic(pipe: Any) -> None:
-    """Send the text of :func:`arithmetic` through a pipe: a hash of eigenvectors, logarithms and
-    powers by NumPy, and a hash of functions by the C library."""
+    """Send the text of :func:`arithmetic` through a pipe: a hash of numbers computed by NumPy, and
+    a hash of numbers computed by the C library."""
     matrix = np.random.default_rng(0).standard_normal((16, 16))
     by_numpy = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix)), np.abs(matrix) ** 0.3
     numbers = np.abs(matrix).ravel().tolist()
@@ -113,5 +113,5 @@ def _say_arithmetic(pipe: Any) -> None:
         hashlib.sha256(b"".join(np.asarray(each).tobytes() for each in computed)).hexdigest()[:8]
         for computed in (by_numpy, by_libm)
     ]
-    with contextlib.suppress(OSError):  # nobody waits for it: the command was interrupted
+    with contextlib.suppress(OSError):  # the command was interrupted
         pipe.send("NumPy {}, libm {}".format(*hashes))

@@ -66,7 +66,7 @@ _asking = threading.Lock()
 def current_code(method: MethodInfo) -> str:
     """Return the code that a method has here, versions such as ``1.2`` or the hash of a method
     file's code; ``none`` if its file no longer defines the method. Raises CoarticError for a file
-    that cannot be used."""
+    that cannot be used, and KeyError for a built-in method that is not here."""
     if method.is_ours:
         return built_in()[method.name].code
     with _asking:
@@ -77,9 +77,9 @@ def current_code(method: MethodInfo) -> str:
 
 
 def check_id(name: str, origin: str, registered: Registry) -> None:
-    """Raise CoarticError for the id of a method from ``origin`` that has other characters than ids
-    have or more than 80, is reserved (capitals matter), or is an id in ``registered``, a condition
-    of the learner or one of :data:`NAMES`, whatever the case of its letters."""
+    """Raise CoarticError for the id ``name`` of a method from ``origin`` that is malformed or has
+    more than 80 characters, begins with a reserved word (:data:`_RESERVED`; capitals matter), or is, capitals aside, an id in
+    ``registered``, a condition of the learner or one of :data:`NAMES`."""
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(
             f"{origin}: the name {name!r} must begin with a letter or digit and have only letters, "

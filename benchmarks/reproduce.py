@@ -28,10 +28,10 @@ AFTER_ANOTHER = "with the same seed after another run"
 
 
 def find_run(prefix: str, folder: Path) -> Run:
-    """Find the run of a results folder whose id begins with ``prefix``.
+    """Return the run of a results folder whose id begins with ``prefix``.
 
-    Raises CoarticError if there is no such run, or more than one, for a prefix that no id can have,
-    and for a folder that cannot be read.
+    Raises CoarticError if there is no such run, or more than one, for an empty prefix, and for a
+    folder that cannot be read.
     """
     if not prefix or not set(prefix) <= set("0123456789abcdef-."):
         raise CoarticError(
@@ -50,7 +50,7 @@ def find_run(prefix: str, folder: Path) -> Run:
 
 def trajectory_of(run: Run) -> Trajectory:
     """Return the movements of a run's solution, executed and sampled at each tick. Raises
-    CoarticError if the run has no solution, or one that cannot be executed or is too long."""
+    CoarticError if the run has no solution, or its solution cannot be executed or is too long."""
     if "solution" not in run.scores:
         why = f"{run.outcome.status}, {run.outcome.reason}"
         raise CoarticError(f"run {run.id} has no solution to show: {why}")
@@ -66,17 +66,17 @@ def trajectory_of(run: Run) -> Trajectory:
 def perform_in_order(
     jobs: Sequence[Job], workers: int = 1, *, verbose: bool = False
 ) -> Iterator[Run]:
-    """Perform jobs: one new process performs all jobs of a method in order, and ``workers``
-    processes run at once. Yield the scored runs, which are not stored, as they finish. ``verbose``
-    shows what methods print and log."""
+    """Perform jobs, and yield the scored runs, which are not stored, as they finish. A new process
+    performs all jobs of a method in order, while it lives; at most ``workers`` processes run at
+    once. ``verbose`` shows what methods print and log."""
     with closing(Local(workers, verbose=verbose).perform(jobs, in_order=True)) as answers:
         for job, outcomes in answers:
             yield from score(job, outcomes)
 
 
 def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tuple[Run, Run]]:
-    """Perform stored runs again, by the methods that are here, and yield each with the new run,
-    which is not stored, in the order in which they finish. ``registered`` must have the methods.
+    """Perform stored runs again, by the methods that are here, and yield pairs of a stored run and
+    the new run, which is not stored, as they finish. ``registered`` must have the methods.
 
     Raises CoarticError if a method no longer takes the parameters of a run.
     """
@@ -101,9 +101,9 @@ def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tu
 
 
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
-    """Return at most ``count`` runs of a folder, spread over its cells, of methods that have in
-    ``registered`` the same version or code as in the run. Raises CoarticError if there is no such
-    run."""
+    """Return at most ``count`` (1 or more) runs of a folder's plan, at equal steps, of methods that
+    have in ``registered`` the same version or code as in the run. Raises CoarticError if there is
+    no such run."""
     with open_store(folder) as store:
         plan = store.plan()
         ids = [
@@ -130,7 +130,7 @@ def repeats_of(run: Run) -> list[Job]:
 
 def doubts_of(run: Run, repeats: Sequence[Run]) -> Iterator[str]:
     """Yield sentences on doubts about a method, from one of its runs and the runs of
-    :func:`repeats_of` in their order: angles in degrees, hidden state, no use of the seed."""
+    :func:`repeats_of` in their order: angles in degrees, hidden state, use of the seed."""
     name, task = run.cell.method.name, run.cell.task.name
     advice = f"see: coartic check {name}"
     if hint := hint_of(run.solution.movements):
@@ -159,8 +159,8 @@ def doubts_of(run: Run, repeats: Sequence[Run]) -> Iterator[str]:
 
 def compare_runs(a: Run, b: Run) -> list[str]:
     """Return the differences between the results of two runs, in words, an empty list for equal
-    results. Times and environments do not count, nor rewards that one run does not keep, nor marks
-    (:func:`.mark_of`), which depend on earlier runs."""
+    results: status, reason, details, counts, movements and rewards. Rewards that a run does not
+    keep do not count, nor marks (:func:`.mark_of`), which depend on earlier runs."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
     marks = LATE, EARLIER

@@ -45,7 +45,7 @@ _EXECUTORS = {
 }
 """Options of ``coartic run`` that are executors in Python."""
 _LEAST_BATCH = 8
-"""Most runs of a cell that are not divided among workers."""
+"""Most runs of a cell that are not divided among workers, if a method performs them together."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
 
@@ -70,18 +70,18 @@ class Progress:
     marks: dict[str, list[str]] = field(default_factory=dict)
     """Sentences on methods against which runs of the folder speak (:meth:`Store.marks`)."""
     others: Counter[int] = field(default_factory=Counter)
-    """Runs of earlier commands in the folder that the plan does not ask for, by the seed of their
-    suite. They are kept, and no report shows them."""
+    """Runs of earlier commands in the folder that the plan does not ask for, without :attr:`stale`
+    runs, by the seed of their suite."""
     wall_s: float = 0.0
     """Wall time of the call, s; 0 until it ends."""
     waiting: Counter[str] = field(default_factory=Counter)
-    """Runs still to perform, by method."""
+    """Runs still to perform, with repeats, by method."""
     took: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     """Wall time of the runs performed by this call, by method, s."""
     timed: Counter[str] = field(default_factory=Counter)
     """Number of runs with a known wall time, by method."""
     workers: int = 1
-    """Number of runs that are performed at once."""
+    """Number of processes that perform runs at once; 1 if it is not known."""
     repeats: int = 0
     """Runs still to perform that only show whether results of own methods repeat."""
 
@@ -113,8 +113,8 @@ class Progress:
 
     @property
     def time_left(self) -> float:
-        """Seconds that the missing runs will take, from the mean times of performed runs; NaN until
-        a quarter is done."""
+        """Seconds that the runs to perform will take, from the mean times of performed runs; NaN
+        until a quarter is done, and if no time is known."""
         coming = +self.waiting
         if not self.timed or self.done < coming.total() / 3:
             return math.nan
@@ -123,7 +123,8 @@ class Progress:
         return sum(each.get(m, mean) * count for m, count in coming.items()) / self.workers
 
     def __repr__(self) -> str:
-        """Return a sentence: how many runs were made in which time, how many failed, the folder."""
+        """Return a sentence: how many runs are there, after which time, how many failed, and the
+        folder."""
         minutes, seconds = divmod(self.wall_s, 60)
         long = self.wall_s >= 100
         time_taken = f"{minutes:.0f} min {seconds:.0f} s" if long else f"{self.wall_s:.0f} s"
@@ -144,8 +145,8 @@ class Progress:
 
 
 Watcher = Callable[[Progress, Cell | None], None]
-"""Function that is called before the first run, and after each run with its cell. An exception in
-it ends no run: a warning says so, and it is not called again."""
+"""Function that is called with the progress: before the first run with None, then with the cell of
+each run. After an exception in it, which gives a warning, it is not called again."""
 
 
 def run_suite(
@@ -161,7 +162,7 @@ def run_suite(
     Parameters
     ----------
     suite : str, Path or Suite
-        A suite, a shipped one by name, or a suite file (``.toml``).
+        A suite, a shipped suite by name, or a suite file (``.toml``).
     folder : str or Path
         Results folder, which is made if it is missing.
     executor, watch
@@ -202,11 +203,10 @@ def perform(
     """Perform the runs of a plan that a results folder lacks.
 
     The plan replaces the plan of the folder; other runs stay there, and no report shows them. Runs
-    that fail are stored and counted, and raise nothing; those that crashed, or timed out under a
+    that fail are stored and counted, and raise nothing; runs that crashed, or timed out under a
     lower limit, are performed again by the next call. An interruption keeps finished runs. For each
-    method of a file, a run is made again after a run with another seed (the shortest run, alone, if
-    all take more than a minute); a warning says if the results differ, or if targets may be meant
-    in degrees.
+    method of a file, an ok run of this call is made again after a run with another seed (alone if
+    all take more than a minute); warnings say what is doubtful, such as other results.
 
     Parameters
     ----------
@@ -307,9 +307,9 @@ def perform(
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the missing runs of the plan, a job for each cell, with runs that crashed or timed out
-    under a lower limit; count the other runs in ``progress``. Raises CoarticError if runs are
-    missing whose method has no code here."""
+    """Return the missing runs of the plan and, if the code of their method is here, runs that
+    crashed or timed out under a lower limit, a job for each cell; count the other runs in
+    ``progress``. Raises CoarticError if runs are missing whose method has no code here."""
     there: set[tuple[int, int]] = set()
     for position, number, status, had_s in store.present():
         job = plan[position]
@@ -335,10 +335,10 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs for workers, and return them in the order in which they begin."""
+    """Divide jobs for workers, and return the parts, long parts first."""
     # A run among many takes a fraction of its time alone: jobs are as large as methods allow, and
-    # each worker has a part. Long jobs come first, as none may be alone at the end; one run of a
-    # planner, which has no number of trials, can take as long as thousands of trials.
+    # each worker has a part. Long jobs come first, so that none is alone at the end; one run of a
+    # planner, which has no number of trials, can take as long as thousands of trials: it is first.
 
     def divide(job: Job, size: int) -> Iterator[Job]:
         for first in range(0, len(job.numbers), size):

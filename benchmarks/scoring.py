@@ -14,8 +14,8 @@ from coartic.tasks.task import Task, hands_of
 
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
-    """Return the scored runs of a job from their outcomes, in order. All ``parts`` (the solution,
-    and initial and replay if present) are executed; only runs that are ok have scores."""
+    """Return the scored runs of a job from their outcomes, in order. All ``parts`` that outcomes
+    have (solution, initial, replay) are executed; only runs that are ok have scores."""
     task = job.cell.task
     executions = iter(execute_all(task, [m for each in outcomes for m in each.parts.values()]))
     runs = []
@@ -47,9 +47,9 @@ def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
 
 
 def _final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
-    """Return status and reason of a run: ``infeasible`` if a part misses a goal, ``solver-failed``
-    if a part cannot be executed or an outcome that is ok has no solution, else status and reason of
-    the outcome."""
+    """Return status and reason of a run, from its first part that misses a goal (``infeasible``) or
+    cannot be executed (``solver-failed``); else ``solver-failed`` if an outcome that is ok has no
+    solution, else status and reason of the outcome."""
     for execution in parts.values():
         if isinstance(execution, Exception):
             return "solver-failed", f"the solution cannot be executed: {execution}"

@@ -1,5 +1,5 @@
-"""Read suites: tasks, methods, parameters and numbers of runs, from files such as those of
-``benchmarks/suites``."""
+"""Read suites: tasks, methods, parameters and numbers of runs, from files such as
+``benchmarks/suites/quick.toml``."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ TaskNamed = Callable[[str], Task]
 
 def _plain_value(value: Any) -> _Plain:
     """Return the value of a parameter: a bool, finite number or text as it is, a list of finite
-    numbers, not empty, as a tuple of floats. Raises PydanticCustomError for any other value, such
-    as an integer beyond the range of floats."""
+    numbers or bools, not empty, as a tuple of floats. Raises PydanticCustomError for any other
+    value."""
     numbers = value if isinstance(value, list | tuple) else [value]
     most = sys.float_info.max
     if numbers and all(isinstance(each, int | float) and abs(each) <= most for each in numbers):
@@ -55,7 +55,7 @@ _Number = Annotated[int, Field(ge=1, strict=True)]
 
 
 class Move(FileData):
-    """A change that makes several tasks of a task, which differ in the place of one goal."""
+    """Displacements of one goal of a task, which make tasks of the task."""
 
     goal: _Number
     """Number of the goal, from 1."""
@@ -68,7 +68,7 @@ class _Block(FileData):
 
     tasks: _Names
     """Names or files of tasks, or ranges of instances such as ``long/v1/i000..i039``; ``["*"]`` for
-    all tasks."""
+    all shipped tasks and the user's."""
     methods: _Names
     """Ids of methods; ``["*"]`` for all methods that apply to the tasks."""
     move: Move | None = None
@@ -89,7 +89,7 @@ class _Block(FileData):
     @model_validator(mode="after")
     def says_everything_once(self) -> _Block:
         """Return this block. Raises ValueError for a parameter that is in ``parameters`` and in
-        ``grid``, and for a value that is in the grid twice."""
+        ``grid``, and for a parameter that has equal values in the grid."""
         for name, values in self.grid.items():
             if name in self.parameters:
                 raise sentence_error(
@@ -127,14 +127,14 @@ _TAKEN_BY = {
     "method file": "coartic check METHOD --method-file {}",
     "shipped family": "coartic list {}",
 }
-"""Command that takes a thing of each kind."""
+"""Command that takes a thing, by its kind."""
 
 
 def kind_of(name: str) -> str:
-    """Return the kind of the thing that is named: ``suite`` or ``shipped family`` for the name of a
-    shipped one; ``method file`` for a name that ends in ``.py``; ``suite``, ``family`` or ``task``
-    for a file ``.toml``, by its keys; ``results folder``, also for a folder that may not be opened;
-    or an empty text for anything else. Raises CoarticError for a ``.toml`` that cannot be read."""
+    """Return the kind of the thing that is named: ``suite`` or ``shipped family`` for a shipped
+    name; ``method file`` for a name that ends in ``.py``; ``suite``, ``family`` or ``task`` for a
+    file ``.toml``, by its keys; ``results folder``, also for a folder that may not be opened; or an
+    empty text for anything else. Raises CoarticError for a ``.toml`` that cannot be read."""
     if name in suites():
         return "suite"
     if {name, f"{name}/v1"} & {*shipped_families()}:
@@ -178,8 +178,8 @@ def load_suite(name: str) -> Suite:
 
 
 def _read_suite(path: Path) -> Suite:
-    """Return the suite of a file. Raises CoarticError with a line for each of its first 20
-    problems, or with one line if it cannot be read."""
+    """Return the suite of a file. Raises CoarticError with lines on its first 20 problems, or with
+    one line if it cannot be read."""
     content = read_toml(path)
     try:
         return Suite.model_validate({"name": path.stem, **content})
@@ -208,7 +208,7 @@ def tasks_of(
 def _changed_tasks(task: Task, suite: Suite, block: _Block) -> list[Task]:
     """Return the tasks that a block makes of a task: the task, with a free base if the block asks
     for it, or in its place a task for each place of the moved goal. Raises CoarticError if the base
-    is free already, or if there is no such goal."""
+    to be freed is free already, if there is no such goal, and for a place out of reach."""
     source = f"suite {suite.name!r}"
 
     def changed(name: str, difference: str, **changes: Any) -> Task:

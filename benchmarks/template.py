@@ -15,7 +15,7 @@ class Mine(Optimiser):
     tuned_on = "nothing"  # tasks on which you chose its constants, here the step of 0.03
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
-        """Minimise the cost of a trial, until ``objective`` raises BudgetError, as no trial is
+        """Minimise the cost of a trial until ``objective`` raises BudgetError because no trial is
         left: do not catch it. The best point counts."""
         # Draw from rng alone. A point has the joints of all goals; units: length, rad.
         x = objective.x0  # the postures of the corrective process

@@ -1,7 +1,7 @@
 """Let a method solve a task in a worker process, and state the outcome as plain data.
 
-A method can run any code, so nothing that it states is trusted: the parent process, which imports
-no method file, executes and scores its solution.
+A method can run any code: the parent process, which imports no method file, checks the form of
+what the method states, and executes and scores the solution.
 """
 
 from __future__ import annotations
@@ -43,6 +43,8 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 _OUTCOMES = TypeAdapter(list[Outcome])
 _ENVIRONMENT = TypeAdapter(dict[Literal["libraries", "imports"], dict[Line, Line] | list[Line]])
 _LONGEST_DETAILS = 10_000_000
+_MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError, RecursionError
+"""Errors of malformed data."""
 
 
 def process_peak_mb() -> float | None:
@@ -62,8 +64,8 @@ def fail(
     wall_s: float | None = None,
     cpu_s: float | None = None,
 ) -> list[Outcome]:
-    """Return an outcome for each run of a job whose worker gave no answer. ``wall_s`` and ``cpu_s``
-    are the times of the job, s, of which each run has an equal share."""
+    """Return an outcome for each run of a job whose worker gave no usable answer. ``wall_s`` and
+    ``cpu_s``, times of the job, s, are shared evenly by its runs."""
     runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
     return [Outcome(status, reason, times=times) for _ in job.numbers]
@@ -71,7 +73,7 @@ def fail(
 
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
     """Return outcomes as JSON, a list of objects with the fields of :class:`Outcome`. Raises
-    TypeError or ValueError for data that JSON cannot hold."""
+    TypeError, ValueError or RecursionError for data that JSON cannot hold."""
 
     def plain(outcome: Outcome) -> dict[str, Any]:
         parts = {part: [*map(movement_data, made)] for part, made in outcome.parts.items()}
@@ -83,7 +85,7 @@ def answer_of(outcomes: Sequence[Outcome]) -> bytes:
 
 def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
     """Return the outcomes of a job from its answer, the JSON of :func:`answer_of`; an outcome
-    ``crashed`` for each run if the answer cannot be read."""
+    ``crashed`` for each run if the answer is malformed or :func:`_check_stated` refuses it."""
     try:
         content = json.loads(answer)
         for each in content:
@@ -95,7 +97,7 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
         if len(outcomes) == len(job.numbers):
             return outcomes
         why = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
-    except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
+    except _MALFORMED as error:
         why = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
 
@@ -197,8 +199,8 @@ def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times)
 
 
 def _place_of(error: BaseException, method: MethodInfo) -> str:
-    """Return the line of a method file in which a run crashed, as ``mine.py, line 12: ``; empty for
-    an error elsewhere."""
+    """Return the last line of its method file that an error passed, as ``mine.py, line 12: ``;
+    empty if it passed none, and for a built-in method."""
     if method.is_ours:
         return ""
     module = sys.modules.get(method.where)
@@ -210,8 +212,8 @@ def _place_of(error: BaseException, method: MethodInfo) -> str:
 
 def statement(result: Any, session: Session) -> dict[str, Any]:
     """Return ``parts`` and ``details`` of an :class:`Outcome`, by name, from a method's result.
-    Raises SolutionError for a result that cannot be kept, and UndeclaredError for movements without
-    a target if the corrective process is not declared."""
+    Raises SolutionError for a result that cannot be kept, and UndeclaredError for a solution with a
+    corrective movement without a target if the corrective process is not declared."""
     if not isinstance(result, Result):
         raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
     try:
@@ -222,14 +224,14 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
         }
         session.check_solution(parts["solution"])
         details = _plain_details(result.details)
-    except (TypeError, ValueError, AttributeError, RecursionError) as error:
+    except _MALFORMED as error:
         raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
     return {"parts": parts, "details": details}
 
 
 def _plain_details(details: Any) -> dict[str, Any]:
-    """Return a copy of the details of a result as plain data. Raises TypeError or ValueError for
-    details that JSON cannot hold, and for more than 10,000,000 characters."""
+    """Return a copy of the details of a result as plain data. Raises TypeError, ValueError or
+    RecursionError for details that JSON cannot hold, and for more than 10,000,000 characters."""
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
     if len(text) > _LONGEST_DETAILS:
         raise ValueError(f"details of {len(text)} characters; at most {_LONGEST_DETAILS} are kept")

@@ -177,6 +177,9 @@ def test_two_results_of_one_run(parts, tmp_path):
         joined([parts[0], other], tmp_path / "whole", LEFT)
     with pytest.raises(CoarticError, match="differs in .*same and .*other"):
         joined([other], tmp_path / "same", LEFT)
+    include_folders(planned(RIGHT[2:], **OPTIONS), parts[:1], tmp_path / "part", ["descending"])
+    with pytest.raises(CoarticError, match="differs in .*part and .*other"):  # beyond its plan
+        include_folders(planned(RIGHT[2:], **OPTIONS), [other], tmp_path / "part", ["descending"])
 
 
 def test_what_does_not_go_together(parts, tmp_path):

@@ -116,6 +116,10 @@ HANDLED = {
     "far": ("return Result((Movement(1, 'right', 'planned', session.q0 + 1e6),) * 3)",
             "solver-failed", "steps; at most"),
     "many": ("return Result(corrected(session) * 9999)", "solver-failed", "movements; at most"),
+    "endless": ("return Result((Movement(np.inf, 'right', 'corrective'),) * 3)",
+                "solver-failed", "cannot be kept: OverflowError"),
+    "leads_nowhere": ("return Result((Movement(1, 'right', 'path', waypoints=[]),) * 3)",
+                      "solver-failed", "cannot be kept: IndexError"),
     "details": ("return Result(corrected(session), {'call': print})",
                 "solver-failed", "cannot be kept: TypeError"),
     "two_ends": ("way = Movement(1, 'right', 'path', session.q0 + 1, waypoints=[session.q0])\n"
@@ -405,6 +409,26 @@ def test_workers_end_with_their_parent(script):
         assert process.poll() is None
     process.kill()
     assert comes(lambda: not folders_of_session(process.pid))
+
+
+def test_one_worker_at_most_waits_for_jobs(monkeypatch):
+    made, new = [], Workers.worker_for
+    monkeypatch.setattr(Workers, "worker_for", lambda *given: made.append(new(*given)) or made[-1])
+    jobs = [planned([cell_on(TASK, KNOWN["corrective-alone/given"])])[0] for _ in range(2)]
+
+    def alive():
+        return sum(worker.exit_code is None for worker in made)
+
+    with contextlib.closing(Workers(Local(2), stays=True)) as workers:
+        assert len([*workers.perform(jobs)]) == len(made) == 2
+        assert comes(lambda: alive() == 1)
+    assert comes(lambda: not alive())
+
+
+@pytest.mark.parametrize("timeout_s", [-1.0, float("nan"), float("inf")])
+def test_a_time_out_of_bounds(timeout_s):
+    with pytest.raises(ValueError, match="timeout_s is .*; it must be a number from 0 to"):
+        Local(timeout_s=timeout_s)
 
 
 def test_workers_that_are_dropped_leave_no_folder():

@@ -1,7 +1,7 @@
-"""The command line, on top of the four packages, which do not import it.
+"""The command line ``coartic``.
 
-Each command is a function: of :mod:`~coartic.cli.run`, :mod:`~coartic.cli.read` or
-:mod:`~coartic.cli.draw`. A command imports other packages only when it is called, so that help and
+Each command is a function of :mod:`~coartic.cli.run`, :mod:`~coartic.cli.read` or
+:mod:`~coartic.cli.draw`. A command imports most packages only when it is called, so that help and
 completion are fast.
 """
 
@@ -62,7 +62,7 @@ class _Command(TyperCommand):
         super().format_options(ctx, formatter)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Return the words after the command's name in the line of its usage, without braces."""
+        """Return the words after the command's name in its line of usage, without braces around."""
         return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
 
 
@@ -84,7 +84,7 @@ for command, example in COMMANDS:
 
 
 def main() -> None:
-    """Run the command line; exit with code 2 after an error that the user can correct, with code 1
+    """Run the command line, and exit: with code 2 after a CoarticError or wrong usage, with code 1
     after an error of the system, or if the command found something wrong."""
     gc.set_threshold(100_000, 50, 1_000)  # imported modules stay: collect garbage rarely
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):

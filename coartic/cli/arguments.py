@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
 
 def file_or_folder(metavar: str, what: str, *names: str) -> Any:
-    """Return an option that reads a file or a folder, which need not exist, as a Path. Its flags
-    are ``names``, or follow from its parameter; ``metavar`` names its value in the help, ``what``
-    is its help. An empty or impossible name raises CoarticError."""
+    """Return an option for the name of a file or folder, which need not exist, read as a Path. Its
+    flags are ``names``, or follow from its parameter; ``metavar`` names its value in the help,
+    ``what`` is its help. An empty or impossible name raises CoarticError."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
 
 def option(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for text, or for files that are read later, by its flags ``names``;
-    ``metavar`` names its value in the help, ``what`` is its help."""
+    """Return an option for text, or for names of files that are read later; parameters as in
+    :func:`file_or_folder`."""
     return typer.Option(*names, readable=False, metavar=metavar, help=what)
 
 
@@ -62,8 +62,8 @@ def within(option: str, what: str, least: float, most: float) -> Any:
 
 
 def _value_in(text: str) -> Any:
-    """Return the number that an option names, an int if it is one, or the range ``50..99``, both
-    ends included; any other text is returned unchanged."""
+    """Return the int, or else the float, that an option states, or the range ``50..99``, both ends
+    included; any other text is returned unchanged."""
     ends = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", str(text))  # a default is no text
     value: Any = range(int(ends[1]), int(ends[2]) + 1) if ends else text
     for kind in (float, int):
@@ -74,8 +74,8 @@ def _value_in(text: str) -> Any:
 
 def request_option(name: str, what: str, unit: str = "N") -> Any:
     """Return an option for a value, a number or ``50..99``, that :func:`.request_for` takes by
-    ``name``, such as ``time_limit_s``; ``what`` is its help, ``unit`` names its value there. Its
-    flag is the name without ``_s``: ``--time-limit``. Reading a value that is refused raises
+    ``name``, such as ``time_limit_s``; ``what`` is its help, ``unit`` names its value in the help.
+    Its flag is the name without ``_s``: ``--time-limit``. Reading a value that is refused raises
     CoarticError."""
     option = f"--{name.removesuffix('_s').replace('_', '-')}"
 
@@ -91,7 +91,8 @@ def request_option(name: str, what: str, unit: str = "N") -> Any:
 
 
 def names_in(text: str | None) -> list[str]:
-    """Return the names in ``text``, separated by commas, without blanks; an empty list for None."""
+    """Return the names in ``text``, also empty, separated by commas, without blanks around them; an
+    empty list for None."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
@@ -160,8 +161,8 @@ def check_used(
 
 
 def file_name(method: str) -> str:
-    """Return the name of the file that ``coartic new`` writes for a method: one that Python can
-    import, and that hides no module of Python's."""
+    """Return the name of the file that ``coartic new`` writes for the id of a method: a file that
+    Python can import, and that hides no standard module, coartic or NumPy."""
     stem = re.sub(r"\W", "_", method)
     taken = {*keyword.kwlist, *sys.stdlib_module_names, "coartic", "numpy"}
     return f"{stem if stem.isidentifier() and stem not in taken else f'my_{stem}'}.py"

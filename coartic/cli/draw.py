@@ -44,7 +44,7 @@ def draw(
     ] = None,
     replace: given.Replace = False,
 ) -> None:
-    """Draw tasks, or write them into a folder as files; or film runs."""
+    """Draw tasks, or write them, with a drawing, into a folder; or film runs."""
     if run:
         if len(tasks := tasks or []) != 1:
             raise CoarticError("--run needs one results folder: coartic draw FOLDER --run ID")
@@ -84,7 +84,7 @@ def _film(
 ) -> None:
     """Write a film (.gif, .mp4), ``width`` pixels wide, of one or two runs of a results folder side
     by side, or, with ``initial``, of one run next to the corrective process alone. Raises
-    CoarticError for more movements or an unknown run, and if ``out`` may not be written."""
+    CoarticError for more or unknown runs, and if the film cannot be made or written."""
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of

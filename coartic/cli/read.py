@@ -90,14 +90,12 @@ def _with_id(name: str, row: Mapping[Any, Any]) -> str:
 
 
 def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> None:
-    """Print a table, then pairs of a word and a text.
+    """Print the ranking of a study as a table, then pairs of a word and a text.
 
-    The table has methods of the ranking, without settings and ablations: those with the smallest
-    gaps and, wherever they rank, the learner and random search; and all methods from files, with
-    their ids and settings, and of the labels ``asked`` that are in no joined row, also below the
-    ranking. The pairs are the reasons why these are not ranked, the findings on
-    coarticulation and on cost, numbers of runs and trials that are not those of the paper, the
-    failed runs, and ``more``.
+    The table has ranked methods: some with the smallest gaps, the learner and random search; and,
+    ranked or not, if they have a gap, methods from files, and methods of the labels ``asked`` for
+    which no other row stands. The pairs say why methods are not ranked, what was found on
+    coarticulation and cost, how runs differ from the paper's, which failed, and ``more``.
     """
     from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
@@ -162,8 +160,8 @@ def verify(
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """Execute every stored solution again and, with --again, perform runs again, or only one with
-    --run; exit with code 1 if something differs, or if runs of the plan are missing."""
+    """Execute every stored solution again and, with --again, perform runs again; with --run, only
+    perform one run again. Exit with code 1 if something differs or, without --run, is missing."""
     from coartic.analysis.verify import check_runs
     from coartic.runs.store import explain_errors, open_store
 
@@ -194,8 +192,8 @@ def verify(
 def _perform_again(
     folder: Path, count: int, run_id: str | None, method_file: list[Path] | None
 ) -> int:
-    """Perform a run of a folder again, or, without ``run_id``, ``count`` of its runs; print the
-    differences from the stored runs and return the number of runs with another result."""
+    """Perform a run of a folder again, or, without ``run_id``, at most ``count`` of its runs; print
+    the differences from the stored runs and return the number of runs with another result."""
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again, some_runs
     from coartic.runs.store import open_store
@@ -261,7 +259,7 @@ def cite(
         bool, typer.Option("--analysis", help="Also works behind statistics and signatures.")
     ] = False,
 ) -> None:
-    """Print BibTeX for coartic, the paper and the methods of a folder."""
+    """Print BibTeX for coartic, the paper and the methods of a folder, or all methods."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
     from coartic.runs.store import open_store

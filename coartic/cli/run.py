@@ -77,7 +77,7 @@ def run(
         given.option("FOLDER", "Include the runs of a folder, or of the 'shipped' results."),
     ] = None,
 ) -> None:
-    """Run the missing part of a suite and print the findings.
+    """Run the missing part of a suite; print the findings, unless --runs names a part.
 
     If it is interrupted, repeat the command: it resumes where it stopped, and repeats runs that
     crashed.
@@ -144,7 +144,7 @@ def list_(
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """List tasks, suites and methods, describe one of them, or list the runs of a folder."""
+    """List tasks, suites and methods, describe what is named, or list the runs of a folder."""
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
@@ -244,7 +244,7 @@ def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     """Yield pairs of word and text: title, name, information, parameters and tasks of a method,
-    whether its runs differ by seed, and its citation."""
+    whether its runs differ by seed, what it was tuned on, and its citation."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import in_words

@@ -39,7 +39,7 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
     """Print lines on ``stream``, by default standard output, and then ``end``; characters that do
     not print, such as line breaks in names, and characters that the terminal lacks are replaced.
     Raises CoarticError if standard output cannot be written, BrokenPipeError if the reader of
-    ``stream`` has ended; if standard error cannot be written, the lines are lost."""
+    ``stream`` has ended; if another stream cannot be written, the lines are lost."""
     stream = stream or sys.stdout
     encoding = getattr(stream, "encoding", None) or "utf-8"
     text = "\n".join(map(one_line, lines)).replace("\u202f", " ")
@@ -89,8 +89,8 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 class Display:
     """Progress of a command on standard error, such as runs done, failures and time left. On a
-    terminal one line changes; elsewhere a line appears every ten seconds at most. What takes
-    longer is shown again, with its time so far."""
+    terminal one line changes; elsewhere a line appears about every ten seconds (:meth:`show`).
+    What takes longer is shown again, with its time so far."""
 
     EVERY_S = 10.0
 
@@ -143,8 +143,8 @@ class Display:
                 self._print(f"{self._doing} ({now - self._since:.0f} s so far)")
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
-        """Show the progress and the cell of the last run; before the first run (``cell`` None) show
-        which runs the folder has already."""
+        """Show the progress, on a terminal with the cell of the last run, unless no run was
+        missing; before the first run (``cell`` None) first show which runs are there already."""
         from coartic.analysis.methods import title_of
 
         total = progress.total
