@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import sys
 import unicodedata
 import warnings
 from collections.abc import Callable, Sequence
@@ -37,6 +38,7 @@ MANY = 20
 _OUTSIDE = 1.25
 """Radii from the centre of a goal from which hits are not at its edge."""
 _NAMED = 5  # of a kind
+_INNER = ("coartic", "pydantic")  # packages whose lines no warning names
 _MONTH = "(jan|feb|m[aä]r|apr|ma[iy]|jun|jul|aug|sep|o[ck]t|nov|de[cz])[a-z]*"
 _ANGLES = {"": 1.0, "degrees are made rad": np.pi / 180, "gradians are made rad": np.pi / 200,
            "turns are made rad": 2 * np.pi}  # fmt: skip
@@ -239,11 +241,14 @@ def also(names: Sequence[str]) -> str:
 
 
 def warn(text: str, refuse: bool = False) -> None:
-    """Warn with this text, in the line of the program that called this package; with ``refuse``
-    raise CoarticError in place of it."""
+    """Warn with this text, at the line outside of this package that called it; with ``refuse``
+    raise CoarticError with this text in place of a warning."""
     if refuse:
         raise CoarticError(text)
-    warnings.warn(text, stacklevel=5)
+    frame, level = sys._getframe(), 1
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in _INNER:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, stacklevel=level)
 
 
 def _written(text: str) -> str:

@@ -130,12 +130,15 @@ def test_a_hit_that_nobody_can_have_made_is_named_or_left_out(people, read, reas
         read(frame)
     with pytest.raises(CoarticError, match=rf"the frame, row {row}: .*{reason}.*Mend"):
         solutions_of(TASK, frame)
-    with pytest.warns(UserWarning, match=f"1 of {len(people)} hits are left out as implausible"):
+    words = f"1 of {len(people)} hits are left out as implausible"
+    with pytest.warns(UserWarning, match=words) as warned:
         left = read(frame, implausible="drop")
+    assert {warning.filename for warning in warned} == {__file__}
     assert len(left) == len(people) - 1
     pd.testing.assert_frame_equal(left, read(people[~bad]))
-    with pytest.warns(UserWarning, match=rf"left out as implausible, row {row}"):
+    with pytest.warns(UserWarning, match=rf"left out as implausible, row {row}") as warned:
         trials = solutions_of(TASK, frame, implausible="drop")
+    assert {warning.filename for warning in warned} == {__file__}
     assert len(trials.runs) == len(solutions_of(TASK, people).runs) - 1
 
 

@@ -99,8 +99,10 @@ def test_a_file_is_read_as_a_frame_and_ticks_are_of_the_unit(tmp_path):
 
 
 def test_an_arm_without_markers_keeps_its_start():
-    with pytest.warns(UserWarning, match="the left arm has no markers and keeps its start"):
+    words = "the left arm has no markers and keeps its start"
+    with pytest.warns(UserWarning, match=words) as warned:
         hits = hits_from_markers(recorded(ONE_OF_TWO), BOTH)
+    assert {warning.filename for warning in warned} == {__file__}
     left = BOTH.robot.joints("left")
     assert (hits[[*BOTH.robot.joint_names[left]]] == BOTH.q0[left]).all(axis=None)
     assert {*hits.hand} == {"right"}
