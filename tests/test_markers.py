@@ -347,7 +347,7 @@ def twice(t):
 
 
 def dropped(t):
-    """A sixth of the frames is lost, and times are numbered anew."""
+    """A sixth of the frames is lost, and times are numbered again."""
     return t[np.random.default_rng(len(t)).random(len(t)) > 1 / 6]
 
 
@@ -375,7 +375,7 @@ SAID |= {
     "right_._. is rounded to 0.003, the radius of goals is 0.01": lambda t: t.assign(
         **(t.iloc[:, 3:] / 0.003).round() * 0.003
     ),
-    r"\d+ times markers go twice as far between samples .* numbered anew": each_trial(dropped),
+    r"\d+ times markers go twice as far between samples .* numbered again": each_trial(dropped),
     r"the length of right link 1 follows joint 2, by 1 % .* slide over a joint.*link 2": soft,
 }
 
