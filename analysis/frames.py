@@ -52,13 +52,13 @@ def checked(
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
     """Return a copy of a user's frame with these columns alone: ``numbers`` as float64 with NaN for
-    missing numbers, ``names`` and ``others`` as they are. With ``reward`` in ``numbers``, a column
-    ``status`` is kept and has to agree: a run has a reward if, and only if, it is ``ok``.
+    missing numbers, ``names`` and ``others`` as they are. With ``reward``, a column ``status`` is
+    kept and has to agree: all runs with a reward, and no others, are ``ok``.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
     that is no frame, a missing column, a column that is there twice, no rows, a value of ``names``
     that is missing, a value of ``names`` or ``others`` without a hash, such as a list, and for
-    ``numbers`` that are no numbers, infinite, or neither 0 nor from 1e-100 to 1e100 in size.
+    ``numbers`` that are no numbers, or neither 0 nor from 1e-100 to 1e100 in size.
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
@@ -161,8 +161,8 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     ``method`` includes the setting if a method of the frame has several settings; ``task`` is the
     number of the task, from 0, in the order of names; ``key`` is the same number in all rows of a
     run (:data:`_SOURCES`). ``more``: names of other columns of numbers to keep. Raises CoarticError
-    as :func:`checked` and :func:`_with_gaps` do, and for a task with several best known rewards, or
-    several :data:`ZERO`.
+    as :func:`checked` and :func:`_with_gaps` do, and for a task with several ``best_known`` or
+    :data:`ZERO`.
     """
     there = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)
@@ -211,9 +211,8 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text, infinite rewards, rewards above 0 (costs
-        are positive, rewards negative) or above the best known reward, a best known reward of 0, or
-        a ``status`` that contradicts a reward.
+        The frame has no rows, lacks a column, or has text, rewards above 0 (costs are positive,
+        rewards negative), rewards above the best known reward, or a best known reward of 0.
 
     Examples
     --------
@@ -238,8 +237,8 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     -------
     Series
         (reward - corrective_best) / (best_known - corrective_best) by the frame's index; negative
-        where the corrective process does better. NaN where nothing can be gained, and where one of
-        the three is NaN.
+        where the corrective process does better. NaN where nothing can be gained, or a reward is
+        NaN.
 
     Raises
     ------
@@ -459,8 +458,8 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        A column is missing or a reward is wrong (:func:`ranking`), the rewards of a run fall,
-        trials are missing or below 1, targets are no gaps, or the frame has no best known reward.
+        A column is missing or a reward is wrong (:func:`ranking`), trials are below 1, targets are
+        no gaps, or the frame has no best known reward.
 
     Examples
     --------
@@ -523,14 +522,13 @@ def solutions_of(
         posture, a column for each of ``task.robot.joint_names``, length unit and rad. The frame is
         checked like a file of :func:`coartic.analysis.read_hits`.
     implausible : {"refuse", "drop"}
-        Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
-        out.
+        Implausible hits (:func:`.read_hits`) raise CoarticError or are left out.
 
     Returns
     -------
     Solutions
         A run for each trial in which all goals are hit; ``run_ids`` has subject and trial, such as
-        ``P1 3``, and ``unfinished`` is ``hits.attrs["unfinished"]``, or 0.
+        ``P1 3``.
 
     Raises
     ------

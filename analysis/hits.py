@@ -71,15 +71,14 @@ def read_hits(
     twice, a name is spelt in two ways, rows are in no order of goals, values are rounded, repeat or
     never vary, times do not follow paths, or are of reactions or of a clock that runs on in some
     trials, and hits contradict the place or the radius of goals, or do so in some trials, as if a
-    sensor had slipped. Not seen are, for instance, trials in another order.
+    sensor had slipped.
 
     Each hit is checked among those of its subject. Implausible is a hit whose hand is more than two
     radii from its goal (up to ten, if motor noise puts a quarter of the hits outside of goals),
     whose locked base is moved as far, whose arm has an angle beyond ±20 rad, one number in place of
     all its angles once it has moved, or, in three hits or more, exact means of the hits around it,
     or whose time is over 20 times the longest subtask of the corrective process, or clearly too
-    short for a straight movement. Implausible hits are refused, or with ``implausible="drop"`` left
-    out; if they are most hits of a subject they are always refused.
+    short for a straight movement.
 
     Parameters
     ----------
@@ -95,7 +94,8 @@ def read_hits(
         Ticks in a unit of ``duration``, such as 100 for seconds; by default 1. Not for a file that
         has ``ticks``.
     implausible : {"refuse", "drop"}
-        "drop" leaves implausible hits out, with a warning that counts them, unless most are.
+        "drop" leaves implausible hits out, with a warning that counts them, unless most hits of a
+        subject are implausible.
 
     Returns
     -------
@@ -106,9 +106,9 @@ def read_hits(
     Raises
     ------
     CoarticError
-        The file is no such table, an argument is wrong, hits are implausible, times are impossible,
-        coarse, in two units or of a clock that runs on, or a joint that seems wrapped turns by more
-        than 2.5 rad between hits. A sentence says where and what is needed.
+        The file is no such table, hits are implausible, times are impossible, coarse, in two units
+        or of a clock that runs on, or a joint that seems wrapped turns by more than 2.5 rad between
+        hits.
     """
     if ticks_per_unit is not None and not 0 < ticks_per_unit < np.inf:
         raise CoarticError(
@@ -161,7 +161,7 @@ def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
         or not all(headings)
         or not 1 < len({*headings}) == len(headings)
         or body.count(",") != rows * (len(headings) - 1)
-        or body.partition("\n")[0].count(",") != len(headings) - 1  # pandas makes an index of more
+        or body.partition("\n")[0].count(",") != len(headings) - 1  # else pandas shifts columns
     ):
         return None
     try:
@@ -227,8 +227,7 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
 
 
 def turned(places: Array, axes: str) -> Array:
-    """Return places, x and y, shape ``(..., 2)``, after a change of axes, a key of
-    :data:`AXES`."""
+    """Return places ``(..., 2)``, x and y, after a change of axes, a key of :data:`AXES`."""
     sign, quarters = AXES[axes]
     at = (places[..., 0] + sign * 1j * places[..., 1]) * 1j**quarters
     return np.stack([at.real, at.imag], axis=-1)
@@ -294,7 +293,7 @@ def as_numbers(values: pd.Series) -> NDArray[np.float64]:
 
 def why_no_number(value: object) -> str:
     """Return in words why a value is no number: it looks like a date, or a character spoils it; for
-    other values, such as a missing value, that a number is needed."""
+    other values that a number is needed."""
     text = _written(str(value))
     if _DATE.fullmatch(text):
         return "it looks like a date that a spreadsheet made of a number: import numbers as text"
@@ -457,8 +456,8 @@ def checked_hits(
 
 def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
     """Unwrap the angles of sorted hits in place, each trial from the task's start on, with a
-    warning if an angle changes. Raises CoarticError if angles of a joint seem wrapped and the joint
-    turns by more than 2.5 rad between hits, so that its direction is in doubt."""
+    warning if one changes. Raises CoarticError if angles of a joint seem wrapped and turn by more
+    than 2.5 rad between hits, so that their direction is in doubt."""
     joints = [*task.robot.joint_names][2:]
     angles = frame[joints].to_numpy(np.float64)
     begins = ~frame.duplicated(["subject", "trial"]).to_numpy()
@@ -565,8 +564,8 @@ def _odd_times(
 ) -> None:
     """Raise CoarticError if times of a subject's hits are of a clock that runs on, in two units,
     coarse, or impossible; warn of signs of this, of reaction times, and of times that do not follow
-    paths. ``straight``: ticks of straight movements, ``(n,)``, NaN where unknown; ``source``,
-    ``unit`` and ``slowest`` as in :func:`_implausible`."""
+    paths. ``straight``: ticks of straight movements, ``(n,)``, NaN where unknown; others as of
+    :func:`_implausible`."""
     ticks, goal, trial = (hits[name].to_numpy(np.float64) for name in ("ticks", "goal", "trial"))
     known = np.isfinite(straight)
     logs = pd.DataFrame({"paths": straight, "here": ticks, "above": np.roll(ticks, 1),
@@ -695,9 +694,9 @@ def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
 
 def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
     """Return in words a change of a recording (degrees to rad, other axes, swapped columns, ...),
-    or one for each arm, that puts over 80 % of the arm's hits in mask ``far`` (three or more over
-    two radii away, not all at one of several goals) as close to goals as 95 % of the others, within
-    1.25 to 2 radii (2 for under 20 others); empty if no change does."""
+    or one for each arm, that puts over 80 % of the arm's hits in mask ``far`` and over two radii
+    away, three or more at several goals if there are such, as close to goals as others, within 1.25
+    to 2 radii; empty if no change does."""
     joints, hands = [*task.robot.joint_names], frame.hand
     q, column = frame[joints].to_numpy(np.float64), np.arange(len(joints))
     arms = [task.robot.joints(hand) for hand in task.hands]
@@ -768,9 +767,9 @@ def _repeats(values: Array, edge: float) -> NDArray[np.bool_]:
 
 
 def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return a mask of the hits of a subject in which all angles of an arm, ``(n, joints)``, are
-    means of the hits before and after it, among all or at its goal (of ``goal``, ``(n,)``), more
-    often than by chance; no hit if the arm has one joint."""
+    """Return a mask of the hits of a subject in which all angles of an arm of two joints or more,
+    ``(n, joints)``, are means of the hits before and after it, or of those at its ``goal``,
+    ``(n,)``, more often than by chance."""
     q, found = arm.round(9), np.zeros(len(arm), dtype=bool)
     steps = np.array([np.diff(np.unique(angles)).min(initial=1.0) for angles in q.T])
     for order in (np.arange(len(q)), np.argsort(goal, kind="stable")):
@@ -782,9 +781,9 @@ def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
-    """Return a sentence for trials in a row of a subject's hand, or of a subject at a goal (such as
-    after a sensor slips), and for each goal, with a much larger share of hits over 1.25 radii from
-    the centre of the goal than others."""
+    """Return a sentence for trials in a row of a subject's hand, or at a goal (such as after a
+    sensor slips), and for each goal, with a much larger share of hits clearly outside of goals than
+    others."""
     q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
     places, trials = _hand_places(q, frame.hand, task), frame.trial.to_numpy(np.float64)
     ways = places - task.goal_array[goals - 1]
@@ -848,8 +847,8 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
 
 def _cut_trials(frame: pd.DataFrame, goals: int) -> list[str]:
     """Return a sentence for each subject with two or more trials that are cut in two: the next
-    trial goes on from their last goal, to the last of all ``goals``; no sentence if under half of
-    the subject's trials that lack hits are such parts."""
+    trial has the goals left, of ``goals`` in all. Half of the trials that lack hits have to be such
+    halves."""
     sentences = []
     for subject, of_subject in frame.groupby("subject", sort=False):
         trials = of_subject.groupby("trial", as_index=False).goal.agg(["min", "max", "count"])
@@ -866,9 +865,9 @@ def _cut_trials(frame: pd.DataFrame, goals: int) -> list[str]:
 
 
 def _copies(frame: pd.DataFrame) -> list[str]:
-    """Return a sentence on trials that are equal in all postures, as if copied (two of a subject,
-    or three that occur twice or more); without such trials, sentences for each subject with more
-    equal times of consecutive hits, or of two trials at all goals, than chance makes."""
+    """Return a sentence on trials that are equal in all postures (two of a subject, or three that
+    occur twice or more); without such trials, sentences for each subject with more equal times of
+    consecutive hits, or of two trials at all goals, than by chance."""
     postures = frame.drop(columns=["subject", "trial", "ticks"])
     hits = pd.util.hash_pandas_object(postures, index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()

@@ -72,8 +72,7 @@ def hits_from_markers(
     ticks_per_unit : float
         Ticks in a second.
     implausible : {"refuse", "drop"}
-        Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
-        out.
+        Implausible hits (:func:`.read_hits`) raise CoarticError or are left out.
 
     Returns
     -------
@@ -85,14 +84,14 @@ def hits_from_markers(
     Raises
     ------
     CoarticError
-        An argument is wrong; the recording is no such table, of several people, or not of 25 to
-        2000 samples in a second; the median length of a link in a trial differs from the task's by
-        more than 10 %; trials of 20 samples or more differ in the time between samples by more than
-        10 %, or, without a tenth at either end, in a locked base by more than two radii; a trial
-        begins far from the task's start or with a rest, or has a second start; most trials are
-        unfinished; before the last goal is hit, a marker has a longer gap or jumps, a link's length
-        jumps by more than 10 % (markers swap), or two shoulders contradict each other; or
-        :func:`.read_hits` would refuse the hits.
+        The recording is no such table, of several people, or not of 25 to 2000 samples in a second;
+        the median length of a link in a trial differs from the task's by more than 10 %; trials of
+        20 samples or more differ in the time between samples by more than 10 %, or, without a tenth
+        at either end, in a locked base by more than two radii; a trial begins far from the task's
+        start or with a rest, or has a second start; most trials are unfinished; before the last
+        goal is hit, a marker has a longer gap or jumps, a link's length jumps by more than 10 %
+        (markers swap), or two shoulders contradict each other; or :func:`.read_hits` would refuse
+        the hits.
     """
     if not 0 < ticks_per_unit < np.inf:
         raise CoarticError(f"ticks_per_unit is {ticks_per_unit}; needed is a number above 0")
@@ -154,8 +153,8 @@ def hits_from_markers(
 
     def agree(name: str, each: Array, share: float, most: float, doubt: float, words: str) -> None:
         """Refuse a quantity, ``each`` by trial, that differs between trials of 20 samples or more
-        by more than ``most``, and warn if by more than ``doubt``; a share ``share`` of the trials
-        at either end does not count. ``words`` end the message."""
+        by over ``most``, and warn if by over ``doubt``; a share ``share`` at either end does not
+        count."""
         long = np.flatnonzero(many & np.isfinite(each))
         ordered, out = np.sort(each[long]), int(share * len(long))
         if not len(long) or (change := ordered[-1 - out] - ordered[out]) <= min(most, doubt):
@@ -400,9 +399,9 @@ def hits_from_markers(
 
 def _odd_steps(ways: Array, least: float) -> str:
     """Return, in words, that most samples repeat the sample before, or that between many samples
-    markers go some twice as far as before and after, on paths over ``least``; empty without such
-    signs. ``ways``: changes of coordinates from the sample before, ``(n, coordinates)``, NaN where
-    a trial begins and after gaps."""
+    markers go some twice as far as before and after, on paths over ``least``; otherwise empty.
+    ``ways``: changes from the sample before, ``(n, coordinates)``, NaN after gaps and where a trial
+    begins."""
     moves = np.flatnonzero((ways != 0).any(axis=1) & np.isfinite(ways).all(axis=1))
     if len(moves) < MANY:
         return ""
@@ -493,8 +492,8 @@ def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:
 
 def _finished_by(trials: Sequence[Array], task: Task) -> str:
     """Return in words a change of axes or of the order of goals that finishes over 80 % of the
-    first 20 unfinished trials, places of hands ``(hands, n, 2)``; empty if no change does, or for
-    fewer than two trials."""
+    first 20 unfinished trials, places of hands ``(hands, n, 2)``; empty if none does, or for fewer
+    than two trials."""
     tried = [(f"in which {axes}", axes, task) for axes in AXES if axes]
     numbers = tuple(range(1, len(task.goals) + 1))
     for order in permutations(numbers) if len(numbers) <= 4 else [numbers[::-1]]:
@@ -513,8 +512,8 @@ def _finished_by(trials: Sequence[Array], task: Task) -> str:
 
 def _bridge(place: Array, time: Array, parts: Sequence[slice], step: float) -> Array:
     """Fill the gaps (NaN) of a marker, ``(n, 2)``, in place by straight lines in time, trial by
-    trial, at an end by the nearest place. Return, at the first sample of each gap, its duration in
-    s, and 0 elsewhere, ``(n,)``; ``step``: time between samples, s."""
+    trial (at ends by the nearest place). Return, at the first sample of each gap, its duration in
+    s, and 0 elsewhere; ``step``: time between samples, s."""
     gap, durations = np.isnan(place[:, 0]), np.zeros(len(place))
     for part in parts if gap.any() else ():
         if not gap[part].any():

@@ -172,8 +172,7 @@ class Study:
         return f"Study of {self.folder}: {runs} of suite {self.suite}"
 
     def _repr_html_(self) -> str:
-        """Return HTML for a notebook: a row for each method and setting with numbers of tasks, of
-        runs and of solved runs."""
+        """Return HTML for a notebook: a row for each method with its numbers of runs."""
         solved = self.runs.status == "ok"
         runs = self.runs[["method", "setting", "task"]].assign(solved=solved)
         counts = runs.groupby(["method", "setting"], sort=False).agg(
@@ -235,7 +234,7 @@ class Study:
     @property
     def folder_in_commands(self) -> str:
         """The folder for commands on a page that others read, quoted for a shell: its path from the
-        working folder, or its name alone if it does not lie in the working folder."""
+        working folder, or its name alone if it is not in there."""
         path = Path(os.path.abspath(self.folder))  # without ..
         return quote(str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name))
 
@@ -248,7 +247,7 @@ class Study:
     @cached_property
     def varied(self) -> tuple[str, dict[str, Any]]:
         """Name of the only parameter in which all compared runs differ, settings of one method, and
-        its values by label (:func:`.parameter_varied`); otherwise an empty name and no values."""
+        its values by label (:func:`.parameter_varied`); otherwise both empty."""
         return parameter_varied(self.runs)
 
     @cached_property
@@ -283,7 +282,7 @@ class Study:
         the task: the zero of gain, share and targets.
 
         With the task's initial hands where there are over 4,096 hand sequences; NaN if the
-        corrective process completes the task with none of these hands, or there are none.
+        corrective process completes the task with none of these hands.
         """
         alone = {}
         for name, task in self.tasks.items():
@@ -334,13 +333,11 @@ class Study:
     def methods(self) -> pd.DataFrame:
         """A row for each method with its setting, by label, in the order of lists and figures.
 
-        Two conditions of the learner can make a further row, the second on all its tasks, as a rule
-        for two arms, the first on others: EC1 with EC4, EC1 with EC3, and the informed EC1 and EC4.
-        Columns:
+        Two conditions of the learner can make a further row, the second on its tasks, the first on
+        others (for one arm): EC1 with EC4, EC1 with EC3, and the informed EC1 and EC4. Columns:
 
         - ``base``: id of the method without a setting;
-        - ``condition``: exploration condition or ablation of the learner by the name in its id;
-          empty for other methods, and for a learner with an own condition;
+        - ``condition``: id of the learner's condition or ablation, such as ``EC4``; or empty;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
         - ``parts``: labels of its runs, a tuple of one text, or two of a joined row, in which runs
           of the second label count on a task with runs of both;
@@ -354,8 +351,8 @@ class Study:
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with whatever setting, represents its algorithm;
-        - ``under``: of a setting (unless it is of :attr:`varied`) or ablation, label of its method,
-          if this method ran; or empty;
+        - ``under``: of a setting or ablation that lists put under its method, the method's label;
+          or empty;
         - ``look``: names of colour and mark in figures, a tuple of two texts.
         """
         return methods_of(self.runs, self.declared, self.marks)
@@ -455,8 +452,7 @@ class Study:
         Parameters
         ----------
         task, method : str
-            Name of the task, and label of the method, its id with its setting, such as
-            ``"random-search sigma=0.1"``; also ``"EC4"``.
+            Name of the task, and label of the method (:meth:`executed`).
         replay : bool
             Take the noiseless trial after learning in place of the solution; runs without such a
             trial are left out.
@@ -487,9 +483,8 @@ class Study:
         Returns
         -------
         Series
-            By the index of :attr:`runs`; NaN for runs without the signature, failed runs, with
-            ``replay`` runs without one, and runs after the first 500 solved ones of a method on a
-            task.
+            By the index of :attr:`runs`; NaN for runs without the signature, failed runs, and runs
+            after the first 500 solved ones of a method on a task.
         """
         values = pd.Series(np.nan, self.runs.index, name=name)
         for key, runs in self.cells.items():

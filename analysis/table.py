@@ -171,9 +171,8 @@ def caption_of(table: Table, frame: pd.DataFrame) -> str:
 
 
 def is_setting(frame: pd.DataFrame) -> pd.Series:
-    """Return for each row of the frame of a :class:`Table` True if its method (in column
-    ``against``, else ``method``, else the name of the row) is a setting or an ablation of a method
-    that is there, too."""
+    """Return for each row of the frame of a :class:`Table` True if its method (``against``, or
+    ``method``, or else its name) is a setting or an ablation of a method that is there, too."""
     named = next((name for name in ("against", "method") if name in frame), "")
     label = frame[named] if named else frame.index.to_series()
     return label.map(frame.attrs.get("under", {})).isin([*label])
