@@ -93,8 +93,8 @@ def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool =
 
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
     """Return True if a method adds exploration noise to the arm that is not to hit: the learner by
-    its condition, random search by its parameter ``idle_arm``. Always True for other methods, and
-    on tasks for one arm."""
+    its condition, others, such as random search, by their parameter ``idle_arm``. Always True
+    without this parameter, and on tasks for one arm."""
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
         return True

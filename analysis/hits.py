@@ -124,8 +124,8 @@ def read_hits(
 
 
 def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return a CSV file as a frame of texts and numbers, and a name for each row, such as ``line
-    2``. Raises CoarticError for a file that cannot be read, is no table of text separated by
+    """Return a CSV file as a frame of texts and numbers, and a name, such as ``line 2``, for each
+    row. Raises CoarticError for a file that cannot be read, is no table of text separated by
     commas, or repeats a heading; ``kind``, such as ``recorded hits are``, is for a message."""
     if words := foreign_file(str(path), f"{kind} a CSV file, see docs/howto/people.md"):
         raise CoarticError(words)
@@ -317,7 +317,7 @@ def checked_hits(
 ) -> pd.DataFrame:
     """Return a new frame of recorded hits, checked, unwrapped and sorted as by :func:`read_hits`,
     with ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints. ``source`` and
-    ``names`` of rows are for messages; ``ticks_per_unit`` is None for hits from no file, whose
+    ``names`` of rows are for messages; ``ticks_per_unit``: None for hits from no file, whose
     ``ticks`` may be fractions."""
     if twice := [name for n, name in enumerate(frame.columns) if name in frame.columns[:n]]:
         raise CoarticError(f"{source} has two columns {twice[0]!r}")

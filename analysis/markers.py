@@ -87,10 +87,10 @@ def hits_from_markers(
         The recording is no such table, of several people, or not of 25 to 2000 samples in a second;
         the median length of a link in a trial differs from the task's by more than 10 %; trials of
         20 samples or more differ in the time between samples by more than 10 %, or, without a tenth
-        at either end, in a locked base by more than two radii; a trial begins far from the task's
-        start or with a rest, or has a second start; most trials are unfinished; before the last
-        goal is hit, a marker has a longer gap or jumps, a link's length jumps by more than 10 %
-        (markers swap), or two shoulders contradict each other; or :func:`.read_hits` would refuse
+        at either end, in a locked base by more than two radii; a finished trial begins far from the
+        task's start or with a rest, or has a second start; most trials are unfinished; before the
+        last goal is hit, a marker has a longer gap or jumps, a link's length jumps by more than 10
+        % (markers swap), or two shoulders contradict each other; or :func:`.read_hits` would refuse
         the hits.
     """
     if not 0 < ticks_per_unit < np.inf:

@@ -266,7 +266,7 @@ class Study:
         """Best known rewards by name of the task, with bounds and sources; tasks without a best
         known reward are left out (:func:`.best_known`).
 
-        On other tasks the reward of :attr:`corrective_best` counts where it is higher.
+        On the tasks that are kept, a higher reward of :attr:`corrective_best` counts, too.
         """
         rewards = best_known(self.stored, self.tasks.values())
         for name, best in rewards.items():

@@ -241,8 +241,8 @@ def check_runs(folder: Path) -> _Report:
     """Execute the stored solutions of a results folder, check its tasks, methods and plan, and
     report what differs or is unchecked. No method is run.
 
-    Runs that the last plan does not ask for are checked, too. Raises sqlite3.Error or ValueError if
-    the folder cannot be read.
+    Runs that the last plan does not ask for are checked, too. Raises an error, such as
+    sqlite3.Error, if the folder cannot be read.
     """
     with closing(sqlite3.connect(f"{folder.absolute().as_uri()}/{DATABASE}", uri=True)) as db:
         db.row_factory = sqlite3.Row
