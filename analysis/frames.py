@@ -353,9 +353,8 @@ def compared_tasks(on: Iterable[tuple[Hashable, Set[Any]]]) -> Set[Any]:
     and the tasks on which it ran.
 
     Candidates are the sets of tasks of single methods. The set is returned for which (number of
-    tasks) x (number of algorithms with a method that ran on all of them) is largest: many tasks,
-    and many algorithms that share them. Of equals the set with more tasks, then the first. Empty
-    for no method.
+    tasks) x (number of algorithms with a method that ran on all of them) is largest; of equals the
+    set with more tasks, then the first. Empty for no method.
     """
     pairs = [*on]
 

@@ -457,7 +457,7 @@ def checked_hits(
 def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
     """Unwrap the angles of sorted hits in place, each trial from the task's start on, with a
     warning if one changes. Raises CoarticError if angles of a joint seem wrapped and turn by more
-    than 2.5 rad between hits, so that their direction is in doubt."""
+    than 2.5 rad between hits, in which direction is then in doubt."""
     joints = [*task.robot.joint_names][2:]
     angles = frame[joints].to_numpy(np.float64)
     begins = ~frame.duplicated(["subject", "trial"]).to_numpy()
@@ -781,9 +781,8 @@ def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
-    """Return a sentence for trials in a row of a subject's hand, or at a goal (such as after a
-    sensor slips), and for each goal, with a much larger share of hits clearly outside of goals than
-    others."""
+    """Return a sentence for trials in a row of a subject's hand, or at a goal, and for each goal,
+    with a much larger share of hits clearly outside of goals than others."""
     q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
     places, trials = _hand_places(q, frame.hand, task), frame.trial.to_numpy(np.float64)
     ways = places - task.goal_array[goals - 1]

@@ -345,7 +345,7 @@ class Study:
         - ``short``: name in figures of one column;
         - ``algorithm``: algorithm that the method is a form of;
         - ``is_learner``: True for the paper's learner under the paper's conditions;
-        - ``is_search``: True for searches for the optimum, which are references;
+        - ``is_search``: True for searches for the optimum;
         - ``information``: use of the reward: ``using the reward of each trial``, ``using the reward
           as a formula`` or ``not using the reward``;
         - ``built_in``: True for methods of coartic, False for methods from files;
@@ -411,9 +411,8 @@ class Study:
             Name of the task, and label of the method, its id with its setting:
             ``"random-search sigma=0.1"``; for conditions of the learner also ``"EC4"``.
         replay : bool
-            Execute the noiseless trial after learning in place of the solution, for runs that have
-            a replay. The solution of most learners is their best trial; the replay shows what was
-            learned without this selection.
+            Execute the replay, a noiseless trial after learning, in place of the solution, for runs
+            that have a replay.
 
         Returns
         -------

@@ -104,7 +104,7 @@ def table(caption: str, columns: str) -> Callable[[Callable[[Study], Rows]], Tab
 
 
 class TableFrame(pd.DataFrame):
-    """Rows of a table. ``print`` and notebooks leave out ``run_ids``, which would fill the page."""
+    """Rows of a table. ``print`` and notebooks leave out column ``run_ids``."""
 
     @property
     def _constructor(self) -> type[pd.DataFrame]:
