@@ -39,7 +39,7 @@ class Column(NamedTuple):
     """Heading; ``{}`` is the rest of a name after its beginning, such as a task. Shares are in per
     cent if the heading has ``(%)``. Empty: only the CSV file has the column."""
     digits: str = ""
-    """Decimals; ``p`` for a p-value; empty: integers are whole, others have three figures."""
+    """Decimals; ``p`` for a p-value; empty: as :func:`.number` chooses."""
 
 
 def _column_of(text: str) -> Column:
