@@ -646,9 +646,9 @@ def _odd_times(
 
 def _clocks(hits: pd.DataFrame, paces: pd.Series, rises: Array, source: str) -> bool:
     """Raise CoarticError if the times of a subject's hits are of a clock that runs on from goal to
-    goal; warn, and return True, if the times of five trials or more, under 80 %, are. ``paces``:
-    ticks of each hit over ticks of a straight movement; ``rises``: ticks less ticks of the row
-    before, ``(n,)``."""
+    goal; warn, and return True, if the times of five trials or more, under 80 %, are. Under 20 hits
+    after goal 1 are not judged. ``paces``: ticks of each hit over ticks of a straight movement;
+    ``rises``: ticks less ticks of the row before, ``(n,)``."""
     later = hits.goal.to_numpy() > 1
     if later.sum() < MANY:
         return False
