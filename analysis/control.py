@@ -1,6 +1,6 @@
 """Comparisons of signatures of coarticulation with random search, their control.
 
-Selection by reward alone produces signatures of coarticulation, so the signatures of a method that
+Selection by reward alone produces signatures of coarticulation. So the signatures of a method that
 selects its solution from trials are compared with the signatures of random search
 (:mod:`coartic.baselines.random_search`), which is the paper's learner without its memory. Like is
 compared with like:
@@ -8,9 +8,9 @@ compared with like:
 - runs with the same hand sequence. The choice of hands itself, signature ``hand``, is compared with
   random search that tries every hand sequence, whatever the hands;
 - the idle arm has noise in random search if it has noise under the learner's condition
-  (``modify_other``: not under EC3), or where there is no such random search;
+  (``modify_other``: not under EC1 and EC3), or if there is no random search without this noise;
 - as many trials;
-- all runs of both: a run that does not improve counts with what it shows, often 0.
+- solved runs of both: a run that does not improve counts with what it shows, often 0.
 
 The test is the one-tailed test of the difference of means over runs by exchange of labels.
 """
@@ -56,11 +56,11 @@ def with_control(
     Returns
     -------
     dict
-        For each hand sequence with which at least a tenth of the method's runs end, the commonest
-        first: the values of the runs of the method with these hands and of the runs of random
-        search (:func:`control_of`) with these hands and as many trials, shape ``(n,)`` each,
+        For each hand sequence with which at least a tenth of the method's solved runs end, the
+        commonest first: the values of the runs of the method with these hands and of the runs of
+        random search (:func:`control_of`) with these hands and as many trials, shape ``(n,)`` each,
         without runs that lack the signature; the second empty if there is no such random search.
-        For signature ``hand`` one entry, ``""``, with all runs.
+        For signature ``hand`` one entry, ``""``, with all solved runs.
 
     Examples
     --------
@@ -93,8 +93,8 @@ def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool =
 
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
     """Return True if a method adds exploration noise to the arm that is not to hit: the learner by
-    its condition, random search by its parameter ``idle_arm``. Always True for other methods, and
-    on tasks for one arm."""
+    its condition, others, such as random search, by their parameter ``idle_arm``. Always True
+    without this parameter, and on tasks for one arm."""
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
         return True
@@ -108,8 +108,8 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
 @cached
 def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
     """Return the labels of forms of random search on a task, by hand sequence of all runs (empty if
-    every hand sequence is tried), number of trials, and True if the idle arm is explored, too.
-    Random search in several ``stages`` is left out."""
+    every hand sequence is tried), number of trials, and True if the idle arm is explored, too. Left
+    out are random search in several ``stages``, and with several given hand sequences."""
     labels = dict[tuple[str, float, bool], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
     for label in map(str, of_search.index):
@@ -126,7 +126,7 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
 
 @cached
 def _most_trials(study: Study, task: str, label: str) -> float:
-    """Return the most trials that a run of a method made on a task, 0 if no run made trials."""
+    """Return the most trials that a run of a method on a task made, 0 if no run made trials."""
     return float(study.cells[task, label].trials.fillna(0).max())
 
 
@@ -178,11 +178,11 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 def control_suite(study: Study, *, runs: Annotated[int, Field(ge=1, le=MOST_RUNS)] = 20) -> str:
     """Return a suite of random search, the control of signatures, where the study lacks it.
 
-    For each method that may select its solution by rewards (:func:`selects`), the suite has random
-    search with as many trials as the method, with noise on the idle arm if the method has such
-    noise, and with each hand sequence that a tenth or more of the method's solved runs have, unless
-    the study has this random search. Write the suite to a file and run it with the results of the
-    study: ``coartic run control.toml --include FOLDER``.
+    For each method that may select its solution by rewards (:func:`selects`), on each task, the
+    suite has random search with as many trials as the method, with noise on the idle arm if the
+    method has such noise, and with each hand sequence that a tenth or more of the method's solved
+    runs have, unless the study has this random search. Write the suite to a file and run it with
+    the results of the study: ``coartic run control.toml --include FOLDER``.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ A frame, also one of your own, has a row for each run, with columns ``method``, 
 (ticks, NaN for a failed run) and ``best_known``, the best known reward of the task;
 ``load(folder).runs`` is such a frame. Shares need ``corrective_best``, too: the reward of the
 corrective process alone with its best hands. Rewards are negative ticks; the costs of an
-``Objective`` are their negatives. Frames with other contents raise CoarticError.
+``Objective`` are their negatives. Frames with other contents are refused.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ def checked(
 ) -> pd.DataFrame:
     """Return a copy of a user's frame with these columns alone: ``numbers`` as float64 with NaN for
     missing numbers, ``names`` and ``others`` as they are. With ``reward``, a column ``status`` is
-    kept and has to agree: a run has a reward if it is ``ok``.
+    kept and has to agree: all runs with a reward, and no others, are ``ok``.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
     that is no frame, a missing column, a column that is there twice, no rows, a value of ``names``
-    that is missing, a value of ``names`` or ``others`` that is a list, and for ``numbers`` that are
-    text, infinite or too large for a float.
+    that is missing, a value of ``names`` or ``others`` without a hash, such as a list, and for
+    ``numbers`` that are no numbers, or neither 0 nor from 1e-100 to 1e100 in size.
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
@@ -92,7 +92,10 @@ def checked(
             columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
         except OverflowError:
             raise CoarticError(f"column {inline(name)} has a number beyond 1e308") from None
-        _refuse_rows(columns, name, np.isinf(columns[name]), "needed are finite numbers")
+        size = columns[name].abs()
+        wrong = (size > 1e100) | ((size > 0) & (size < 1e-100))
+        most = "needed are finite numbers, 0 or from 1e-100 to 1e100 in size"
+        _refuse_rows(columns, name, wrong, most)
     if status:
         is_ok = columns.status.astype(object) == "ok"
         rule = "a run has a reward if its status is ok, and NaN otherwise"
@@ -106,11 +109,8 @@ def inline(name: object) -> str:
 
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
-    """Return a list of the names of columns that an argument has; a text is one name.
-
-    Raises CoarticError, with ``what`` as the name of the argument, for an argument that is no list
-    of columns.
-    """
+    """Return a list of the names of columns in ``names``, an argument called ``what``; a text is
+    one name. Raises CoarticError for an argument that is no list of names."""
     if isinstance(names, str):
         return [names]
     if not isinstance(names, Iterable) or not all(map(is_hashable, listed := list(names))):
@@ -119,8 +119,8 @@ def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
 
 
 def _refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
-    """Raise CoarticError for the first row that is True in ``wrong``, with its value in ``column``
-    and the words ``needed``."""
+    """Raise CoarticError if rows are True in ``wrong``, with the value of the first of them in
+    ``column``, and the words ``needed``."""
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
         (value,), (row,) = frame[column].iloc[rows[:1]].tolist(), frame.index[rows[:1]].tolist()
         raise CoarticError(
@@ -131,8 +131,8 @@ def _refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str
 def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     """Return a copy of checked columns with ``gap``, (best known - reward) / |best known|, and, of
     frames with :data:`ZERO`, ``share``, (reward - zero) / (best known - zero): 1 at the best known
-    reward, 0 at :data:`ZERO`, below 0 if worse. Both are NaN for a failed run, ``share`` also where
-    the two are equal.
+    reward, 0 at :data:`ZERO`, below 0 if worse. Both are NaN without a reward or a best known
+    reward, ``share`` also where zero is NaN or the best known reward.
 
     Raises CoarticError for a reward or a best known reward above 0, for a best known reward of 0,
     and for a reward (beyond rounding, :data:`NEGLIGIBLE`) or :data:`ZERO` (at all) above the best
@@ -161,7 +161,8 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     ``method`` includes the setting if a method of the frame has several settings; ``task`` is the
     number of the task, from 0, in the order of names; ``key`` is the same number in all rows of a
     run (:data:`_SOURCES`). ``more``: names of other columns of numbers to keep. Raises CoarticError
-    as :func:`checked` and :func:`_with_gaps` do, and for a task with several best known rewards.
+    as :func:`checked` and :func:`_with_gaps` do, and for a task with several ``best_known`` or
+    :data:`ZERO`.
     """
     there = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)
@@ -235,8 +236,9 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Returns
     -------
     Series
-        (reward - corrective_best) / (best_known - corrective_best) of each row; negative where the
-        corrective process does better. NaN where nothing can be gained, and where a reward is NaN.
+        (reward - corrective_best) / (best_known - corrective_best) by the frame's index; negative
+        where the corrective process does better. NaN where nothing can be gained, or a reward is
+        NaN.
 
     Raises
     ------
@@ -273,8 +275,8 @@ def means(
     -------
     DataFrame
         A row for each group, in the order of first appearance: ``by``, the number of ``rows``, and
-        for each column ``x`` the mean ``x`` with its interval ``x_low`` to ``x_high`` (BCa
-        bootstrap, NaN with fewer than three values); a mean without values is NaN.
+        for each column ``x`` the mean ``x`` with its interval ``x_low`` to ``x_high`` (NaN with
+        fewer than three values); a mean without values is NaN.
 
     Raises
     ------
@@ -309,8 +311,7 @@ def means(
 
 
 def by_task(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the mean reward of each method on each task, from which means over tasks can be
-    computed again.
+    """Return the mean reward, gap and share of each method on each task.
 
     Parameters
     ----------
@@ -321,14 +322,15 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each pair of ``task`` and ``method``, in the order of first appearance: mean
-        ``reward`` (negative ticks) of ``n`` solved runs, ``gap``, and ``share`` where the frame has
-        ``corrective_best``; NaN where ``n`` is 0.
+        A row for each pair of ``task`` and ``method`` (with the setting, as in :func:`ranking`), in
+        the order of first appearance: mean ``reward`` (negative ticks) of ``n`` solved runs,
+        ``gap``, and ``share`` where the frame has ``corrective_best``; NaN where no run has such a
+        number.
 
     Raises
     ------
     CoarticError
-        A column is missing, a name is missing, or a reward is wrong (:func:`ranking`).
+        The frame is wrong (:func:`ranking`).
 
     Examples
     --------
@@ -351,9 +353,8 @@ def compared_tasks(on: Iterable[tuple[Hashable, Set[Any]]]) -> Set[Any]:
     and the tasks on which it ran.
 
     Candidates are the sets of tasks of single methods. The set is returned for which (number of
-    tasks) x (number of algorithms with a method that ran on all of them) is largest: many tasks,
-    and many algorithms that share them. Of equals the set with more tasks, then the first. Empty
-    for no method.
+    tasks) x (number of algorithms with a method that ran on all of them) is largest; of equals the
+    set with more tasks, then the first. Empty for no method.
     """
     pairs = [*on]
 
@@ -377,13 +378,13 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each method, the smallest gap first: ``gap``, the mean over the compared tasks
-        (:func:`compared_tasks`: those that most methods share) of the mean over runs, with its 95 %
-        interval ``gap_low`` to ``gap_high`` for other runs on the same tasks (stratified bootstrap,
-        NaN with fewer than three runs on a task); the numbers of compared ``tasks`` that it solved
+        A row for each method, by its name, the smallest gap first: ``gap``, the mean over the
+        compared tasks (:func:`compared_tasks`: many tasks that many methods share) of the mean over
+        runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
+        (NaN with fewer than three runs on a task); the numbers of compared ``tasks`` that it solved
         in every run, of ``missing`` tasks (other compared tasks), of ``runs`` and of ``failed``
         runs on all tasks. A method with missing tasks has no gap and is last. The paper's learner
-        over tasks for one arm and for two has a row of its own, ``"dual-process (EC1, EC4)"``. With
+        on tasks for one arm and for two has a further row, ``"dual-process (EC1, EC4)"``. With
         ``corrective_best`` also the ``share`` of the possible gain (:func:`shares`) with
         ``share_low`` and ``share_high``, a mean over the tasks on which something can be gained,
         and ``without_gain``, the number of other tasks.
@@ -391,8 +392,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        A column is missing or a reward is wrong (:func:`gaps`), a name is missing, or a task has
-        several best known rewards.
+        A column or a name is missing, a reward is wrong (:func:`gaps`), a task has several best
+        known rewards, or a run has two rows.
 
     Examples
     --------
@@ -509,7 +510,7 @@ def solutions_of(
 ) -> Solutions:
     """Return recorded trials, of people for instance, as solutions for signatures.
 
-    Nothing is executed again: postures at hits and ticks, rounded to whole ones, are as recorded.
+    Nothing is executed again: postures at hits (unwrapped) and ticks (rounded) are as recorded.
 
     Parameters
     ----------
@@ -520,8 +521,7 @@ def solutions_of(
         posture, a column for each of ``task.robot.joint_names``, length unit and rad. The frame is
         checked like a file of :func:`coartic.analysis.read_hits`.
     implausible : {"refuse", "drop"}
-        Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
-        out.
+        Implausible hits (:func:`.read_hits`) raise CoarticError or are left out.
 
     Returns
     -------

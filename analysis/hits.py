@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import sys
 import unicodedata
 import warnings
 from collections.abc import Callable, Sequence
@@ -33,10 +34,11 @@ _SLOWEST = 20
 _UNITS = {"s": 100.0, "ms": 0.1, "min": 6000.0, "control steps": 1.0}
 """Ticks in units of a duration, for a person who takes a second for each rad."""
 MANY = 20
-"""Fewest hits, or samples, that are compared with others."""
+"""Fewest hits, or samples, that most comparisons need."""
 _OUTSIDE = 1.25
-"""Radii from the centre of a goal from which hits are not at its edge."""
+"""Distance from the centre of a goal, radii, beyond which a hit is not at its edge."""
 _NAMED = 5  # of a kind
+_INNER = ("coartic", "pydantic")  # packages whose lines no warning names
 _MONTH = "(jan|feb|m[aä]r|apr|ma[iy]|jun|jul|aug|sep|o[ck]t|nov|de[cz])[a-z]*"
 _ANGLES = {"": 1.0, "degrees are made rad": np.pi / 180, "gradians are made rad": np.pi / 200,
            "turns are made rad": 2 * np.pi}  # fmt: skip
@@ -46,7 +48,7 @@ AXES = {
     "axes are turned by 180 degrees": (1, 2), "axes are turned by -90 degrees": (1, 3),
     "x and y are swapped": (-1, 1), "x and y are swapped, with the other sign": (-1, 3),
 }  # fmt: skip
-"""Changes of axes: sign of angles, and turn in right angles afterwards."""
+"""Changes of axes: sign of angles, and right angles of a turn afterwards."""
 _DATE = re.compile(rf"\d+\W+{_MONTH}\W*\d*|{_MONTH}\W+\d+|\d+([-./])\d+\3\d{{2,4}}", re.IGNORECASE)
 _HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
 
@@ -62,22 +64,21 @@ def read_hits(
     """Read recorded trials: a CSV file with a row for each hit.
 
     Blank lines, lines that begin with ``#``, commas at the end of a line, and other columns do not
-    count; columns of an arm or a joint that the task does not use are left out with a warning.
-    Angles that jump by a turn (2π) between hits are unwrapped from hit to hit, from the
-    start of the task on, with a warning. Warns, too, if an arm of the task would be much faster or
-    slower, if trials or their times are there twice, a name is spelt in two ways, rows are in no
-    order of goals, values are rounded, repeat or never vary, times do not follow paths, are those
-    of reactions or of a clock that runs on in some trials, and if hits contradict the place or the
-    radius of goals, or do so in some trials, as if a sensor had slipped. Not seen are another
-    person or clock rate from the first trial on, trials in another order, and smoothing over them.
+    count; columns of an arm or a joint that the task does not use are left out, with a warning if
+    they are not as at the start. Angles are unwrapped from hit to hit, from the start of the task
+    on, with a warning if one jumps by more than half a turn (π). Warns, too, of signs that an arm
+    of the task is slower or much faster, trials are cut in two, trials or their times are there
+    twice, a name is spelt in two ways, rows are in no order of goals, values are rounded, repeat or
+    never vary, times do not follow paths, or are of reactions or of a clock that runs on in some
+    trials, and hits contradict the place or the radius of goals, or do so in some trials, as if a
+    sensor had slipped.
 
     Each hit is checked among those of its subject. Implausible is a hit whose hand is more than two
-    radii from its goal (more if motor noise puts a quarter of all hits outside of their goals),
-    whose base moves where it is locked, whose arm has an angle of more than 20 rad, one number in
-    place of all its angles, or exact means of the hits around it, or whose time is over 20 times
-    the longest subtask of the corrective process, or too short for a straight movement. Implausible
-    hits are refused, or with ``implausible="drop"`` left out; if they are most hits of a subject
-    they are always refused.
+    radii from its goal (up to ten, if motor noise puts a quarter of the hits outside of goals),
+    whose locked base is moved as far, whose arm has an angle beyond ±20 rad, one number in place of
+    all its angles once it has moved, or, in three hits or more, exact means of the hits around it,
+    or whose time is over 20 times the longest subtask of the corrective process, or clearly too
+    short for a straight movement.
 
     Parameters
     ----------
@@ -90,10 +91,11 @@ def read_hits(
     task : Task
         The task that was practised.
     ticks_per_unit : float, optional
-        Ticks in a unit of ``duration``, such as 100 for seconds; by default 1. Refused if the file
+        Ticks in a unit of ``duration``, such as 100 for seconds; by default 1. Not for a file that
         has ``ticks``.
     implausible : {"refuse", "drop"}
-        "drop" leaves implausible hits out, with a warning that counts them, unless most are.
+        "drop" leaves implausible hits out, with a warning that counts them, unless most hits of a
+        subject are implausible.
 
     Returns
     -------
@@ -104,9 +106,9 @@ def read_hits(
     Raises
     ------
     CoarticError
-        The file is no such table, hits are implausible, times are rounded, in two units or those of
-        a clock that runs on, or a wrapped joint turns by more than 2.5 rad between hits. A sentence
-        says where and what is needed.
+        The file is no such table, hits are implausible, times are impossible, coarse, in two units
+        or of a clock that runs on, or a joint that seems wrapped turns by more than 2.5 rad between
+        hits.
     """
     if ticks_per_unit is not None and not 0 < ticks_per_unit < np.inf:
         raise CoarticError(
@@ -122,9 +124,9 @@ def read_hits(
 
 
 def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return a CSV file of ``kind`` (such as ``recorded hits are``, for messages) as a frame of
-    texts, and a name for each row, such as ``line 2``. Raises CoarticError for a file that cannot
-    be read, is no table of text separated by commas, or repeats its headings."""
+    """Return a CSV file as a frame of texts and numbers, and a name, such as ``line 2``, for each
+    row. Raises CoarticError for a file that cannot be read, is no table of text separated by
+    commas, or repeats a heading; ``kind``, such as ``recorded hits are``, is for a message."""
     if words := foreign_file(str(path), f"{kind} a CSV file, see docs/howto/people.md"):
         raise CoarticError(words)
     try:
@@ -148,9 +150,9 @@ def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
 
 
 def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
-    """Return frame and names of rows as :func:`read_table`, by a fast parser; None for a text with
-    quotes, comments, blank lines, rows that differ in length, or empty, equal or single
-    headings."""
+    """Return frame and names of rows as :func:`read_table` does, by a fast parser; None for a text
+    without rows, or with quotes, ``#``, blank lines, rows that differ in length, odd line ends, or
+    empty, equal or single headings."""
     head, _, body = text.replace("\r\n", "\n").removesuffix("\n").partition("\n")
     headings, rows = [*map(_written, head.split(","))], body.count("\n") + 1
     if (
@@ -159,6 +161,7 @@ def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
         or not all(headings)
         or not 1 < len({*headings}) == len(headings)
         or body.count(",") != rows * (len(headings) - 1)
+        or body.partition("\n")[0].count(",") != len(headings) - 1  # else pandas shifts columns
     ):
         return None
     try:
@@ -174,10 +177,9 @@ def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
 
 
 def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return frame and names of rows as :func:`read_table`, by a parser that goes line by line, at
-    a fifth of the speed. Raises CoarticError for another separator, a row with another number of
-    values than the headings, and a repeated heading. Warns of rows that are left out because they
-    begin with #."""
+    """Return frame and names of rows as :func:`read_table` does, line by line. Raises CoarticError
+    for another separator, a row with another number of values than the headings, an open quote, and
+    a repeated heading. Warns of rows that are left out because they begin with #."""
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
     rows, lines, wrong, hidden = [], [], [], []
@@ -225,7 +227,7 @@ def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
 
 
 def turned(places: Array, axes: str) -> Array:
-    """Return places ``(..., 2)`` after a change of axes, a key of :data:`AXES`."""
+    """Return places ``(..., 2)``, x and y, after a change of axes, a key of :data:`AXES`."""
     sign, quarters = AXES[axes]
     at = (places[..., 0] + sign * 1j * places[..., 1]) * 1j**quarters
     return np.stack([at.real, at.imag], axis=-1)
@@ -233,22 +235,25 @@ def turned(places: Array, axes: str) -> Array:
 
 def also(names: Sequence[str]) -> str:
     """Return `` (also B, C, D, E, 2 more)`` for names A to G: the second to the fifth name and the
-    number of others; empty for a single name."""
+    number of others; empty for a single name or none."""
     named = [*names[1:_NAMED], *[f"{len(names) - _NAMED} more"] * (len(names) > _NAMED)]
     return f" (also {', '.join(named)})" if named else ""
 
 
 def warn(text: str, refuse: bool = False) -> None:
-    """Warn with this text, in the line of the program that called this package; with ``refuse``
-    raise CoarticError in place of it."""
+    """Warn with this text, at the line outside of this package that called it; with ``refuse``
+    raise CoarticError with this text in place of a warning."""
     if refuse:
         raise CoarticError(text)
-    warnings.warn(text, stacklevel=5)
+    frame, level = sys._getframe(), 1
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in _INNER:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, stacklevel=level)
 
 
 def _written(text: str) -> str:
-    """Return text in Unicode's composed form (NFC), with single spaces for blanks of any kind, a
-    hyphen for dashes and minus signs, and without characters that do not show."""
+    """Return text in Unicode's composed form (NFC), with single spaces for blanks of any kind
+    between words, a hyphen for dashes and minus signs, and without format characters (Cf)."""
     shown = "".join(c for c in text.translate(_HYPHENS) if unicodedata.category(c) != "Cf")
     return " ".join(unicodedata.normalize("NFC", shown).split())
 
@@ -259,21 +264,22 @@ def row_names(frame: pd.DataFrame) -> list[str]:
 
 
 def as_names(values: pd.Series) -> pd.Series:
-    """Return names as texts with single spaces and plain hyphens (:func:`_written`); whole numbers
-    without ``.0``, and an empty text for a missing name."""
+    """Return names as texts, with single spaces and plain hyphens (:func:`_written`); whole numbers
+    are without ``.0``, and a missing name is an empty text."""
     known = {}
     for value in values.dropna().unique():
-        whole = isinstance(value, float) and value.is_integer()
+        whole = isinstance(value, float | np.floating) and value.is_integer()
         known[value] = _written(f"{value:.0f}" if whole else str(value))
     return values.map(known).astype(object).where(values.notna(), "")
 
 
 def as_numbers(values: pd.Series) -> NDArray[np.float64]:
     """Return numbers, shape ``(n,)``, also of texts with typographic minus signs; NaN for a value
-    that is no number. Infinity is one, True and False are not."""
-    if infer_dtype(values, skipna=True) in ("boolean", "mixed", "mixed-integer"):
+    that is no real number. Infinity is a number, True and False are not."""
+    values = values.astype(object) if isinstance(values.dtype, pd.CategoricalDtype) else values
+    if infer_dtype(values, skipna=True) in ("boolean", "complex", "mixed", "mixed-integer"):
         values = values.astype(object).where(
-            ~values.map(lambda value: isinstance(value, bool | np.bool_))
+            ~values.map(lambda value: isinstance(value, bool | np.bool_ | complex))
         )
     elif values.dtype.kind not in "iufO":  # durations of pandas would be nanoseconds
         values = values.astype(str)
@@ -286,8 +292,8 @@ def as_numbers(values: pd.Series) -> NDArray[np.float64]:
 
 
 def why_no_number(value: object) -> str:
-    """Return what is needed in place of a value that is no number: the character that spoils it,
-    or advice on a missing value."""
+    """Return in words why a value is no number: it looks like a date, or a character spoils it; for
+    other values that a number is needed."""
     text = _written(str(value))
     if _DATE.fullmatch(text):
         return "it looks like a date that a spreadsheet made of a number: import numbers as text"
@@ -309,9 +315,10 @@ def checked_hits(
     implausible: Implausible = "refuse",
     ticks_per_unit: float | None = None,
 ) -> pd.DataFrame:
-    """Return a new frame of recorded hits, checked, unwrapped and sorted (:func:`read_hits`), with
-    ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints. ``source`` and ``names``
-    of rows are for messages; ``ticks_per_unit`` is None for a frame, whose ticks may be broken."""
+    """Return a new frame of recorded hits, checked, unwrapped and sorted as by :func:`read_hits`,
+    with ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints. ``source`` and
+    ``names`` of rows are for messages; ``ticks_per_unit``: None for hits from no file, whose
+    ``ticks`` may be fractions."""
     if twice := [name for n, name in enumerate(frame.columns) if name in frame.columns[:n]]:
         raise CoarticError(f"{source} has two columns {twice[0]!r}")
     called = names or row_names(frame)
@@ -449,8 +456,8 @@ def checked_hits(
 
 def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
     """Unwrap the angles of sorted hits in place, each trial from the task's start on, with a
-    warning. Raises CoarticError if angles are wrapped and a joint turns by more than 2.5 rad
-    between hits, so that its direction is in doubt."""
+    warning if one changes. Raises CoarticError if angles of a joint seem wrapped and turn by more
+    than 2.5 rad between hits, in which direction is then in doubt."""
     joints = [*task.robot.joint_names][2:]
     angles = frame[joints].to_numpy(np.float64)
     begins = ~frame.duplicated(["subject", "trial"]).to_numpy()
@@ -486,8 +493,9 @@ def _implausible(
     frame: pd.DataFrame, task: Task, source: str, unit: float, slowest: float
 ) -> NDArray[np.object_]:
     """Return why sorted hits of a subject are implausible, a text for each, empty for a plausible
-    hit, and warn of places and times (:func:`_odd_times`) that are odd. ``source``: name of the
-    recording and the subject; ``unit``: ticks in a unit; ``slowest``: longest subtask, ticks."""
+    hit; warn of odd places, and check times (:func:`_odd_times`). ``source`` begins messages;
+    ``unit``: ticks in a unit of the recording; ``slowest``: ticks of the longest subtask of the
+    corrective process."""
     q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
     goal, ticks = frame.goal.to_numpy(np.int64), frame.ticks.to_numpy(np.float64)
     why = np.full(len(frame), "", dtype=object)
@@ -554,9 +562,10 @@ def _implausible(
 def _odd_times(
     hits: pd.DataFrame, straight: Array, source: str, unit: float, slowest: float
 ) -> None:
-    """Raise CoarticError if a subject's times are those of a clock that runs on, in two units,
-    rounded, or not possible; warn if they seem so, or not to be of these hits alone.
-    ``straight``: ticks of straight movements, NaN where unknown; others as above."""
+    """Raise CoarticError if times of a subject's hits are of a clock that runs on, in two units,
+    coarse, or impossible; warn of signs of this, of reaction times, and of times that do not follow
+    paths. ``straight``: ticks of straight movements, ``(n,)``, NaN where unknown; others as of
+    :func:`_implausible`."""
     ticks, goal, trial = (hits[name].to_numpy(np.float64) for name in ("ticks", "goal", "trial"))
     known = np.isfinite(straight)
     logs = pd.DataFrame({"paths": straight, "here": ticks, "above": np.roll(ticks, 1),
@@ -636,9 +645,10 @@ def _odd_times(
 
 
 def _clocks(hits: pd.DataFrame, paces: pd.Series, rises: Array, source: str) -> bool:
-    """Raise CoarticError if the times of a subject's hits are those of a clock that runs on from
-    goal to goal; warn, and return True, if those of some trials are. ``paces``: ticks of each hit
-    over those of a straight movement, ``rises``: ticks less those of the row before, ``(n,)``."""
+    """Raise CoarticError if the times of a subject's hits are of a clock that runs on from goal to
+    goal; warn, and return True, if the times of five trials or more, under 80 %, are. Under 20 hits
+    after goal 1 are not judged. ``paces``: ticks of each hit over ticks of a straight movement;
+    ``rises``: ticks less ticks of the row before, ``(n,)``."""
     later = hits.goal.to_numpy() > 1
     if later.sum() < MANY:
         return False
@@ -657,9 +667,9 @@ def _clocks(hits: pd.DataFrame, paces: pd.Series, rises: Array, source: str) -> 
 
 
 def _changed(odd: NDArray[np.bool_], trial: Array) -> tuple[NDArray[np.bool_], str]:
-    """Return a mask of the hits ``(n,)`` of trials in a row, or before and after them, that are odd
-    more often than others, and these trials in words. It is empty where the range of the sum of
-    deviations from the mean (Kuiper's statistic) is, as by chance, less than 2.6 √n SD."""
+    """Return a mask of hits ``(n,)`` in a row, or of all before and after them, that are odd more
+    often than others, and their trials in words. It has no hit if n is below 20, or if the range of
+    the sum of deviations from the mean (Kuiper's statistic) is, as by chance, at most 2.6 √n SD."""
     part, number = np.zeros(len(odd), dtype=bool), np.arange(len(odd))
     sums = np.cumsum(odd) - (number + 1) * (odd.sum() / max(len(odd), 1))
     if len(odd) >= MANY and np.ptp(sums) > 2.6 * np.sqrt(len(odd)) * odd.std():
@@ -683,9 +693,10 @@ def _hand_places(q: Array, hands: pd.Series, task: Task) -> Array:
 
 
 def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
-    """Return in words a change of a recording (degrees to rad, other axes, swapped columns, ...)
-    that puts over 80 % of an arm's hits in mask ``far``, three or more at several goals, as close
-    to goals as 95 % of the others are, at least within two radii; empty if no change does."""
+    """Return in words a change of a recording (degrees to rad, other axes, swapped columns, ...),
+    or one for each arm, that puts over 80 % of the arm's hits in mask ``far`` and over two radii
+    away, three or more at several goals if there are such, as close to goals as others, within 1.25
+    to 2 radii; empty if no change does."""
     joints, hands = [*task.robot.joint_names], frame.hand
     q, column = frame[joints].to_numpy(np.float64), np.arange(len(joints))
     arms = [task.robot.joints(hand) for hand in task.hands]
@@ -747,8 +758,8 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
 
 def _repeats(values: Array, edge: float) -> NDArray[np.bool_]:
     """Return a mask of the rows whose k values, ``(n, k)``, in steps to which they are rounded, are
-    all less than ``edge`` away from 0; empty if chance could make as many, which makes over 2ᵏ
-    times as many rows within five times that distance."""
+    all less than ``edge`` away from 0; no row if chance could make as many: fewer than 3 + m / 2ᵏ,
+    for m other rows less than five times as far away."""
     size: Array = np.abs(values).max(axis=1, initial=0.0)
     exact = size < edge
     near = int((size[~exact] < 5 * edge).sum())
@@ -756,8 +767,9 @@ def _repeats(values: Array, edge: float) -> NDArray[np.bool_]:
 
 
 def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return a mask of the hits of a subject in which all angles of an arm, ``(n, joints)``, are
-    means of the hits around it, in the order of rows or of trials at one of the goals ``(n,)``."""
+    """Return a mask of the hits of a subject in which all angles of an arm of two joints or more,
+    ``(n, joints)``, are means of the hits before and after it, or of those at its ``goal``,
+    ``(n,)``, more often than by chance."""
     q, found = arm.round(9), np.zeros(len(arm), dtype=bool)
     steps = np.array([np.diff(np.unique(angles)).min(initial=1.0) for angles in q.T])
     for order in (np.arange(len(q)), np.argsort(goal, kind="stable")):
@@ -769,8 +781,8 @@ def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
-    """Return a sentence for trials of a subject's hand, or at a goal (such as those after a sensor
-    slips), and for each goal, with a much larger share of hits outside of goals than others."""
+    """Return a sentence for trials in a row of a subject's hand, or at a goal, and for each goal,
+    with a much larger share of hits clearly outside of goals than others."""
     q, goals = frame[[*task.robot.joint_names]].to_numpy(np.float64), frame.goal.to_numpy(np.int64)
     places, trials = _hand_places(q, frame.hand, task), frame.trial.to_numpy(np.float64)
     ways = places - task.goal_array[goals - 1]
@@ -804,9 +816,9 @@ def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
 
 
 def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> None:
-    """Warn if an angle of an arm is rounded, or if many hits of a goal have one posture or one
-    angle in common. ``hits`` are the hits of a subject with this arm, ``joints`` the columns of its
-    angles; ``source`` begins the warning."""
+    """Warn, once, if an angle of an arm is rounded or the same in all hits, or if many hits of a
+    goal have a posture or an angle in common. ``hits`` are the hits of a subject with this arm,
+    ``joints`` the columns of its angles; ``source`` begins the warning."""
     postures = len(hits[joints].drop_duplicates())
     for name in joints:
         angles = np.unique(hits[name])
@@ -833,8 +845,9 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
 
 
 def _cut_trials(frame: pd.DataFrame, goals: int) -> list[str]:
-    """Return a sentence for each subject of whom two or more trials end where the next trial
-    begins, in the order of all ``goals``, if half of the trials that lack hits do."""
+    """Return a sentence for each subject with two or more trials that are cut in two: the next
+    trial has the goals left, of ``goals`` in all. Half of the trials that lack hits have to be such
+    halves."""
     sentences = []
     for subject, of_subject in frame.groupby("subject", sort=False):
         trials = of_subject.groupby("trial", as_index=False).goal.agg(["min", "max", "count"])
@@ -851,9 +864,9 @@ def _cut_trials(frame: pd.DataFrame, goals: int) -> list[str]:
 
 
 def _copies(frame: pd.DataFrame) -> list[str]:
-    """Return a sentence for trials that are equal in all postures, as if copied (two of a subject,
-    or three that occur twice or more), and for equal times of consecutive hits, or of two trials at
-    all goals, that are more than almost equal times."""
+    """Return a sentence on trials that are equal in all postures (two of a subject, or three that
+    occur twice or more); without such trials, sentences for each subject with more equal times of
+    consecutive hits, or of two trials at all goals, than by chance."""
     postures = frame.drop(columns=["subject", "trial", "ticks"])
     hits = pd.util.hash_pandas_object(postures, index=False)
     trials = hits.groupby([frame.subject, frame.trial], sort=False).sum()

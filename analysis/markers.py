@@ -33,9 +33,9 @@ from coartic.robot import HANDS, Array
 _LONGEST_GAP = 0.05
 """Longest gap in the place of a marker that is bridged, s."""
 _TOLERANCE = 0.1
-"""Largest difference, as a share, of the length of a link, and of places of the base."""
+"""Largest difference, as a share, of lengths of links, times of samples, and shoulders."""
 _LONGEST_REST = 0.2
-"""Longest rest in a trial, s."""
+"""Longest rest that passes as movement, s."""
 
 
 @checked_arguments
@@ -49,19 +49,19 @@ def hits_from_markers(
 ) -> pd.DataFrame:
     """Find the hits of a person's trials in the places of markers over time.
 
-    A trial begins with its first sample. A hit is the first sample with the tip within the goal's
+    A trial begins with its first sample. A hit is the first sample with a tip within the goal's
     radius, or after such a place on the straight line between samples, in the order of the goals;
     its time and posture are interpolated to where the tip enters the goal. Gaps of up to 50 ms
-    (empty, NaN, or both coordinates 0) are bridged by a straight line, with a warning. An arm
-    without markers keeps its start, with a warning. Warns, too, of samples that repeat, places that
-    are rounded, frames that seem lost, links whose length follows a joint, an arm that starts later
-    than the other in all trials, trials that begin away from the task's start, rests on the way,
-    and hits of a goal that the tip does not leave before.
+    (empty, NaN, or, far from the origin, both coordinates 0) are bridged by a straight line, with a
+    warning. An arm of the task without markers keeps its start, with a warning. Warns, too, of
+    samples that repeat, places that are rounded, frames that seem lost, links whose length follows
+    a joint, an arm that starts later than the other in all trials, trials that begin away from the
+    task's start, rests on the way, and hits of two goals in successive samples.
 
     Parameters
     ----------
     recording : DataFrame, str or pathlib.Path
-        A frame, or a CSV file in UTF-8, of one person: a row for each sample, in the order of time,
+        A frame, or a CSV file in UTF-8, of one person: a row for each sample, by trial and time,
         with columns ``subject``, ``trial`` (from 1), ``time`` (s), and x and y of each marker in
         the length unit of the task: ``right_1_x``, ``right_1_y`` is the shoulder, joint 1,
         ``right_2`` the next joint, ``right_tip`` the hand. Other columns do not count.
@@ -72,26 +72,26 @@ def hits_from_markers(
     ticks_per_unit : float
         Ticks in a second.
     implausible : {"refuse", "drop"}
-        Hits that the person cannot have made (:func:`.read_hits`) raise CoarticError or are left
-        out.
+        Implausible hits (:func:`.read_hits`) raise CoarticError or are left out.
 
     Returns
     -------
     DataFrame
         A row for each hit, with the columns of :func:`.read_hits`. Trials in which a goal is never
-        reached have no hits; ``attrs["unfinished"]`` is the number of such trials, which
-        :func:`pandas.concat` loses: fit each person.
+        reached have no hits, with a warning; ``attrs["unfinished"]``, which :func:`pandas.concat`
+        loses, is the number of such trials.
 
     Raises
     ------
     CoarticError
-        The recording is no such table, of several people, or of less than 25 samples in a second;
-        the median length of a link in a trial differs from the task's by more than 10 %; trials
-        differ in the time between samples by more than 10 %, or in a locked base by more than two
-        radii; a trial begins far from the task's start or with a rest, or has a second start; most
-        trials are unfinished; a marker has a longer gap or jumps; a link's length jumps by more
-        than 10 % (markers swap); two shoulders contradict each other; or :func:`.read_hits` would
-        refuse the hits.
+        The recording is no such table, of several people, or not of 25 to 2000 samples in a second;
+        the median length of a link in a trial differs from the task's by more than 10 %; trials of
+        20 samples or more differ in the time between samples by more than 10 %, or, without a tenth
+        at either end, in a locked base by more than two radii; a finished trial begins far from the
+        task's start or with a rest, or has a second start; most trials are unfinished; before the
+        last goal is hit, a marker has a longer gap or jumps, a link's length jumps by more than 10
+        % (markers swap), or two shoulders contradict each other; or :func:`.read_hits` would refuse
+        the hits.
     """
     if not 0 < ticks_per_unit < np.inf:
         raise CoarticError(f"ticks_per_unit is {ticks_per_unit}; needed is a number above 0")
@@ -152,8 +152,9 @@ def hits_from_markers(
         return pd.DataFrame(values).groupby(number).median().to_numpy()
 
     def agree(name: str, each: Array, share: float, most: float, doubt: float, words: str) -> None:
-        """Refuse a quantity, ``each`` by trial, that changes between trials by more than ``most``,
-        and warn if by more than ``doubt``; a share ``share`` at either end does not count."""
+        """Refuse a quantity, ``each`` by trial, that differs between trials of 20 samples or more
+        by over ``most``, and warn if by over ``doubt``; a share ``share`` at either end does not
+        count."""
         long = np.flatnonzero(many & np.isfinite(each))
         ordered, out = np.sort(each[long]), int(share * len(long))
         if not len(long) or (change := ordered[-1 - out] - ordered[out]) <= min(most, doubt):
@@ -398,8 +399,9 @@ def hits_from_markers(
 
 def _odd_steps(ways: Array, least: float) -> str:
     """Return, in words, that most samples repeat the sample before, or that between many samples
-    markers go twice as far as before and after, on paths over ``least``; empty if neither is so.
-    ``ways``: changes of coordinates, ``(n, coordinates)``, NaN where a trial begins, after gaps."""
+    markers go some twice as far as before and after, on paths over ``least``; otherwise empty.
+    ``ways``: changes from the sample before, ``(n, coordinates)``, NaN after gaps and where a trial
+    begins."""
     moves = np.flatnonzero((ways != 0).any(axis=1) & np.isfinite(ways).all(axis=1))
     if len(moves) < MANY:
         return ""
@@ -413,12 +415,12 @@ def _odd_steps(ways: Array, least: float) -> str:
     if (skipped := int((ratios > 1.6).sum())) <= max(2, 0.02 * len(ratios)):
         return ""
     return (f"{counted(skipped, 'time')} markers go twice as far between samples as before and "
-            "after: are frames lost, and times numbered anew?")  # fmt: skip
+            "after: are frames lost, and times numbered again?")  # fmt: skip
 
 
 def _stretches(lengths: Array, angles: Array) -> list[str]:
     """Return in words each link whose length, ``(n, links)``, follows the angle, rad, of a joint
-    at one of its ends (except the first joint of the arm), or varies by over 5 %."""
+    at one of its ends (except the first joint of the arm), or slowly varies by over 5 % (SD)."""
     changes = []
     for link, length in enumerate(lengths.T):
         for joint in range(max(link, 1), min(link + 2, angles.shape[1])):
@@ -448,8 +450,9 @@ def _points(places: Iterable[Array]) -> str:
 
 
 def _rests(places: Array, time: Array, radius: float) -> list[int]:
-    """Return the indices of samples at which rests of over 0.2 s on the way begin; ``places`` of
-    markers, ``(n, markers, 2)``, and ``radius`` in length unit, ``time``, ``(n,)``, in s."""
+    """Return the indices of samples at which rests of over 0.2 s begin, except at the first sample;
+    ``places`` of markers, ``(n, markers, 2)``, and ``radius`` in length unit, ``time``, ``(n,)``,
+    in s."""
     # A smooth movement that ends and another that begins are within a radius of the place between
     # them for 1.26 (the cube root of 2) times as long as within half a radius, without the rest.
     ahead = np.minimum(np.searchsorted(time, time + _LONGEST_REST), len(time) - 1)
@@ -474,8 +477,9 @@ def _rests(places: Array, time: Array, radius: float) -> list[int]:
 
 
 def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:
-    """Return in words two markers of an arm whose exchange makes all median distances of markers,
-    ``(n, markers, 2)``, agree with the lengths of links within 10 %; empty if there are none."""
+    """Return in words the first two markers of an arm (``places``, ``(n, markers, 2)``) whose
+    exchange brings the median length of each link within 10 % of ``links``; empty if no exchange
+    does."""
     for one, other in combinations(range(len(markers)), 2):
         order = [*range(len(markers))]
         order[one], order[other] = other, one
@@ -487,8 +491,9 @@ def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:
 
 
 def _finished_by(trials: Sequence[Array], task: Task) -> str:
-    """Return in words a change of axes or of the order of goals that finishes over 80 % of
-    unfinished trials, places of hands ``(hands, n, 2)``; empty if none does, or for one trial."""
+    """Return in words a change of axes or of the order of goals that finishes over 80 % of the
+    first 20 unfinished trials, places of hands ``(hands, n, 2)``; empty if none does, or for fewer
+    than two trials."""
     tried = [(f"in which {axes}", axes, task) for axes in AXES if axes]
     numbers = tuple(range(1, len(task.goals) + 1))
     for order in permutations(numbers) if len(numbers) <= 4 else [numbers[::-1]]:
@@ -507,8 +512,8 @@ def _finished_by(trials: Sequence[Array], task: Task) -> str:
 
 def _bridge(place: Array, time: Array, parts: Sequence[slice], step: float) -> Array:
     """Fill the gaps (NaN) of a marker, ``(n, 2)``, in place by straight lines in time, trial by
-    trial. Return, at the first sample of each gap, its duration in s, and 0 elsewhere; ``step``:
-    time between samples, s."""
+    trial (at ends by the nearest place). Return, at the first sample of each gap, its duration in
+    s, and 0 elsewhere; ``step``: time between samples, s."""
     gap, durations = np.isnan(place[:, 0]), np.zeros(len(place))
     for part in parts if gap.any() else ():
         if not gap[part].any():
@@ -524,9 +529,9 @@ def _bridge(place: Array, time: Array, parts: Sequence[slice], step: float) -> A
 
 
 def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int, float, Array]]:
-    """Return the hits of a trial, up to the first goal that is missed: index of the sample and of
-    the hand in ``tips``, ``(hands, n, 2)``, and time, s, and posture where the tip enters the goal,
-    from times ``(n,)`` and postures ``q``, ``(n, dof)``, of the samples."""
+    """Return the hits of a trial, up to the first goal that is missed, each with the index of the
+    sample and of the hand in ``tips``, ``(hands, n, 2)``, and time, s, and posture where the tip
+    enters the goal, from times ``(n,)`` and postures ``q``, ``(n, dof)``, of the samples."""
     found: list[tuple[int, int, float, Array]] = []
     at, goals = tips @ [1, 1j], task.goal_array @ [1, 1j]
     ways = np.diff(at, axis=1, prepend=at[:, :1])  # to each sample from the one before

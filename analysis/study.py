@@ -1,6 +1,6 @@
 """A results folder as data: its runs, methods, cells, tasks, movements and optima.
 
-``load("results/comparison")`` reads a folder. The other modules of the analysis are functions of a
+``load("results/comparison")`` reads a folder. Other modules of the analysis have functions of a
 study; :func:`cached` keeps the results of a function for each study.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 import html
 import json
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
@@ -19,7 +20,7 @@ from typing import Any, Concatenate, Literal
 import numpy as np
 import pandas as pd
 
-from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences
+from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences, initial_hands
 from coartic.analysis.method_frame import methods_of, parameter_varied
 from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
 from coartic.analysis.signatures.measures import SIGNATURES
@@ -87,7 +88,7 @@ def cached(
 ) -> Callable[Concatenate[Study, Asked], Computed]:
     """Make a function of a study keep its result for each study and its other arguments.
 
-    Every call returns the same object, which callers must not change; arguments must be hashable.
+    Equal calls return the same object, which callers must not change; arguments must be hashable.
     The function raises CoarticError for an object that is no study, and for an argument of another
     kind than its hint says.
     """
@@ -112,10 +113,10 @@ def cached(
 def load(folder: str | Path, *, against: str = "") -> Study:
     """Read a results folder, or by the name ``"shipped"`` the shipped results of suite
     ``comparison``. With ``against``, a method of the folder, by id, label or title, table
-    ``differences`` compares all other methods with this one.
+    ``differences`` compares other methods with this one.
 
     Raises CoarticError if the folder is no results folder, or lacks runs of its suite, or has no
-    method ``against``.
+    method ``against``, or several.
     """
     folder = folder_named(folder)
     with open_results(folder) as store:
@@ -133,7 +134,7 @@ def load(folder: str | Path, *, against: str = "") -> Study:
 
 def _label_in(study: Study, name: str) -> str:
     """Return the label of the method that has this label, id, short id such as ``EC4`` or title in
-    a study. Raises CoarticError if no method has it, or several settings of a method do."""
+    a study. Raises CoarticError if no method has it, or several methods or settings do."""
     methods = study.methods
     for names in (methods.index, methods.base, methods.title):
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
@@ -160,8 +161,8 @@ class Study:
     """Sentences on what was found against methods, by the method's id: code that was loaded too
     late, and results that depend on earlier runs."""
     against: str = ""
-    """Label of the method with which table ``differences`` compares the others; empty: each method
-    from a file."""
+    """Label of the method with which table ``differences`` compares others; empty if none was
+    named."""
     imports: dict[str, list[str]] = field(default_factory=dict)
     """Names and versions of the packages that files of methods import, by the method's id."""
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
@@ -171,7 +172,7 @@ class Study:
         return f"Study of {self.folder}: {runs} of suite {self.suite}"
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: a row for each method with its numbers of runs."""
+        """Return HTML for a notebook: a row for each method with its numbers of runs."""
         solved = self.runs.status == "ok"
         runs = self.runs[["method", "setting", "task"]].assign(solved=solved)
         counts = runs.groupby(["method", "setting"], sort=False).agg(
@@ -232,26 +233,26 @@ class Study:
 
     @property
     def folder_in_commands(self) -> str:
-        """The folder for commands on a page that others read, quoted for a shell: its name alone if
-        it lies outside the working folder."""
-        path = self.folder.absolute()
+        """The folder for commands on a page that others read, quoted for a shell: its path from the
+        working folder, or its name alone if it is not in there."""
+        path = Path(os.path.abspath(self.folder))  # without ..
         return quote(str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name))
 
     @property
     def question(self) -> tuple[str, str]:
-        """Title and description of a suite of the user's own; empty for a shipped suite."""
+        """Title and description of a suite of the user's own, run on its own tasks; else empty."""
         title, description = self.made_with.get("question", ("", ""))
         return title, description
 
     @cached_property
     def varied(self) -> tuple[str, dict[str, Any]]:
         """Name of the only parameter in which all compared runs differ, settings of one method, and
-        its values by label (:func:`.parameter_varied`); otherwise empty."""
+        its values by label (:func:`.parameter_varied`); otherwise both empty."""
         return parameter_varied(self.runs)
 
     @cached_property
     def tasks(self) -> dict[str, Task]:
-        """Tasks by name; of tasks with equal titles the titles here have the names, too."""
+        """Tasks by name, with titles that differ (:func:`.titled_apart`)."""
         tasks = {job.cell.task.name: job.cell.task for job in self.plan}
         return {task.name: task for task in titled_apart(tasks.values())}
 
@@ -262,16 +263,17 @@ class Study:
 
     @cached_property
     def optima(self) -> dict[str, BestKnown]:
-        """Best known rewards by name of the task, with proven bounds and sources; tasks without a
-        best known reward are left out (:func:`.best_known`).
+        """Best known rewards by name of the task, with bounds and sources; tasks without a best
+        known reward are left out (:func:`.best_known`).
 
-        The reward of :attr:`corrective_best` counts where it is higher than all others.
+        On the tasks that are kept, a higher reward of :attr:`corrective_best` counts, too.
         """
         rewards = best_known(self.stored, self.tasks.values())
         for name, best in rewards.items():
             if (alone := self.corrective_best[name]) > best.reward:
-                source = "corrective process alone"
-                rewards[name] = replace(best, reward=int(alone), source=source, run_id="")
+                ranked, source = self.sequences(name), "corrective process alone"
+                hands = ranked.hands.iloc[0] if len(ranked) else initial_hands(self.tasks[name])
+                rewards[name] = BestKnown(int(alone), best.bound, hands, source, "", best.only_here)
         return rewards
 
     @cached_property
@@ -295,10 +297,10 @@ class Study:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
         Further columns: ``label``, the method with its setting; ``family``, ``split``, number of
-        ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task (missing for a search
-        with another base) and :attr:`corrective_best`; ``gap``, a share of the best known reward;
-        and a column for each parameter of methods, unless its name is taken: ``trials`` is the
-        number of trials made, ``hands`` the hands of the solution.
+        ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task (missing without one, and
+        for a search with another base) and :attr:`corrective_best`; ``gap``, a share of the best
+        known reward; and a column for each parameter of methods, unless its name is taken:
+        ``trials`` is the number of trials made, ``hands`` the hands of the solution.
         """
         runs, tasks = self.stored, self.tasks
         cells = [*zip(runs.task, runs.method, runs.parameters, strict=True)]
@@ -331,12 +333,11 @@ class Study:
     def methods(self) -> pd.DataFrame:
         """A row for each method with its setting, by label, in the order of lists and figures.
 
-        Two conditions of the learner can make a further row, the first on tasks for one arm, the
-        second on tasks for two arms: EC1 with EC4, EC1 with EC3, and the informed EC1 and EC4.
-        Columns:
+        Two conditions of the learner can make a further row, the second on its tasks, the first on
+        others (for one arm): EC1 with EC4, EC1 with EC3, and the informed EC1 and EC4. Columns:
 
         - ``base``: id of the method without a setting;
-        - ``condition``: exploration condition of the learner; empty for other methods;
+        - ``condition``: id of the learner's condition or ablation, such as ``EC4``; or empty;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
         - ``parts``: labels of its runs, a tuple of one text, or two of a joined row, in which runs
           of the second label count on a task with runs of both;
@@ -344,13 +345,14 @@ class Study:
         - ``short``: name in figures of one column;
         - ``algorithm``: algorithm that the method is a form of;
         - ``is_learner``: True for the paper's learner under the paper's conditions;
-        - ``is_search``: True for searches for the optimum, which are references;
+        - ``is_search``: True for searches for the optimum;
         - ``information``: use of the reward: ``using the reward of each trial``, ``using the reward
           as a formula`` or ``not using the reward``;
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with whatever setting, represents its algorithm;
-        - ``under``: of a setting or ablation, label of its method, if this method ran; or empty;
+        - ``under``: of a setting or ablation that lists put under its method, the method's label;
+          or empty;
         - ``look``: names of colour and mark in figures, a tuple of two texts.
         """
         return methods_of(self.runs, self.declared, self.marks)
@@ -370,9 +372,9 @@ class Study:
     def sequences(self, task: str) -> pd.DataFrame:
         """Return the results of the corrective process alone on a task, by hand sequence.
 
-        A row for each sequence, the best first: ``hands``, ``reward`` (ticks, missing for a
-        failure) and ``reason`` of the failure. No rows if the task has over 4,096 sequences. Raises
-        CoarticError for a task that the study does not have.
+        A row for each sequence, the best first: ``hands``, ``reward`` (negative ticks, missing for
+        a failure) and ``reason`` of the failure. No rows if the task has over 4,096 sequences.
+        Raises CoarticError for a task that the study does not have.
         """
         if task not in self.tasks:
             raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
@@ -409,9 +411,8 @@ class Study:
             Name of the task, and label of the method, its id with its setting:
             ``"random-search sigma=0.1"``; for conditions of the learner also ``"EC4"``.
         replay : bool
-            Execute the noiseless trial after learning in place of the solution, for runs that have
-            a replay. The solution of a learner is its best trial; the replay shows what was learned
-            without this selection.
+            Execute the replay, a noiseless trial after learning, in place of the solution, for runs
+            that have a replay.
 
         Returns
         -------
@@ -450,8 +451,7 @@ class Study:
         Parameters
         ----------
         task, method : str
-            Name of the task, and label of the method, its id with its setting, such as
-            ``"random-search sigma=0.1"``; also ``"EC4"``.
+            Name of the task, and label of the method (:meth:`executed`).
         replay : bool
             Take the noiseless trial after learning in place of the solution; runs without such a
             trial are left out.
@@ -512,9 +512,10 @@ class Study:
     def signature_by_hands(self, name: str, task: str, method: str) -> dict[str, Array]:
         """Return a signature of a method's runs on a task by hand sequence, in alphabetical order.
 
-        Arrays have shape ``(n,)``; runs without the signature are left out. Signature ``hand``, the
-        choice of hands itself, has one entry ``""`` for all hand sequences together. ``name`` is in
-        ``coartic.analysis.SIGNATURES``; ``method`` is a label, the id with its setting.
+        Arrays have shape ``(n,)``, of the first 500 solved runs; runs without the signature are
+        left out. Signature ``hand``, the choice of hands itself, has one entry ``""`` for all hand
+        sequences together. ``name`` is in ``coartic.analysis.SIGNATURES``; ``method`` is a label,
+        the id with its setting.
         """
         values = self._signature_of_each(name, task, method, replay=False)
         runs = self.executed(task, method).runs
@@ -525,8 +526,8 @@ class Study:
     @cached
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` by run id, of the first 500 solved
-        runs of each method on each task, also in a study by :meth:`only`; for ``replay`` runs
-        without a replay are left out."""
+        runs of each method on each task of the folder, also in a study by :meth:`only`; for
+        ``replay`` runs without a replay are left out."""
         with open_results(self.folder) as store:
             return store.movements(part, MOST_EXECUTED)
 

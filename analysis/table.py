@@ -39,11 +39,11 @@ class Column(NamedTuple):
     """Heading; ``{}`` is the rest of a name after its beginning, such as a task. Shares are in per
     cent if the heading has ``(%)``. Empty: only the CSV file has the column."""
     digits: str = ""
-    """Decimals; ``p`` for a p-value; empty: integers are whole, others have three figures."""
+    """Decimals; ``p`` for a p-value; empty: as :func:`.number` chooses."""
 
 
 def _column_of(text: str) -> Column:
-    """Parse the text of a column: its name and ending, then ``: heading`` and ``.digits``.
+    """Return a column from its text: its name and ending, then ``: heading`` and `` .digits``.
 
     Examples: ``gap[]: gap (%) .1``; ``reward± .1`` and ``task``, whose heading is the name;
     ``least_p: -``, which only the CSV file has. Endings: see :class:`Column`.
@@ -73,15 +73,15 @@ class Table:
         return _rows_of(study, self)
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: what the table has, and its columns with headings."""
+        """Return HTML for a notebook: what the table has, and its columns with headings."""
         rows = [(column.name + column.ending, column.header) for column in self.columns]
         columns = pd.DataFrame(rows, columns=["column", "heading"]).to_html(index=False)
         words = inspect.getdoc(self.rows) or ""
         return f"<p>Table {self.id}, a function of a study. {html.escape(words)}</p>{columns}"
 
     def column(self, name: str) -> Column:
-        """Return the column with this name, or the column with ``*`` whose name begins it. Raises
-        KeyError for other names, such as ``gap_low`` of column ``gap[]``."""
+        """Return the first column with this name, or with ``*`` or ``[*]`` and a beginning of the
+        name. Raises KeyError for other names, such as ``gap_low`` of column ``gap[]``."""
         for column in self.columns:
             begins = column.ending in ("*", "[*]") and name.startswith(column.name)
             if name == column.name or begins:
@@ -104,7 +104,7 @@ def table(caption: str, columns: str) -> Callable[[Callable[[Study], Rows]], Tab
 
 
 class TableFrame(pd.DataFrame):
-    """Rows of a table. ``print`` and notebooks leave out ``run_ids``, which would fill the page."""
+    """Rows of a table. ``print`` and notebooks leave out column ``run_ids``."""
 
     @property
     def _constructor(self) -> type[pd.DataFrame]:
@@ -145,9 +145,10 @@ def _rows_of(study: Study, table: Table) -> pd.DataFrame:
 def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     """Return names for showing a table, by kind.
 
-    ``titles``: titles of tasks, families and methods by id; ``under``: the method of each setting
-    and ablation, by label; ``own``: labels of methods from files; ``reference``: name of the
-    rewards to which gaps are taken; ``compared``: number of compared tasks, in words.
+    ``titles``: titles of tasks, families and methods by id, and words for uses of the reward;
+    ``under``: the method of each setting and ablation, by label; ``own``: labels of methods from
+    files; ``reference``: name of the rewards to which gaps are taken; ``compared``: number of
+    compared tasks, such as ``3 tasks``.
     """
     methods, tasks = study.methods, study.tasks
     names = {label: shown_name(study, label) for label in methods.index}
@@ -170,8 +171,8 @@ def caption_of(table: Table, frame: pd.DataFrame) -> str:
 
 
 def is_setting(frame: pd.DataFrame) -> pd.Series:
-    """Return for each row of the frame of a :class:`Table` True if the row is of a setting or an
-    ablation of a method that has a row, too."""
+    """Return for each row of the frame of a :class:`Table` True if its method (``against``, or
+    ``method``, or else its name) is a setting or an ablation of a method that is there, too."""
     named = next((name for name in ("against", "method") if name in frame), "")
     label = frame[named] if named else frame.index.to_series()
     return label.map(frame.attrs.get("under", {})).isin([*label])
@@ -179,8 +180,8 @@ def is_setting(frame: pd.DataFrame) -> pd.Series:
 
 def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
     """Return entries of a row on the runs of one method on one task: title of the ``task``, label
-    of the ``method``, numbers of ``runs`` and ``solved`` runs, mean ``reward`` (ticks) with
-    ``reward_sd`` and ``reward_median``, mean ``gap`` and ``run_ids``.
+    of the ``method``, numbers of ``runs`` and ``solved`` runs, mean ``reward`` (negative ticks)
+    with ``reward_sd`` and ``reward_median``, mean ``gap`` and ``run_ids``.
 
     Without a solved run reward and gap are NaN. A table leaves out entries without a column.
     """

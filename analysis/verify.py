@@ -1,16 +1,16 @@
 """Check a results folder: execute every stored solution again.
 
 It needs Python and NumPy, and nothing of coartic. ``python verify.py FOLDER`` opens
-``FOLDER/runs.sqlite`` and checks of every run that its solution (and of a learner its first and
-last trial) keeps the rules, hits every goal, and has the stored ticks, rewards, hands, corrections
-and travel of the other arm; by a hash, that no joint and no trial was changed since; by its id and
-its seed, that the task, method and parameters are those that it was asked for; and that the tables
-and views through which reports read all this are coartic's, and show each run as what it is.
+``FOLDER/runs.sqlite`` and checks of every run that its solution (and of a learner its first trial
+and its replay) keeps the rules, hits every goal, and has the stored ticks, reward and hands, and
+the solution the stored corrections and travel of the other arm; by a hash, that no joint and no
+trial was changed since; by its id and its seed, that it is of its task, method and parameters; and
+that the tables and views through which reports read all this are coartic's.
 
 The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in Motor Skill
 Acquisition*): A robot, a mobile base with two arms, hits goals with its hands, in their order. A
 configuration q holds x and y of the base, then the angles of the left arm and of the right arm. A
-movement goes from q straight to a target q^t in steps of length m; its last step, a shorter one,
+movement goes from q straight to a target q^t in steps of length m; its last step, often shorter,
 ends at q^t. Before each step the robot looks. It stops if its hand is within the radius of the
 goal (a hit); in a learned or planned movement, also if its hand is within θ^a of where q^t would
 put it (arrival). k steps cost k ticks, and stopping costs one. The reward is minus all ticks. Each
@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 DATABASE = "runs.sqlite?mode=rw"  # SQLite checks no values of a file that it opens as read-only
-STATED = {  # of table results: what is said of each solution that is stored of a run
+STATED = {  # columns of table results on each part of a run whose movements are stored
     "solution": ("reward", "hands", "solution_corrections", "other_arm_travel"),
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
@@ -74,7 +74,7 @@ def need(holds: Any, words: str) -> None:
         raise ValueError(words)
 
 
-# One bit of a hand's position can decide where a movement stops. So all is computed in coartic's
+# One bit of a hand's position can decide where a movement stops. So lines are computed in coartic's
 # order and with its polynomials: IEEE arithmetic then gives the same bits on every computer.
 HIGH, MIDDLE, LOW = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
 S3, S5, S7, S9, S11, S13, S15, S17 = ((-1) ** n / math.factorial(2 * n + 1) for n in range(1, 9))
@@ -83,7 +83,7 @@ C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in ran
 
 def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
     """Return cosine and sine of angles, rad, by the Taylor series of what is left after k quarters
-    of a turn (π/2); from 1e5 rad on by the C library."""
+    of a turn (π/2); from ±1e5 rad on by the C library."""
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
     z, k = x * x, quarters.astype(np.int64)
@@ -101,7 +101,7 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 
 def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]:
     """Return x and y of the hand of ``arm`` (slice of joints, lengths of links, shoulder's place)
-    for configurations in the columns of ``q``; ``on_path``: by NumPy's cosine and sine."""
+    for n configurations in the columns of ``q``, ``(n,)`` each; ``on_path``: by NumPy's cosine."""
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
     angles = np.cumsum(q[joints], axis=0)  # each joint's is measured from the link before
@@ -113,7 +113,7 @@ def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]
 
 def stored_task(definition: str, model: str) -> Any:
     """Return a task from its stored JSON, with its constants of movement (``model``), start
-    (``q0``), locked base coordinates and arms. Raises ValueError for no goal, or too much text."""
+    (``q0``), locked coordinates, arms. Raises ValueError for 0 or over 256 goals, or long text."""
     need(len(f"{definition}{model}") <= LONGEST_TEXT, "the task is too long")
     task = json.loads(definition, object_hook=lambda content: SimpleNamespace(**content))
     task.model = SimpleNamespace(**json.loads(model))
@@ -185,8 +185,8 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
 
 
 def _recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
-    """Return reward, hands, number of corrections made, and joint travel of idle arms from hit to
-    hit, rad. Raises ValueError if a movement breaks a rule or takes other ticks than stored."""
+    """Return reward, letters of hands, number of corrections, and joint travel of idle arms from
+    hit to hit, rad. Raises ValueError if a rule is broken or ticks are not as stored."""
     _check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
@@ -241,8 +241,8 @@ def check_runs(folder: Path) -> _Report:
     """Execute the stored solutions of a results folder, check its tasks, methods and plan, and
     report what differs or is unchecked. No method is run.
 
-    Runs that the last plan does not ask for are checked, too. Raises sqlite3.Error or ValueError if
-    the folder cannot be read.
+    Runs that the last plan does not ask for are checked, too. Raises an error, such as
+    sqlite3.Error, if the folder cannot be read.
     """
     with closing(sqlite3.connect(f"{folder.absolute().as_uri()}/{DATABASE}", uri=True)) as db:
         db.row_factory = sqlite3.Row
@@ -250,7 +250,7 @@ def check_runs(folder: Path) -> _Report:
 
 
 def _check_all(db: sqlite3.Connection) -> _Report:
-    """Return the report of :func:`check_runs` on an open database; nothing is checked if a table or
+    """Return the report of :func:`check_runs` on an open database; no run is checked if a table or
     view is not as coartic makes it. Raises ValueError for another format."""
     db.execute("PRAGMA trusted_schema = OFF")
     db.execute("PRAGMA query_only = ON")
@@ -303,8 +303,8 @@ def _check_all(db: sqlite3.Connection) -> _Report:
 
 
 def _check_identity(row: Any) -> None:
-    """Raise ValueError if the id or the seed of a run does not belong to its cell: the id is a hash
-    of the cell, the seed of the suite and the number of the run, and ends with the code."""
+    """Raise ValueError if the id or the seed of a run does not follow from its cell (the seed: from
+    the task's name), the suite's seed and the run's number; the id ends with the code."""
     suite_seed, run = row["suite_seed"], row["run"]
     digits = hashlib.sha256(f"{row['digest']} {suite_seed} {run}".encode()).hexdigest()[:16]
     need(row["run_id"] == f"{digits}-{row['code']}", "it is not the run that its id says")
@@ -314,9 +314,9 @@ def _check_identity(row: Any) -> None:
 
 
 def _check_cells(db: sqlite3.Connection, tasks: dict[int, Any]) -> Iterator[str]:
-    """Yield a sentence for each row that refers to a missing row, contradicts itself or cannot be
-    read, and for each name of two tasks in the plan. ``tasks`` gets the task of each cell by id, or
-    words on what is wrong; a cell's digest is a hash of task, method, parameters, model, budget."""
+    """Yield a sentence for each row that refers to a missing row, each cell or environment that
+    contradicts itself or cannot be read, and each name of two tasks in the plan. ``tasks`` gets the
+    task of each cell by id, or words on what is wrong with the cell."""
     for table, number, missing, _ in db.execute("PRAGMA foreign_key_check"):
         yield f"Row {number} of table {table} names a row of {missing} that is not there."
     for row in db.execute("SELECT * FROM cells"):
@@ -378,9 +378,9 @@ def hash_of(content: Any) -> str:
 
 
 def _check_rewards(row: Any) -> bytes:
-    """Return a run's rewards, unpacked: integers of four bytes, the best reward, then of each trial
-    1 plus the ticks by which it is worse (0 without a reward), the lowest bytes of all first.
-    Raises ValueError for damage, and if the best trial is not the first with the run's reward."""
+    """Return a run's rewards as unpacked bytes: integers of four bytes, the best reward, then of
+    each trial 1 plus the ticks by which it is worse (0 without a reward), the lowest bytes of all
+    first. Raises ValueError for damage, and if ``best_trial`` is not the first with the reward."""
     size = 4 * (1 + min(row["trials"] or 0, MOST_TRIALS))
     try:
         content = (packed := zlib.decompressobj()).decompress(row["rewards"] or EMPTY, size + 1)
@@ -421,7 +421,7 @@ def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[Mo
 
 def main() -> int:
     """Check the folder that the command line names, or else the current folder, and print what was
-    found. Returns 0 if nothing differs or is missing, else 1, and 2 if it cannot be read."""
+    found. Return 0 if nothing differs or is missing, else 1, and 2 if it cannot be read."""
     folder = Path(*sys.argv[1:])
     try:
         report = check_runs(folder)

@@ -60,8 +60,8 @@ def id_of(function: Callable[..., Any]) -> str:
 def number(value: float, digits: _Digits | None = None) -> str:
     """Write a number, with a true minus and spaces between thousands from 10 000 on; – for NaN.
 
-    ``digits``: decimals; by default none for integers, and three significant figures for others,
-    below 0.0001 two, as in ``1.2e−05``.
+    ``digits``: decimals; by default none for integers, and as many as three significant figures
+    need for others; below 0.0001 two figures, as in ``1.2e−05``.
     """
     if math.isnan(value):
         return NONE
@@ -97,7 +97,7 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
 
 @checked_arguments
 def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, unit: str = "") -> str:
-    """Write a number of a table with its interval. Raises CoarticError if the row lacks one.
+    """Write a number of a table with its interval. Raises CoarticError if the row lacks a number.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     Returns
     -------
     str
-        Such as ``7.8 [7.3, 8.1]``; the number alone if its ends are NaN or equal to it.
+        Such as ``7.8 [7.3, 8.1]``; the number alone if an end is NaN or the ends are equal.
 
     Examples
     --------
@@ -134,8 +134,8 @@ def titled_apart(tasks: Iterable[Task]) -> list[Task]:
     """Return the tasks in their order, so that titles differ: a task that needs another title is
     replaced by a copy with this title.
 
-    The title of a changed task, ``ascending.radius-0.2``, is the title of its task and the change.
-    Other tasks with the same title have their names in the title.
+    A changed task, ``ascending.radius-0.2``, that has the title of its task gets the change, too:
+    ``Ascending, radius-0.2``. Then tasks with the same title get their names, too.
     """
     tasks, titles = [*tasks], []
     for task in tasks:
@@ -197,11 +197,11 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
 def latex(text: object) -> str:
     """Return text as one printable line (:func:`.one_line`) for LaTeX and BibTeX.
 
-    Special characters of LaTeX and BibTeX are escaped; Greek letters, arrows and common signs
-    become commands. Latin letters stay, with their accents up to U+02FF (``é``, ``ő``); letters
-    beyond lose accents (``ế`` becomes ``e``), and indices and ligatures become plain (``₂``:
-    ``2``). All other characters, such as Chinese, become ``\\symbol``, which XeLaTeX and LuaLaTeX
-    print.
+    Special characters of LaTeX and BibTeX are escaped; Greek letters, arrows and common signs are
+    written as LaTeX does, except ``↳``, which is left out. Characters up to U+02FF stay (``é``,
+    ``ő``); Latin letters beyond lose accents (``ế`` becomes ``e``), and indices and ligatures
+    become plain (``₂``: ``2``). All others, such as Chinese, become ``\\symbol``, which XeLaTeX and
+    LuaLaTeX print.
     """
 
     def escaped(c: str) -> str:

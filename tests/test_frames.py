@@ -76,6 +76,7 @@ def small_frame(**changes):
         ({"task": [["t"], ["t"]]}, "task has .'t'. in row 0: needed is a name, a number or a tup"),
         ({"seed": [[1], [2]]}, "seed has .1. in row 0: needed is a name, a number or a tuple"),
         ({"reward": [-300, -(10**400)]}, "reward has a number beyond 1e308"),
+        ({"reward": [-1e200, -1e200]}, "reward has -1e.200 in row 0: needed are finite numbers"),
     ],
 )
 def test_a_frame_that_cannot_be_meant_is_refused(changes, words):

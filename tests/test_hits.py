@@ -65,6 +65,7 @@ WRONG = {
     "base_x is 1e\\+300": put("base_x", 0, 1e300),
     "line 2: left_2 is '?inf": put("left_2", 0, np.inf),
     "left_2 is '?True'?; needed is a number": put("left_2", 0, np.True_),
+    r"left_2 is '?\(1\+2j\)'?; '\(' .* makes it no number": put("left_2", 0, 1 + 2j),
     "no column subject.*found are who, trial": lambda t: t.rename(columns={"subject": "who"}),
 }
 
@@ -130,12 +131,15 @@ def test_a_hit_that_nobody_can_have_made_is_named_or_left_out(people, read, reas
         read(frame)
     with pytest.raises(CoarticError, match=rf"the frame, row {row}: .*{reason}.*Mend"):
         solutions_of(TASK, frame)
-    with pytest.warns(UserWarning, match=f"1 of {len(people)} hits are left out as implausible"):
+    words = f"1 of {len(people)} hits are left out as implausible"
+    with pytest.warns(UserWarning, match=words) as warned:
         left = read(frame, implausible="drop")
+    assert {warning.filename for warning in warned} == {__file__}
     assert len(left) == len(people) - 1
     pd.testing.assert_frame_equal(left, read(people[~bad]))
-    with pytest.warns(UserWarning, match=rf"left out as implausible, row {row}"):
+    with pytest.warns(UserWarning, match=rf"left out as implausible, row {row}") as warned:
         trials = solutions_of(TASK, frame, implausible="drop")
+    assert {warning.filename for warning in warned} == {__file__}
     assert len(trials.runs) == len(solutions_of(TASK, people).runs) - 1
 
 
@@ -596,6 +600,10 @@ NO_TABLE = {
         line[:-1] + ",7" * (n == 2) + "\n" for n, line in enumerate(text.splitlines(True))
     ),
     "line 2: it has 14 values": lambda text: text.replace("\na,", "\n", 1),
+    "line 2: it has 16 values.*also line 3": lambda text: "".join(
+        {1: line[:-1] + ",7\n", 2: line.partition(",")[2]}.get(n, line)
+        for n, line in enumerate(text.splitlines(True))
+    ),
     "is in UTF-16, as Excel": lambda text: text.encode("utf-16"),
     "in UTF-16": lambda text: text.encode("utf-16-le"),
     "is damaged from byte": lambda text: text.encode()[:-300] + b"\0" * 300,

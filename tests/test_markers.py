@@ -99,8 +99,10 @@ def test_a_file_is_read_as_a_frame_and_ticks_are_of_the_unit(tmp_path):
 
 
 def test_an_arm_without_markers_keeps_its_start():
-    with pytest.warns(UserWarning, match="the left arm has no markers and keeps its start"):
+    words = "the left arm has no markers and keeps its start"
+    with pytest.warns(UserWarning, match=words) as warned:
         hits = hits_from_markers(recorded(ONE_OF_TWO), BOTH)
+    assert {warning.filename for warning in warned} == {__file__}
     left = BOTH.robot.joints("left")
     assert (hits[[*BOTH.robot.joint_names[left]]] == BOTH.q0[left]).all(axis=None)
     assert {*hits.hand} == {"right"}
@@ -345,7 +347,7 @@ def twice(t):
 
 
 def dropped(t):
-    """A sixth of the frames is lost, and times are numbered anew."""
+    """A sixth of the frames is lost, and times are numbered again."""
     return t[np.random.default_rng(len(t)).random(len(t)) > 1 / 6]
 
 
@@ -373,7 +375,7 @@ SAID |= {
     "right_._. is rounded to 0.003, the radius of goals is 0.01": lambda t: t.assign(
         **(t.iloc[:, 3:] / 0.003).round() * 0.003
     ),
-    r"\d+ times markers go twice as far between samples .* numbered anew": each_trial(dropped),
+    r"\d+ times markers go twice as far between samples .* numbered again": each_trial(dropped),
     r"the length of right link 1 follows joint 2, by 1 % .* slide over a joint.*link 2": soft,
 }
 

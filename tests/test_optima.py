@@ -42,6 +42,10 @@ def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
         "free": (-300, None, "one b=2", "free -300"),
     }
     assert [name for name, each in best.items() if each.only_here] == ["free"]
+    worse = study_of([run("free", "one", -900), run("free", "two", -900)], changed)
+    found, alone = worse.optima["free"], worse.sequences("free").iloc[0]
+    assert (found.reward, found.hands) == (alone.reward, alone.hands)
+    assert (found.source, found.only_here) == ("corrective process alone", True)
     nothing = optima.best_known(study.stored.assign(status="timeout"), tasks)
     assert {name: each.reward for name, each in nothing.items()} == {
         name: best_shipped(load_task(name)).reward for name in ("ascending", *shipped)

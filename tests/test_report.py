@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -270,6 +271,13 @@ def test_methods_that_follow_paths_are_left_out():
     both, paths = (study_of(runs, movements=lambda _: stored) for runs in (rows, rows[1:]))
     assert [run["id"] for run in methods_played(both, ["ascending"])] == ["corrective"]
     assert player(paths) == ""
+
+
+def test_commands_name_a_folder_without_the_way_to_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shown = {"a/b": "a/b", "../a": "a", ".": tmp_path.name, f"{tmp_path}/b c": "'b c'", "/a/b": "b"}
+    for folder, name in shown.items():
+        assert Study(Path(folder), [], {}, pd.DataFrame()).folder_in_commands == name
 
 
 def test_a_method_to_compare_with_is_meant_by_label_id_or_title(traced):

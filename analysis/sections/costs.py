@@ -231,11 +231,16 @@ def list_runtimes(study: Study) -> Rows:
 )
 def draw_runtimes(study: Study) -> Parts | None:
     """Draw the share of targets that methods reach within a number of trials, and of
-    forward-kinematics evaluations, a panel each; None without a curve."""
+    forward-kinematics evaluations, a panel each, or only one if the other has no curve; None
+    without a curve.
+
+    Of :func:`.headline_methods`, without the corrective process alone, curves are of methods that
+    use the reward of each trial, of methods from files, and, of all methods that do not use the
+    reward of each trial, of the method that reaches most targets.
+    """
     tabled = list_runtimes(study)
     rows = study.methods.loc[[*tabled.index]]
     rows = rows.loc[headline_methods(rows)]
-    # Shown are methods that learn, random search, the best planner, and methods from files.
     rows = rows[rows.algorithm != "corrective process alone"]
     plans = rows.index[rows.information != BY_TRIAL]
     best = tabled.reached[plans].idxmax() if len(plans) else None
