@@ -78,8 +78,9 @@ def current_code(method: MethodInfo) -> str:
 
 def check_id(name: str, origin: str, registered: Registry) -> None:
     """Raise CoarticError for the id ``name`` of a method from ``origin`` that is malformed or has
-    more than 80 characters, begins with a reserved word (:data:`_RESERVED`; capitals matter), or is, capitals aside, an id in
-    ``registered``, a condition of the learner or one of :data:`NAMES`."""
+    more than 80 characters, begins with a reserved word (:data:`_RESERVED`; capitals matter), or
+    is, capitals aside, an id in ``registered``, a condition of the learner or one of
+    :data:`NAMES`."""
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(
             f"{origin}: the name {name!r} must begin with a letter or digit and have only letters, "
