@@ -463,8 +463,8 @@ def start_process(process: Any) -> None:
 
 @contextlib.contextmanager
 def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes with the environment variables of workers, with which all x86-64
-    processors round alike, for programs that run methods or proofs themselves.
+    """Open a pool of processes with the environment variables of workers, with which x86-64
+    processors with AVX2 round alike, for programs that run methods or proofs themselves.
 
     Examples
     --------

@@ -29,7 +29,7 @@ ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
 def worker_variables() -> dict[str, str]:
     """Return environment variables to set for a process in which methods run: one thread, and on
     x86-64 OpenBLAS's kernels for Nehalem and NumPy's loops without AVX-512, so that x86-64
-    processors round alike."""
+    processors with AVX2 (from Haswell and Zen on) round alike."""
     if platform.machine() not in ("x86_64", "AMD64"):
         return ONE_THREAD
     major, minor = map(int, metadata.version("numpy").split(".")[:2])

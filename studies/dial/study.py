@@ -171,7 +171,7 @@ def draw(table):
         axes.set_yscale("log")
         axes.set_yticks([1, 10, 100, 1_000, 10_000], ["1", "10", "100", "1000", "10 000"])
         axes.minorticks_off()
-        axes.set_ylabel(f"trials to {share} of the gain")
+        axes.set_ylabel(f"trials to {share} of gain")
         axes.axhline(TRIALS, color=figures.GREY, linewidth=0.6, linestyle=":")
     panels[2].set_ylabel("gain after 100 trials (%)")
     for axes in panels:
