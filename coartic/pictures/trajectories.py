@@ -88,10 +88,10 @@ class Trajectory:
     def to_frame(self) -> pd.DataFrame:
         """Return the movement as a table, a row for each control tick (index ``tick``, from 0).
 
-        ``goal`` is the number of the first goal not hit before the tick, ``hand`` the hand that is
-        to hit it. Then the configuration (``base_x``, ``base_y`` in length units, ``left_1`` and so
-        on in rad) and the place of both hands (``left_x``, ``left_y``, ``right_x``, ``right_y``,
-        length unit). ``attrs["units"]`` has these units.
+        ``goal`` is the number of the first goal with this or a later row in ``hits``, ``hand`` the
+        hand that is to hit it. Then the configuration (``base_x``, ``base_y`` in length units,
+        ``left_1`` and so on in rad) and the place of both hands (``left_x``, ``left_y``,
+        ``right_x``, ``right_y``, length unit). ``attrs["units"]`` has these units.
         """
         import pandas as pd
 
