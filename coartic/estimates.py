@@ -109,8 +109,8 @@ def centred(values: Array) -> Array:
 
 @checked_arguments
 def mean(values: Numbers, *, resamples: Resamples = RESAMPLES) -> Estimate:
-    """Return the mean of a sample ``(n,)`` with its 95 % bootstrap interval
-    (:func:`mean_of_means`), NaN for fewer than three values. Raises ValueError for a sample that is
+    """Return the mean of a sample ``(n,)`` with its 95 % interval (:func:`mean_of_means`), whose
+    ends are NaN for fewer than three values. Raises ValueError for a sample that is
     empty or not finite."""
     return _mean_of(tuple(vector(values).tolist()), resamples)
 
@@ -125,8 +125,8 @@ def difference_of_means(
     first: Numbers, second: Numbers, *, resamples: Resamples = RESAMPLES
 ) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
-    and ``(m,)``, with its 95 % bootstrap interval (:func:`mean_of_means`), NaN for fewer than three
-    values in a sample. Raises ValueError for a sample that is empty or not finite."""
+    and ``(m,)``, with its 95 % interval (:func:`mean_of_means`), whose ends are NaN for fewer than
+    three values in a sample. Raises ValueError for a sample that is empty or not finite."""
     return mean_of_means([first, second], [1.0, -1.0], resamples)
 
 

@@ -44,7 +44,8 @@ def _links_for(robot: Robot) -> int:
 
 def width_of(robot: Robot) -> int:
     """Return the number of entries of a robot's configuration in records of kernels: the ``dof``
-    entries of the robot, then zeros up to a base and two arms of :func:`_links_for` links each."""
+    entries of the robot, then unused ones up to a base and two arms of :func:`_links_for` links
+    each."""
     return BASE_DOF + 2 * _links_for(robot)
 
 
@@ -266,8 +267,8 @@ def winding(q: Any, slot: int) -> float:
 
 @inner
 def are_near(at: SlotArrays, count: int) -> bool:
-    """Return whether the angle from +x of every link in the first ``count`` columns of ``at``, and
-    in columns that pad them (:func:`padded_count`), is certain to be below 1e5 rad
+    """Return whether the absolute angle from +x of every link in the first ``count`` columns of
+    ``at``, and in columns that pad them (:func:`padded_count`), is certain to be below 1e5 rad
     (:func:`winding`)."""
     far = 0
     for i in range(padded_count(count)):
@@ -296,7 +297,7 @@ _far_chains = _chains_by(cosine, sine)
 def place(at: SlotArrays, count: int, near: bool) -> None:
     """Fill the arrays ``x`` and ``y`` in the first ``count`` columns of ``at``, and in columns that
     pad them, in place, with the places of shoulder, joints and hand, length unit, for the
-    configurations ``at.q``. ``near`` promises link angles below 1e5 rad (:func:`are_near`)."""
+    configurations ``at.q``. ``near`` promises absolute link angles below 1e5 rad."""
     if near:
         _near_chains(at, padded_count(count))
     else:

@@ -62,8 +62,8 @@ class _Kernel:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """Compiled function: a dispatcher of Numba, which compiles it when it is first called, or
-        an intrinsic. Raises CoarticError as :func:`_compile_kernel` does."""
+        """Compiled function: a dispatcher of Numba, which compiles it, or reads its machine code,
+        when first called, or an intrinsic. Raises CoarticError as :func:`_compile_kernel` does."""
         return _compile_kernel(self.function, self.kind)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -74,8 +74,8 @@ class _Kernel:
         return self.dispatcher(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the compiled dispatcher that Numba asks for when another kernel
-        calls this kernel; raise AttributeError for other attributes."""
+        """Return an attribute of :attr:`dispatcher` that Numba asks for when another kernel calls
+        this kernel; raise AttributeError for other attributes."""
         if name in ("_numba_type_", "py_func", "targetoptions"):
             return getattr(self.dispatcher, name)
         raise AttributeError(f"a kernel has no attribute {name!r}")
@@ -123,8 +123,9 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 
 
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
-    """Return the addresses with which kernels draw from N NumPy generators (:func:`generator_at`),
-    of state and two functions, shape ``(N, 3)``. The generators must outlive the kernel's call."""
+    """Return the addresses with which kernels draw from N > 0 NumPy generators
+    (:func:`generator_at`), of state and two functions, shape ``(N, 3)``. The generators must
+    outlive the kernel's call."""
     rows = [
         [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
         for c in (generator.bit_generator.ctypes for generator in generators)
@@ -290,7 +291,7 @@ def _cache_folder() -> Path | None:
 
 
 def _remove_old(root: Path, current: Path) -> None:
-    """Remove the folders of machine code below ``root`` that no process has used for 30 days;
+    """Remove the folders of machine code in ``root`` that no process has begun to use for 30 days;
     ``current`` counts as used now, whatever the clock says."""
     with contextlib.suppress(OSError):
         os.utime(current)
@@ -354,9 +355,9 @@ class _MachineCode:
         self.unlock()
 
     def wait_for_lock(self) -> bool:
-        """Lock this function's code for this process, whose id the file of the lock gets, and
-        return True; return False if it cannot be locked, or another process holds the lock for more
-        than 120 s. A log message names that process after 5 s."""
+        """Lock this function's code for this process, whose id the file of the lock gets unless the
+        disk is full, and return True; return False if it cannot be locked, or another process holds
+        the lock for more than 120 s. A log message names that process after 5 s."""
         with contextlib.suppress(ImportError, OSError):
             import fcntl
 

@@ -109,7 +109,8 @@ def largest_square(length: float) -> float:
 
 @inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
-    """Return a number of steps, rarely whole, for which the hand certainly stays out of a disc.
+    """Return a number of steps, rarely whole, for which the hand certainly stays out of a disc; 0
+    if it may be in the disc.
 
     Along the line of a movement every absolute link angle turns at a constant rate. So per step the
     hand moves by at most ``s = |Δbase| + Σ length |Δangle|``, and its velocity changes by at most
@@ -139,7 +140,7 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 def divide_steps(at: SlotArrays, count: int, step: float) -> bool:
     """Set rates, bounds and numbers of steps, of length ``step`` in joint space, of the movements
     in the first ``count`` columns of ``at`` (:func:`start`), in place; ``distance`` becomes its
-    root. Return whether all link angles are certain to stay below 1e5 rad (:func:`winding`)."""
+    root. Return whether all link angles certainly stay below 1e5 rad in size (:func:`winding`)."""
     far = 0
     for i in range(padded_count(count)):
         distance = math.sqrt(at.distance[i])
@@ -267,7 +268,7 @@ def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotReco
 
 @entry
 def _move_kernel(stop_on_arrival: bool, robot: NDArray[np.void], batch: Batch) -> None:
-    """Move the first run of ``batch`` to its target, and set the results in its record
+    """Move the first run of ``batch`` towards its target, and set the results in its record
     (:func:`move_slots`). ``robot`` comes from :func:`robot_parameters`."""
     run = batch.runs[0]
     start(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
@@ -358,9 +359,9 @@ def descend(
     at: SlotArrays, count: int, robot: RobotRecord, runs: Any, pull: Any
 ) -> tuple[int, bool]:
     """Make an iteration of the corrective process **A** in each of the first ``count`` columns of
-    ``at`` that goes on, in place, with ``pull`` as in :func:`descend_to_goals`; the status of a
-    column that it does not change becomes stuck. Return how many columns have ended, and whether
-    all link angles are then certain to be below 1e5 rad."""
+    ``at`` that goes on, in place, with ``pull`` as in :func:`descend_to_goals`; the status of such
+    a column that stays the same becomes stuck. Return how many columns have ended, and whether all
+    link angles are then certain to be below 1e5 rad in size."""
     ended = 0
     far = 0
     tip = len(at.length)
@@ -398,7 +399,7 @@ def descend(
 def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) -> None:
     """Iterate the corrective process **A** in the first ``count`` slots of ``batch.at[0]`` until
     each has converged or failed: is not finite, no longer moves, or has made ``max_iterations``.
-    The record of each run in ``batch.runs`` gets ``converged``, ``iterations`` and, in ``target``,
+    The record of each run in these slots gets ``converged``, ``iterations`` and, in ``target``,
     base and arm of the last iterate (the entries of the other arm stay), and its ``evaluations``
     grow by ``iterations`` + 1. Afterwards the slots, which :func:`load` filled, are free.
 
@@ -461,9 +462,9 @@ def project(v: Any, x: Any, y: Any) -> None:
 
 @inner
 def _pull_to_preferred(at: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
-    """Set ``pull`` in each of the first ``count`` columns of ``at`` to β N(q) (p − q), 0 for a
-    locked base: the share β of the way to the preferred posture p (``pull`` and ``preferred`` of
-    the run), projected by N onto the null space of the hand's Jacobian."""
+    """Set ``pull`` in each of the first ``count`` columns of ``at`` to β N(q) (p − q), 0 for locked
+    base coordinates: the share β of the way to the preferred posture p (``pull`` and ``preferred``
+    of the run), projected by N onto the null space of the hand's Jacobian."""
     tip = len(at.length)
     for i in range(count):
         run, v = runs[at.run[i]], at.pull[:, i]
@@ -486,21 +487,21 @@ def _pull_to_preferred(at: SlotArrays, count: int, robot: RobotRecord, runs: Any
 @shared
 def pull_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
     """Run the corrective process with a pull to each run's preferred posture in the first ``count``
-    slots of ``batch``; set ``target`` and ``converged`` of the runs (:func:`descend_to_goals`)."""
+    slots of ``batch``, and set the results in the runs' records (:func:`descend_to_goals`)."""
     descend_to_goals(batch, count, robot, _pull_to_preferred)
 
 
 @shared
 def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
-    """Run the paper's corrective process in the first ``count`` slots of ``batch``; set ``target``
-    and ``converged`` of the runs (:func:`descend_to_goals`)."""
+    """Run the paper's corrective process in the first ``count`` slots of ``batch``, and set the
+    results in the runs' records (:func:`descend_to_goals`)."""
     descend_to_goals(batch, count, robot, None)
 
 
 @entry
 def _correct_kernel(robot: NDArray[np.void], batch: Batch) -> None:
-    """Run the corrective process for the first run of ``batch``; ``target`` in its record becomes
-    the last iterate. ``robot`` comes from :func:`robot_parameters`."""
+    """Run the corrective process for the first run of ``batch``, and set the results in its record
+    (:func:`descend_to_goals`). ``robot`` comes from :func:`robot_parameters`."""
     run = batch.runs[0]
     load(batch.at[0], 0, 0, run, arm_of(robot[0], run.hand))
     correct_slots(batch, 1, robot[0])
@@ -574,7 +575,7 @@ def explain_failure(
     model: MotionModel,
 ) -> str:
     """Return the end of a sentence, from its colon on, on why the corrective process may have
-    failed from ``q``, shape ``(dof,)``; an empty text if there is no cause that users can mend.
+    failed from ``q``, shape ``(dof,)``; an empty text if none of the causes below applies.
 
     One cause is a hand that no free joint or base coordinate moves nearer. Other causes are a long
     and a short arm: near a goal, errors shrink by the factor ``1 - gain σ²`` an iteration, with the

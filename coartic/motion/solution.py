@@ -418,8 +418,9 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
 
 
 def _check_movement(task: Task, movement: Movement) -> Movement:
-    """Return the movement itself, or a copy as in :func:`movements_by_goal`. Raises SolutionError
-    or ValueError for an unknown hand or kind, or if target or waypoints do not fit."""
+    """Return the movement itself, or a copy with arrays as in :func:`movements_by_goal`. Raises
+    SolutionError or ValueError for a hand that the task does not have, for an unknown kind, and if
+    target or waypoints do not fit."""
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
     if not isinstance(movement.hand, str) or movement.hand not in task.hands:
         known = " and ".join(map(repr, task.hands))
@@ -461,7 +462,7 @@ def _check_point(task: Task, point: Any) -> Array:
 
 def _hold_base(task: Task, points: Array) -> Array:
     """Set locked base coordinates of points, ``(..., dof)``, to their values at the start, in
-    place, and return ``points`` itself. Raises ValueError where a coordinate differs from the start
+    place, and return ``points`` itself. Raises ValueError where one of them differs from the start
     by more than :data:`HELD`, 1e-6 length units; NaN stays."""
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)

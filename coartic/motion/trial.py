@@ -107,9 +107,9 @@ def set_off(run: RunRecord, q: Any) -> None:
 
 @inlined
 def begin(run: RunRecord, goal: Any) -> None:
-    """Set the next goal of a run, x and y, in place: phase 1, *begin*. The next action, unless
-    *aim* sets a target, is to check whether the hand is in the goal, or none if the trial has
-    ended."""
+    """Set the next goal of a run, x and y, in place: phase 1, *begin*. Its target becomes where it
+    stands, ``hit`` False, ``corrects`` True, and the next ``action`` to check whether the hand is
+    in the goal, or none if the trial has ended."""
     fill_row(run.goal, goal)
     fill_row(run.target, run.q)
     run.action = CHECK if run.going else IDLE
@@ -118,8 +118,8 @@ def begin(run: RunRecord, goal: Any) -> None:
 
 @inlined
 def aim(run: RunRecord, target: Any) -> None:
-    """Set the target of a run, in place: phase 2, *aim*. Where an entry of ``target``, shape
-    ``(dof,)``, is NaN, base or joint stays; if all are NaN, no movement is made."""
+    """Set the target of a run, in place: phase 2, *aim*. Where an entry of ``target``, at least
+    ``dof`` entries, is NaN, base or joint stays; unless all are NaN, the next action is to move."""
     for j in range(len(target)):
         if not math.isnan(target[j]):
             run.target[j] = target[j]
@@ -129,8 +129,8 @@ def aim(run: RunRecord, target: Any) -> None:
 @inlined
 def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Move each of the first ``count`` runs of a batch to its target, or check whether its hand is
-    in the goal, as its ``action`` says (:data:`IDLE`): phase 3, *move*. ``q``, ``hit``, ``ticks``
-    and ``evaluations`` change in place; a run without a movement takes 0 ticks."""
+    in the goal, or neither, as its ``action`` says (:data:`IDLE`): phase 3, *move*. ``q``, ``hit``,
+    ``ticks``, ``evaluations`` and ``acting`` change in place; without a movement ticks are 0."""
     for stops in (True, False):
         for i in range(count):
             run, action = batch.runs[i], batch.runs[i].action
@@ -145,8 +145,8 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 @inlined
 def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Correct missed goals of the first ``count`` runs of a batch, in place: phase 4, *correct*.
-    ``target`` of a corrected run becomes the configuration that **A** finds; ``ticks`` of each run
-    become the ticks of its corrective movement, 0 if none is made."""
+    ``target`` of a run for which **A** acts becomes the configuration in which **A** ends;
+    ``ticks`` of each run become the ticks of its corrective movement, 0 if none is made."""
     find_corrections(count, robot, batch)
     make_corrections(count, robot, batch)
 
@@ -204,9 +204,9 @@ def _move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> N
 
 @inlined
 def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
-    """Have the corrective process **A**, kernel ``descend``, find a ``target`` that hits the goal
-    for each of the first ``count`` runs of ``batch`` that missed it, whose trial goes on and that
-    may be corrected. ``converged`` is True where **A** did, else False; ``ticks`` become 0."""
+    """Set ``target`` of each of the first ``count`` runs of ``batch`` that missed its goal, goes on
+    and may be corrected to where the corrective process **A**, kernel ``descend``, ends. In each of
+    the first ``count`` runs ``converged`` is True if **A** converged, and ``ticks`` become 0."""
     at, slot = batch.at[0], 0
     for i in range(count):
         run = batch.runs[i]
@@ -221,15 +221,15 @@ def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None
 
 @shared
 def find_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Have the paper's corrective process **A** find targets for runs that missed their goals
-    (:func:`_find_by`)."""
+    """Have the paper's corrective process **A** find targets: set ``target`` of each of the first
+    ``count`` runs of ``batch`` that missed its goal, goes on and may be corrected to where **A**
+    ends (:func:`_find_by`)."""
     _find_by(count, robot, batch, correct_slots)
 
 
 @shared
 def find_pulled_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Have **A**, pulled to each run's preferred posture, find targets for runs that missed their
-    goals (:func:`_find_by`)."""
+    """Do as :func:`find_corrections` with **A** pulled to each run's preferred posture."""
     _find_by(count, robot, batch, pull_slots)
 
 
@@ -289,7 +289,7 @@ def _reach_lot(
 ) -> None:
     """Let ``count`` arms from number ``first`` (from 0) on, at most as many as ``batch`` has runs,
     reach for their goals; fill in ``goals``, accounts ``(N, G, M)``, and ``counts``, ``(N, 5)``,
-    in place. ``arms`` are :class:`Requests`."""
+    given as 0, in place. ``arms`` are :class:`Requests`, ``robot`` is a :data:`RobotRecord`."""
     for i in range(count):
         n, run = first + i, batch.runs[i]
         set_off(run, arms.starts[min(n, len(arms.starts) - 1)])
@@ -332,8 +332,8 @@ def _reach_lot(
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any) -> None:
     """Let every arm reach for its goals, as many arms at a time as a batch has runs; fill
-    ``goals``, ``counts`` and ``rewards``, the entries of :class:`Accounts`, in place. ``others``:
-    entries of :class:`Requests`, then of a batch."""
+    ``goals``, ``counts`` (given as 0) and ``rewards``, the entries of :class:`Accounts`, in place.
+    ``others``: entries of :class:`Requests`, then of a batch."""
     arms, batch = Requests(*others[:5]), Batch(*others[5:])
     count, room = len(arms.targets), len(batch.runs)
     for first in range(0, count, room):
@@ -360,7 +360,7 @@ def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Acco
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
     """Let N arms reach for G goals each, in turn, and return their accounts; an arm that misses a
-    goal makes no further movement. ``parameters`` come from :func:`robot_parameters`.
+    goal makes no movement for later goals. ``parameters`` come from :func:`robot_parameters`.
 
     A trial with a target beyond :data:`LARGEST_ENTRY` fails without a movement; nothing else is
     checked. Many arms are shared among threads.
@@ -555,8 +555,8 @@ def make_trials(
 
 
 def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
-    """Return a sentence on the first goal that a trial missed, and why, from the accounts of its
-    goals, shape ``(G,)``; empty if the trial hit every goal."""
+    """Return a sentence on the first goal that a trial missed, and, where it is known, why, from
+    the accounts of its goals, shape ``(G,)``; empty if the trial hit every goal."""
     if goals["hit"][-1]:
         return ""
     number = int(goals["hit"].argmin())
@@ -621,7 +621,7 @@ HandSequences = str | Sequence[str]
 def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
     """Return the hand for each goal of ``count`` trials, 0 left or 1 right, shape ``(count, G)``.
 
-    Raises ValueError if the sequences do not fit the task, or their number is not ``count``.
+    Raises ValueError if the sequences do not fit the task, or a list has not ``count`` of them.
     """
     several = isinstance(hands, Iterable) and not isinstance(hands, str)
     each: list[Any] = list(hands) if several else [hands]
@@ -724,7 +724,7 @@ def search_initial_hands(
     If the task names a sequence, this is returned, and no counts. If it names a policy, the
     corrective process alone tries sequences of ``hands`` (None: the task's): under
     ``"best-single-hand"`` sequences of one hand, else all; the first of :func:`ranked_sequences` is
-    returned. ``outside`` as in :func:`make_trials`.
+    returned. ``outside`` as in :func:`make_trials`; a search that fails counts no trials.
 
     Raises NotApplicableError if no sequence tried completes the task, or more than 4096 would have
     to be tried, and ValueError for no hand or a hand that is not among the task's hands.
@@ -744,7 +744,7 @@ def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
     """Return what :func:`search_initial_hands` returns for a task, given as JSON, with a policy and
-    for ``hands`` in order; the caller counts the trials. The last 64 results are kept."""
+    for ``hands`` in order; the caller counts the trials. The 64 results used last are kept."""
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)
     if task.initial_hands == "best-single-hand":

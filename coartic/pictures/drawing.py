@@ -105,10 +105,11 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
 
 def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Array, Array]:
     """Return the lower left and the upper right corner, shape ``(2,)``, length unit, of a box
-    around the goals and the robot in ``configurations``, shape ``(..., dof)``.
+    around the goals, and the base and the arms of the task's hands in ``configurations``, shape
+    ``(..., dof)``.
 
     ``margin`` is the free border, length unit, for arms of length 4; it scales with the shorter
-    arm.
+    arm. Circles of goals may reach into it.
     """
     margin *= task.robot.scale
     points = [
@@ -117,4 +118,8 @@ def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Ar
     ]
     points += [task.robot.joint_positions(configurations, hand) for hand in task.hands]
     cloud = np.concatenate([part.reshape(-1, 2) for part in points])
-    return cloud.min(axis=0) - margin, cloud.max(axis=0) + margin
+    low, high = task.goal_array.min(axis=0), task.goal_array.max(axis=0)
+    return (
+        np.minimum(cloud.min(axis=0) - margin, low - task.radius),
+        np.maximum(cloud.max(axis=0) + margin, high + task.radius),
+    )

@@ -47,9 +47,9 @@ def write_film(
     width: int = 800,
     replace: bool = False,
 ) -> tuple[int, float]:
-    """Write a film, ``width`` pixels wide (MP4: rounded down to even), of movements side by side,
-    all from their first tick; return the number of frames that differ, and the ticks that are shown
-    in a second.
+    """Write a film, ``width`` pixels wide (MP4: up to 2 fewer), of movements side by side, all from
+    their first tick; return the number of frames that differ, and about how many ticks are shown in
+    a second.
 
     ``movements`` are pairs of a title and a trajectory. A movement that ends before the longest
     movement then stands still. Raises CoarticError for a movement without a tick, for an ending

@@ -77,7 +77,7 @@ class Trajectory:
 
     def subtask(self, goal: int) -> Array:
         """Return the rows of ``configurations`` from the hit of the goal before, or the start, to
-        the hit of a goal, both included, shape ``(rows, dof)``.
+        the hit of a goal, both included, shape ``(rows, dof)``; none if no tick was made.
 
         ``goal`` is a number from 1. Raises ValueError if there is no such goal.
         """
@@ -88,10 +88,10 @@ class Trajectory:
     def to_frame(self) -> pd.DataFrame:
         """Return the movement as a table, a row for each control tick (index ``tick``, from 0).
 
-        ``goal`` is the number of the goal that the robot moves to, ``hand`` the hand that is to hit
-        it. Then the configuration (``base_x``, ``base_y`` in length units, ``left_1`` and so on in
-        rad) and the place of both hands (``left_x``, ``left_y``, ``right_x``, ``right_y``, length
-        unit). ``attrs["units"]`` has these units.
+        ``goal`` is the number of the first goal with this or a later row in ``hits``, ``hand`` the
+        hand that is to hit it. Then the configuration (``base_x``, ``base_y`` in length units,
+        ``left_1`` and so on in rad) and the place of both hands (``left_x``, ``left_y``,
+        ``right_x``, ``right_y``, length unit). ``attrs["units"]`` has these units.
         """
         import pandas as pd
 
@@ -139,9 +139,9 @@ class Trajectory:
         width: Annotated[int, Field(ge=200, le=3840)] = 560,
         replace: bool = False,
     ) -> None:
-        """Write a film of the movement, ``width`` pixels wide (MP4: rounded down to even), as a
-        file ``.gif`` or, where ffmpeg is installed, ``.mp4``; with ``replace`` a file that is there
-        is written over. Raises CoarticError for another ending, if no control tick was made, and if
+        """Write a film of the movement, ``width`` pixels wide (MP4: up to 2 fewer), as a file
+        ``.gif`` or, where ffmpeg is installed, ``.mp4``; with ``replace`` a file that is there is
+        written over. Raises CoarticError for another ending, if no control tick was made, and if
         the file cannot be written, or is there and ``replace`` is False."""
         from coartic.pictures.film import write_film
 
