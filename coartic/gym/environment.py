@@ -54,10 +54,10 @@ class TaskEnv(Recorded, gymnasium.Env):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial, of the task or of a random instance of the family; return observation
-        ``(O,)`` and info, a dictionary: ``task`` is the task's name, ``is_success`` True if the
-        trial has hit all goals. With ``seed`` None the random generator goes on, which the system
-        seeds at first. Raises ValueError for any option, and for a seed that is no whole number
-        from 0."""
+        ``(O,)`` and info, a dictionary: ``task`` is the task's name (:meth:`TaskVectorEnv.infos`),
+        ``is_success`` True if the trial has hit all goals. With ``seed`` None the random generator
+        goes on, which the system seeds at first. Raises ValueError for any option, and for a seed
+        that is no whole number from 0."""
         super().reset(seed=whole_seed(seed))
         check_no_options(options)
         self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))

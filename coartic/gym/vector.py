@@ -259,9 +259,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
     def infos(self) -> dict[str, Any]:
         """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
-        and ``is_success``, True where the robot has hit all goals of its trial; before the first
-        reset it means nothing. After :meth:`step` a trial that ended has started again: its last
-        infos are in ``final_info`` of the step."""
+        with a family's file for the family, and ``is_success``, True where the robot has hit all
+        goals of its trial; before the first reset it means nothing. After :meth:`step` a trial that
+        ended has started again: its last infos are in ``final_info`` of the step."""
         task = self.state.task
         return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 

@@ -13,6 +13,7 @@ import itertools
 import json
 import os
 import pickle
+import re
 import sqlite3
 import time
 import warnings
@@ -634,8 +635,8 @@ def open_store(folder: Path) -> Iterator[Store]:
 
 @contextmanager
 def open_content(content: bytes, name: str) -> Iterator[Store]:
-    """Open the content of a ``runs.sqlite`` in memory for reading; messages call its folder ``name``.
-    """
+    """Open the content of a ``runs.sqlite`` in memory for reading; ``name`` stands for its folder
+    in messages."""
     with closing(_connect(":memory:", WAIT_S)) as connection:
         connection.deserialize(content)
         yield Store(Path(name), connection)
@@ -731,7 +732,7 @@ def _check_files(folder: Path) -> None:
 
 def _has_tables(connection: sqlite3.Connection) -> bool:
     """Return True if the file is marked as coartic's in this format, and False if the file has
-    neither a mark nor tables. Additions of other programs pass, except triggers. Raises
+    neither this mark nor tables. Additions of other programs pass, except triggers. Raises
     CoarticError for any other file, and ValueError for a row that names a missing row."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
@@ -807,7 +808,8 @@ def _explain(path: Path, error: Exception) -> str:
     said = plain(str(error), 200) or type(error).__name__
     if isinstance(error, CoarticError):
         said = one_line(str(error))
-        if str(path.parent) in said:
+        named = "|".join(re.escape(str(each)) for each in (path, path.parent))
+        if re.search(rf"(?<!\S)({named})(?!\w)", said):  # no point in "3.0.0" is folder "."
             return said
     elif isinstance(error, OSError):
         path, said = Path(error.filename or path), error.strerror or said
