@@ -94,8 +94,8 @@ def score(
     Warns
     -----
     UserWarning
-        An agent has no environment, as after loading, and neither ``env`` nor ``vec_normalize``
-        normalises: nothing says whether it was trained in ``VecNormalize``.
+        An agent's ``get_env`` returns None, as after loading, and neither ``env`` nor
+        ``vec_normalize`` normalises: nothing says whether it was trained in ``VecNormalize``.
 
     Examples
     --------

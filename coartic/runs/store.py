@@ -772,9 +772,9 @@ _UNREADABLE = (
 def explain_errors(folder: Path) -> Iterator[None]:
     """Turn an error of the block of this context into a CoarticError that names the file: of the
     system (the file that it names, else ``runs.sqlite`` in ``folder``), of SQLite, a CoarticError
-    (kept, as one line, if it names the folder), and any ValueError, LookupError, TypeError,
-    OverflowError, RecursionError or error of zlib, which are taken for content that coartic does
-    not write. Other errors pass."""
+    (kept, as one line, if it names the file or the folder), and any ValueError, LookupError,
+    TypeError, OverflowError, RecursionError or error of zlib, which are taken for content that
+    coartic does not write. Other errors pass."""
     try:
         yield
     except (CoarticError, *_UNREADABLE) as error:
