@@ -424,6 +424,14 @@ def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words)
         assert content() == before
 
 
+def test_an_error_names_the_file_in_the_current_folder(copied, tmp_path, monkeypatch):
+    """A point in a sentence is not the name of the folder."""
+    sql(f"PRAGMA user_version = {FORMAT - 1}")(copied)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(CoarticError, match=f"^cannot use {RUNS_FILE}: it was .* 3.0.0"):
+        load(".")
+
+
 @pytest.mark.parametrize(
     "statement",
     ["ANALYZE", "PRAGMA optimize = 0xfffe", "VACUUM", "CREATE INDEX i ON results (reward)",

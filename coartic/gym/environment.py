@@ -33,8 +33,8 @@ ADDED = ("OrderEnforcing", "PassiveEnvChecker", "Monitor", "VecMonitor")
 
 
 class TaskEnv(Recorded, gymnasium.Env):
-    """Environment of one robot, with the options, observations, actions and rewards of
-    :class:`TaskVectorEnv`; a trial begins with a reset only."""
+    """Environment of one robot, with the options (except ``num_envs``), observations, actions and
+    rewards of :class:`TaskVectorEnv`; a trial begins with a reset only."""
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
 
@@ -54,9 +54,10 @@ class TaskEnv(Recorded, gymnasium.Env):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial, of the task or of a random instance of the family; return observation
-        ``(O,)`` and info, a dictionary: ``task`` is the task's name, ``is_success`` True if the
-        trial has hit all goals. With ``seed`` None the random generator goes on. Raises ValueError
-        for any option, and for a seed that is no whole number from 0."""
+        ``(O,)`` and info, a dictionary: ``task`` is the task's name (:meth:`TaskVectorEnv.infos`),
+        ``is_success`` True if the trial has hit all goals. With ``seed`` None the random generator
+        goes on, which the system seeds at first. Raises ValueError for any option, and for a seed
+        that is no whole number from 0."""
         super().reset(seed=whole_seed(seed))
         check_no_options(options)
         self.robots._begin(slice(None), self.np_random.integers(len(self.robots.tasks)))
@@ -130,10 +131,10 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> RobotEnvs:
 
     ``env`` is an id, such as ``"coartic/TwoArmed1-v2"``; ``options`` are options of
     :class:`TaskVectorEnv`. Trials start again by themselves, actions are clipped, and rewards are
-    minus the ticks, as shares of the ticks that the corrective process takes for the whole trial,
-    at least -2 a step (:class:`~coartic.gym.stable_baselines.RobotEnvs`). Raises ValueError or
-    TypeError for an unknown id and for a wrong option, and CoarticError for a task that cannot be
-    used, and if Stable-Baselines3 is not installed.
+    minus the ticks, on a scale of the task's, at least -2 a step
+    (:class:`~coartic.gym.stable_baselines.RobotEnvs`). Raises ValueError or TypeError for an
+    unknown id and for a wrong option, and CoarticError for a task that cannot be used, and if
+    Stable-Baselines3 is not installed.
     """
     try:
         from coartic.gym.stable_baselines import RobotEnvs

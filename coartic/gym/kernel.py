@@ -163,10 +163,10 @@ def observe(*fields: Any) -> None:
 
 @entry
 def step_robots(*fields: Any) -> int:
-    """Let all robots whose trial goes on reach for their next goal; change the arrays ``fields``,
-    the entries of a :class:`VectorState`, in place. Return the number of trials that make their
-    first step; -1 - n, without a movement, if robot n, from 0, is the first whose action is not
-    finite."""
+    """Let all robots whose trial goes on reach for their next goal; change arrays among
+    ``fields``, the entries of a :class:`VectorState`, in place. Return the number of trials that
+    make their first step; -1 - n, without a movement, if robot n, from 0, is the first whose action
+    is not finite."""
     state = VectorState(*fields)
     last, begun = len(state.task) - 1, 0
     for n in range(last + 1):

@@ -49,23 +49,24 @@ def score(
     ----------
     env : str, Env, VectorEnv or VecEnv
         An environment of this package, or its id. Of a family the instances of the test split are
-        scored, or of the ``split`` that is given here. An environment in wrappers is taken as it
-        is, with its own instances: policies see and do what the wrappers let them, and trials count
-        in ticks; wrappers that normalise learn nothing.
+        scored, or of the ``split`` that is given here. An environment in wrappers (other than
+        :data:`ADDED`, or ``VecNormalize`` alone) is taken as it is, with its own instances:
+        policies that are no methods see and do what the wrappers let them, and trials count in
+        ticks; wrappers that normalise learn nothing.
     policy : callable, agent, Method or mapping, optional
         Gives actions ``(N, A)`` for observations ``(N, O)``: a function, an agent with the
         ``predict`` of Stable-Baselines3, which is asked without noise, or a method of the
-        benchmark, such as a planner, that solves each task. For an agent that was trained in
-        ``VecNormalize``, observations are normalised as there. A mapping has several, by their
+        benchmark, such as a planner, that solves each task. By default the ``VecNormalize`` of
+        an agent's own environment normalises what it sees. A mapping has several, by their
         names.
     episodes : int
         Trials of random actions on each task.
     seed : int
         Seed of random actions, of methods and of an environment in wrappers.
     vec_normalize : str, Path or VecNormalize, optional
-        Normalises what policies see, such as of an agent that was loaded from a file: the
-        ``VecNormalize`` of its training, or the file that its ``save`` wrote (a pickle: open only
-        files that you trust).
+        Normalises what policies see (in the place of ``env``'s, if that is its only wrapper), such
+        as of an agent that was loaded from a file: the ``VecNormalize`` of its training, or the
+        file that its ``save`` wrote (a pickle: open only files that you trust).
     **options
         Options of :class:`TaskVectorEnv`, for an environment without wrappers.
 
@@ -76,24 +77,25 @@ def score(
         the task's initial hands, and for the best solution known. Columns: ``reward``, the mean
         over tasks, ticks; ``gap`` to the best known reward, a share of it, over tasks where it is
         known, with its 95 % interval ``gap_low`` to ``gap_high`` (BCa bootstrap) over tasks, or of
-        one task over trials; ``completed``, the share of trials that hit all goals: where it is
-        below 1, reward and gap are NaN. NaN also where nothing is known, or too few values for an
-        interval. ``attrs["units"]`` has the units.
+        one task over trials; ``completed``, the share of trials that hit all goals (by actions in
+        less than 1,000,000 ticks): where it is below 1, reward and gap are NaN. NaN also stands for
+        what is not known, and for an interval of too few values. ``attrs["units"]`` has the units.
 
     Raises
     ------
     ValueError, TypeError
         The environment is not coartic's, an option is wrong, the policy is no policy, is called as
-        another row, or is an agent with other spaces or wrappers than the environment; or
-        observations would be normalised twice, in ``env`` and by ``vec_normalize``.
+        another row, or is an agent with other spaces than the environment or with wrappers where
+        this has none; or observations would be normalised twice, in ``env`` and by
+        ``vec_normalize``.
     OSError
         The file of ``vec_normalize`` cannot be read.
 
     Warns
     -----
     UserWarning
-        An agent has no environment, as after loading, and neither ``env`` nor ``vec_normalize``
-        normalises: nothing says whether it was trained in ``VecNormalize``.
+        An agent's ``get_env`` returns None, as after loading, and neither ``env`` nor
+        ``vec_normalize`` normalises: nothing says whether it was trained in ``VecNormalize``.
 
     Examples
     --------
@@ -138,7 +140,8 @@ def score(
 
 
 def column(rewards: Iterable[float | None]) -> Array:
-    """Return K rewards as a column, an array of shape ``(K, 1)``, with NaN for None."""
+    """Return K rewards, at least one, as a column, an array of shape ``(K, 1)``, with NaN for
+    None."""
     return np.array([[reward] for reward in rewards], np.float64)
 
 
@@ -166,7 +169,8 @@ def _normaliser(given: str | Path | Any) -> Any:
 def _acting(policy: Any, env: Any, normal: Any) -> Callable[[NDArray[np.float32]], ArrayLike]:
     """Return a function that gives the actions of a policy for observations of ``env``, which
     ``normal``, a ``VecNormalize``, normalises; if ``normal`` is None and ``env`` has none, the
-    agent's own. Raises TypeError for no policy, and for an agent of other spaces or wrappers."""
+    agent's own. Raises TypeError for no policy, and for an agent of other spaces, or of wrappers
+    where ``env`` has none."""
     normalised = any(map(is_normaliser, layers(env)))
     if normal is None and not normalised:
         normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
@@ -224,7 +228,7 @@ def _rollout(
 ) -> Array:
     """Let ``act``, which gives actions ``(n, A)`` for observations ``(n, O)``, make trials on each
     task of a :class:`TaskVectorEnv` with these options. Return the total rewards, ticks, shape
-    ``(tasks, trials)``; NaN where a trial failed."""
+    ``(tasks, trials)``; NaN where a trial failed or took 1,000,000 ticks or more."""
     rows = np.arange(trials * tasks)
     robots, totals = TaskVectorEnv(len(rows), **options), np.zeros(len(rows))
     robots._begin(rows, rows // trials)
@@ -239,8 +243,9 @@ def _rollout_as_it_is(
     act: Callable[[NDArray[np.float32]], ArrayLike], env: Any, tasks: int, seed: int
 ) -> Array:
     """Let ``act`` (:func:`_rollout`) make trials in an environment in wrappers, reset with
-    ``seed``, until each of its ``tasks`` tasks had a trial. Return the total reward of the first
-    trial on each task, ticks, shape ``(tasks, 1)``; NaN where the trial failed or was cut short."""
+    ``seed``, until each of its ``tasks`` tasks had a trial. Return the total reward of the trial on
+    each task that ended first, ticks, shape ``(tasks, 1)``; NaN where the trial failed, was cut
+    short or took 1,000,000 ticks or more."""
     robots, is_one = robots_of(env), isinstance(env, gymnasium.Env)
     totals, rewards = np.zeros(robots.num_envs), dict[int, float]()
 
@@ -319,7 +324,7 @@ def compare(rewards: Mapping[str, Numbers], best: Numbers) -> pd.DataFrame:
 
 def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
     """Return the reward of the solution that a method finds for a task; None if the method does not
-    apply, finds no solution, or the solution misses a goal."""
+    apply or finds no solution, or a goal is missed even after correction."""
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)
         return execute(task, result.solution, model=model).reward

@@ -56,11 +56,11 @@ class Recorded:
 class TaskVectorEnv(Recorded, VectorEnv):
     """Vector environment: N robots act side by side, each in a trial of its own.
 
-    An episode is a trial, of as many steps as there are goals. The reward of a step is minus its
-    ticks, or -1,000,000 where the corrective process fails, which ends the trial. A trial that has
-    ended starts again in the same step, as in Gymnasium's mode ``SAME_STEP``: ``final_obs`` and
-    ``final_info`` have its last observation and infos. Only the draw of an instance of a family is
-    random.
+    An episode is a trial, of at most as many steps as there are goals. The reward of a step is
+    minus its ticks, or -1,000,000 where the corrective process fails, which ends the trial. A trial
+    that has ended starts again in the same step, as in Gymnasium's mode ``SAME_STEP``:
+    ``final_obs`` and ``final_info`` have its last observation and infos. Only the draw of an
+    instance of a family is random.
 
     Parameters
     ----------
@@ -92,7 +92,8 @@ class TaskVectorEnv(Recorded, VectorEnv):
     Notes
     -----
     Joints are the coordinates of the base (length unit) and the angles of the arms (rad) that can
-    move, in the order of a configuration; in a family, of arms with the most links.
+    move, the arms in the order of the task's ``hands``; each arm counts with the most links that an
+    arm of the task or family can have.
 
     An observation has an entry for the next goal and for each goal ahead, 1 if the goal exists,
     else 0; x and y of each from the base, length unit, 0 without a goal; and the joints. In a
@@ -103,8 +104,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
     box is from -1 to 1; entries beyond are clipped. For each hand the corrective process finds a
     posture at the goal. With an entry up to 0.5 the hand is the hand whose posture is nearer in
     joint space, above 0.5 the other hand. The target is the posture of this hand, or, where the
-    process fails, the present posture, plus :data:`REACH` times the entries of the joints: zeros do
-    what the corrective process does. Entries of joints that a robot cannot move do nothing.
+    process fails, the present posture, plus :data:`REACH` times the entries of the joints: zeros
+    mostly do what the corrective process does with this hand. Entries of joints that a robot cannot
+    move do nothing.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -257,9 +259,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
 
     def infos(self) -> dict[str, Any]:
         """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
-        and ``is_success``, True where the robot has hit all goals of its trial; before the first
-        reset it means nothing. After :meth:`step` a trial that ended has started again: its last
-        infos are in ``final_info`` of the step."""
+        with a family's file for the family, and ``is_success``, True where the robot has hit all
+        goals of its trial; before the first reset it means nothing. After :meth:`step` a trial that
+        ended has started again: its last infos are in ``final_info`` of the step."""
         task = self.state.task
         return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
 
@@ -271,8 +273,9 @@ class TaskVectorEnv(Recorded, VectorEnv):
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial of each of the N robots; return observations ``(N, O)`` and the dictionary
         of infos. ``seed``: a list of a seed for each robot, or one number, with which robot i (from
-        0) has ``seed + i``; a robot with None keeps its random generator, which draws the tasks.
-        Raises ValueError for any option, and for seeds that are not whole numbers from 0.
+        0) has ``seed + i``; a robot with None keeps its random generator, which draws the tasks and
+        which the system seeds at first. Raises ValueError for any option, and for seeds that are
+        not whole numbers from 0.
         """
         check_no_options(options)
         if isinstance(seed, Iterable):

@@ -51,8 +51,9 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
     """Make a folder, if it is missing, and return the paths of files, below the folder, that
-    :data:`LISTING` there lists. Raises CoarticError if the folder cannot be written, if another
-    file has a path among ``names``, or if a path of either is a link or leads out of the folder."""
+    :data:`LISTING` there lists, except absolute paths and paths with ``..``. Raises CoarticError if
+    the folder cannot be written, if another file has a path among ``names``, or if one of these
+    paths is a link or leads out of the folder."""
     ours, listing = set[str](), folder / LISTING
     with errors_in_words(folder):
         if os.path.lexists(folder) and not folder.is_dir():

@@ -31,7 +31,8 @@ _words = ["Interrupted."]
 def catch_signals() -> None:
     """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) raise KeyboardInterrupt from now
     on, except in the 5 s after a KeyboardInterrupt that Python did not lose
-    (:func:`_interrupt_again`); unblock all signals. A signal ignored, as by ``nohup``, stays so."""
+    (:func:`_interrupt_again`); unblock all signals (not on Windows). A signal ignored, as by
+    ``nohup``, stays so."""
 
     def interrupt(number: int, _: object) -> None:
         if not _heard or time.monotonic() > _heard[-1][1] + _CLEANING_S:
@@ -95,8 +96,8 @@ def end_if_interrupted() -> None:
 
 @contextmanager
 def blocked_signals() -> Iterator[None]:
-    """Block the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) in the block of this context, also
-    for processes that start in the block; do nothing on Windows."""
+    """Block the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) for this thread in the block of
+    this context, also for processes that it starts there; do nothing on Windows."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

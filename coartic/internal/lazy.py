@@ -14,7 +14,7 @@ def import_lazily(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return the functions ``__getattr__`` and ``__dir__`` for module ``package``, which imports
-    names on first use. ``homes`` has, by name, the module in which the name is defined.
+    names on first use. ``homes`` has, by name, a module that has the name.
     ``__getattr__`` raises AttributeError for any other name."""
     module = sys.modules[package]
 

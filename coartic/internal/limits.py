@@ -51,7 +51,8 @@ def is_time(value: Any) -> bool:
 
 def plain_values(value: Any) -> Any:
     """Return a value with ``x.item()`` in place of each scalar x of NumPy, also in copies of lists,
-    tuples and dictionaries; a text in place of a time or a span of time."""
+    tuples and dictionaries (values, not keys; subclasses stay); a text in place of a time or a span
+    of time."""
     import numpy as np
 
     if type(value) in (list, tuple):
@@ -73,9 +74,10 @@ def real_array(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def real_numbers(value: Any) -> NDArray[np.float64]:
-    """Return real numbers as an array of float64 of their shape; NaN and infinity pass. An array of
-    float64 is returned itself, not a copy. Raises ValueError for anything else: text, complex
-    numbers, True and False, rows of unequal length, masked entries."""
+    """Return real numbers as an array of float64 of their shape; NaN and infinity pass. An
+    ``ndarray`` of float64 is returned itself, not a copy. Raises ValueError for anything else:
+    text, complex numbers, True and False, rows of unequal length, masked entries, integers beyond
+    float64."""
     import numpy as np  # which the command line's help does without
 
     if type(value) is np.ndarray and value.dtype == np.float64:
@@ -98,7 +100,7 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
 
 def _refuse_entries(value: Any) -> None:
     """Raise ValueError for an array with masked entries, and for a list or tuple that contains, at
-    any depth, such an array, True, False or an array of bools."""
+    any depth of lists and tuples, such an array, True, False or an array of bools."""
     import numpy as np
 
     if isinstance(value, list | tuple):

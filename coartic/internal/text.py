@@ -26,8 +26,8 @@ _MOST_FIGURES = 12  # of an array in a repr
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
     """Return text as one printable line (:func:`one_line`), without blanks at its ends; a line of
-    more than ``most`` characters is cut to that length and ends in ``…``. Only the first
-    4 ``most`` characters of the text count."""
+    more than ``most`` characters is cut to that length and ends in ``…``. Only 4 ``most``
+    characters, from the first that is no blank, count."""
     line = one_line(text.strip()[: 4 * most])  # an escape takes longer than what it shows
     return line if len(line) <= most else line[: most - 1] + "…"
 
@@ -135,8 +135,8 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """Return a sentence that no ``kind``, such as ``task``, is called ``name``, with the nearest of
-    ``names``, or, if no name is near, with all names, or the first 12 of more than 13; for a file
-    of another program return a sentence that coartic does not read it."""
+    ``names`` (:func:`did_you_mean`), or, if no name is near, with all names, or the first 12 of
+    more than 13; for a file of another program return a sentence that coartic does not read it."""
     if isinstance(name, str) and (words := foreign_file(name)):
         return f"{words}."
     several = list(names)

@@ -56,8 +56,8 @@ def threads_for(jobs: int) -> int:
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
     """Call ``work`` with consecutive slices that together cover the indices 0 to ``count`` - 1, in
     parallel: at least ``least`` indices each, unless one slice has all, and at most as many slices
-    as ``OMP_NUM_THREADS`` says, or, if it has no number, as the process may use cores. Returns when
-    all calls have ended; an error that ``work`` raises passes."""
+    as ``OMP_NUM_THREADS`` says (one for 0), or, if it has no number, as the process may use cores.
+    Returns when all calls have ended; an error that ``work`` raises passes."""
     if count < 2 * least:
         work(slice(0, count))
         return
@@ -90,7 +90,8 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     """Make this process a worker: the leader of a new group of processes (not on Windows), with the
     first ``streams`` of input, output and errors connected to the null device. When its parent by
-    ``multiprocessing`` has ended, a thread removes ``folder``, if given, and kills the group."""
+    ``multiprocessing`` has ended, a thread removes ``folder``, if given, and kills this process
+    with its group."""
 
     def end_with_parent() -> None:
         if (parent := multiprocessing.parent_process()) is not None:

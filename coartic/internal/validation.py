@@ -120,7 +120,7 @@ class FileData(BaseModel):
 def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:
     """Return lines ``source: sentence`` on the first 20 problems in ``error`` of file ``source``
     (:func:`_explain_first`), and, if there are more, a last line with the number of further
-    problems. ``keys`` are the keys that the file may have in any of its tables."""
+    problems. ``keys`` are keys that the file or its tables may have."""
     sentences, more = _explain_first(error.errors(include_url=False), list(keys))
     lines = [f"{plain(source)}: {sentence}" for sentence in sentences]
     if more:
@@ -130,7 +130,8 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
 
 def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
     """Return sentences on the first 20 problems of an object's arguments (:func:`_explain_first`),
-    joined by semicolons. ``keys`` are the names of the arguments of its class, in order."""
+    joined by semicolons. ``keys`` are the names of the arguments of its class, in order, or empty.
+    """
     return "; ".join(_explain_first(error.errors(include_url=False), keys)[0])
 
 
@@ -152,8 +153,8 @@ def explain_call(error: ValidationError, keys: Sequence[str], given: dict[int | 
 
 def _explain_first(details: list[ErrorDetails], keys: Sequence[str]) -> tuple[list[str], int]:
     """Return a list of sentences on the first 20 problems, each sentence once, and the number of
-    further problems; a list that is too short counts only alone. ``keys``: names of the keys that
-    a file has, or of arguments in order."""
+    further problems; of lists that are too short only the first counts, and only without other
+    problems. ``keys``: names of the keys that a file has, or of arguments in order."""
     # A list is counted too short without its bad entries.
     details = [d for d in details if d["type"] != "too_short"] or details[:1]
     sentences = (plain(_explain_problem(detail, keys)) for detail in details[:_SHOWN])
@@ -167,8 +168,8 @@ def sentence_error(text: str) -> PydanticCustomError:
 
 def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
     """Return a sentence about a problem. ``keys``: the known keys, in the order of arguments; the
-    sentence names the known key nearest to an unknown key, and calls argument k (from 0) without a
-    name ``keys[k]``."""
+    sentence names the known key nearest to an unknown key, if one is near, and calls argument k
+    (from 0) without a name ``keys[k]``."""
     key, message = "", detail["msg"]  # where it is: goals[1][0], robot.left_links
     for part in detail["loc"]:
         if not key and isinstance(part, int) and part < len(keys):

@@ -230,8 +230,8 @@ class Run:
         return [movement_data(each) for each in self.scores.get(part, Score()).movements]
 
     def to_row(self) -> dict[str, Any]:
-        """Return the columns of the run in table ``results`` by name, without ``cell`` and
-        ``environment``, the ids of rows of other tables."""
+        """Return the columns of the run in table ``results`` by name, without the ids of rows that
+        the store adds: ``id``, ``cell`` and ``environment``."""
         row = {name: attrgetter(source)(self) for name, _, source, _ in COLUMNS if source}
         details = json.dumps(self.outcome.details)
         used = ", ".join(self.outcome.used)
@@ -365,7 +365,8 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     """Return the error of a solution with more than 10,000 movements, :data:`_MOST_NUMBERS` numbers
-    or :data:`MOST_STEPS` steps between configurations; None for any other solution."""
+    or, if its configurations have one shape, :data:`MOST_STEPS` steps between them; None for any
+    other solution."""
     if len(solution) > _MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
     corners = [task.q0]

@@ -13,6 +13,7 @@ import itertools
 import json
 import os
 import pickle
+import re
 import sqlite3
 import time
 import warnings
@@ -220,9 +221,9 @@ class Store:
             self._db.execute("UPDATE suite SET plan_hash = ?", (self._plan_hash(),))
 
     def plan(self) -> list[Job]:
-        """Return the plan of the folder, a list of the jobs of the last suite; ``where`` of their
-        methods is empty. Raises CoarticError if no plan is stored yet, or if it is not as written.
-        """
+        """Return the plan of the folder, a list of the jobs of the last suite, without
+        ``question``; ``where`` of their methods is empty. Raises CoarticError if no plan is stored
+        yet, or if it is not as written."""
         with explain_errors(self.folder):
             suite = self._suite()
             if suite["plan_hash"] != self._plan_hash():
@@ -520,8 +521,8 @@ class Store:
         return self._insert("cells", _cell_row(cell)), cell.method.code
 
     def _insert(self, table: str, row: Mapping[str, Any]) -> int:
-        """Insert a row, values by column, into a table; return the id of the row. Lists, tuples
-        and dictionaries become JSON."""
+        """Insert a row, values by column, into a table; return the id of the row, if the table
+        has ids. Lists, tuples and dictionaries become JSON."""
         names = ", ".join(f'"{name}"' for name in row)
         marks = ", ".join("?" for _ in row)
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
@@ -606,8 +607,8 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
     """Open a results folder for reading in the block of this context. Raises CoarticError if the
-    folder has no results, or results in another format, and while a ``coartic run`` writes into
-    it."""
+    folder has no results, or results in another format, and while a ``coartic run`` writes into it
+    (:func:`lock`)."""
     path = folder / RUNS_FILE
     with explain_errors(folder):
         try:
@@ -634,7 +635,8 @@ def open_store(folder: Path) -> Iterator[Store]:
 
 @contextmanager
 def open_content(content: bytes, name: str) -> Iterator[Store]:
-    """Open the content of a ``runs.sqlite`` in memory for reading; messages call it ``name``."""
+    """Open the content of a ``runs.sqlite`` in memory for reading; ``name`` stands for its folder
+    in messages."""
     with closing(_connect(":memory:", WAIT_S)) as connection:
         connection.deserialize(content)
         yield Store(Path(name), connection)
@@ -673,8 +675,8 @@ def writing(folder: Path) -> Iterator[Store]:
 def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
     """Lock a folder for this process in the block of this context, or, with ``shared``, share the
     lock with other readers; do nothing where the folder cannot be opened, or the system or the disk
-    has no such locks. Raises CoarticError, which names ``command``, while the lock is held
-    elsewhere."""
+    has no such locks. Raises CoarticError, which names ``command``, if the lock is held elsewhere,
+    and without ``shared`` stays so for 1 s."""
     try:
         import fcntl
 
@@ -729,9 +731,9 @@ def _check_files(folder: Path) -> None:
 
 
 def _has_tables(connection: sqlite3.Connection) -> bool:
-    """Return True if the file is marked as coartic's in this format, and False if the file has no
-    tables. Additions of other programs pass, except triggers. Raises CoarticError for any other
-    file, and ValueError for a row that names a missing row."""
+    """Return True if the file is marked as coartic's in this format, and False if the file has
+    neither this mark nor tables. Additions of other programs pass, except triggers. Raises
+    CoarticError for any other file, and ValueError for a row that names a missing row."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     there = {kind for (kind,) in connection.execute("SELECT type FROM sqlite_master")}
@@ -770,9 +772,9 @@ _UNREADABLE = (
 def explain_errors(folder: Path) -> Iterator[None]:
     """Turn an error of the block of this context into a CoarticError that names the file: of the
     system (the file that it names, else ``runs.sqlite`` in ``folder``), of SQLite, a CoarticError
-    (kept, as one line, if it names the folder), and any ValueError, LookupError, TypeError,
-    OverflowError, RecursionError or error of zlib, which are taken for content that coartic does
-    not write. Other errors pass."""
+    (kept, as one line, if it names the file or the folder), and any ValueError, LookupError,
+    TypeError, OverflowError, RecursionError or error of zlib, which are taken for content that
+    coartic does not write. Other errors pass."""
     try:
         yield
     except (CoarticError, *_UNREADABLE) as error:
@@ -806,7 +808,8 @@ def _explain(path: Path, error: Exception) -> str:
     said = plain(str(error), 200) or type(error).__name__
     if isinstance(error, CoarticError):
         said = one_line(str(error))
-        if str(path.parent) in said:
+        named = "|".join(re.escape(str(each)) for each in (path, path.parent))
+        if re.search(rf"(?<!\S)({named})(?!\w)", said):  # no point in "3.0.0" is folder "."
             return said
     elif isinstance(error, OSError):
         path, said = Path(error.filename or path), error.strerror or said
