@@ -86,8 +86,9 @@ def read_hits(
         The file (UTF-8), with columns ``subject``, ``trial`` and ``goal`` (both from 1), ``hand``
         (left or right), ``ticks`` or ``duration``, and one for each entry of
         ``task.robot.joint_names`` (length unit and rad). ``ticks`` and ``duration`` count from the
-        hit before, or the start. Rows of trials and goals may be missing, and so may columns of an arm that is
-        not among ``task.hands`` and of a locked base: their values are then those at the start.
+        hit before, or the start. Rows of trials and goals may be missing, and so may columns of an
+        arm that is not among ``task.hands`` and of a locked base: their values are then those at
+        the start.
     task : Task
         The task that was practised.
     ticks_per_unit : float, optional

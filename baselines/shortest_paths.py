@@ -84,9 +84,9 @@ def fewest_ticks(
     and execute the roundings; return, of the roundings that hit every goal when executed, the one
     with the fewest ticks, then the fewest corrections. Left out are roundings beyond the nearest 64
     of a plan (:meth:`.Rounding.every`), and, before they are solved or executed, roundings that
-    promise no fewer ticks than the best so far (:meth:`.Rounding.least`). The session counts solves
-    and forward kinematics, not iterations and Jacobians of corrections. Raises MethodError if no
-    rounding is solved and hits every goal."""
+    promise no fewer ticks than the best so far (:meth:`.Rounding.least`). The session counts the
+    solver's effort and forward kinematics, not iterations and Jacobians of corrections. Raises
+    MethodError if no rounding is solved and hits every goal."""
     fewest: PlanInTicks | None = None
     least: tuple[float, float] = math.inf, math.inf
 
