@@ -52,8 +52,8 @@ def checked(
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
     """Return a copy of a user's frame with these columns alone: ``numbers`` as float64 with NaN for
-    missing numbers, ``names`` and ``others`` as they are. With ``reward``, a column ``status`` is
-    kept and has to agree: all runs with a reward, and no others, are ``ok``.
+    missing numbers, ``names`` and ``others`` as they are. With number ``reward``, a column
+    ``status`` is kept and has to agree: all runs with a reward, and no others, are ``ok``.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
     that is no frame, such a column that is missing or there twice, no rows, a value of ``names``

@@ -186,9 +186,9 @@ class PosturePlanner:
     def retrieve(self, goals: range) -> Layers:
         """Return, by goal (from 0) and hand, postures ``(n, dof)`` with the hand at the goal. Each
         has the angles of the hand's arm from a posture of the planner's ``store``, and all else
-        from the planner's ``q``, where the robot stands. Each free base coordinate is moved by the
-        way from hand to goal; then base and arm are corrected (:meth:`correct`). Postures that are
-        not at the goal then are left out."""
+        from the planner's ``q``, where the robot is to stand. Each free base coordinate is moved by
+        the way from hand to goal; then base and arm are corrected (:meth:`correct`). Postures that
+        are not at the goal then are left out."""
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
             postures = np.tile(self.q, (len(self.store), 1))

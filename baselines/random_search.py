@@ -166,11 +166,11 @@ class RandomSearch(RandomSearchHands):
     Parameters = RandomSearchParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials of the corrective process alone with parameter ``hands`` or by default with
-        each sequence, then trials with noise with the best of them until none is left
-        (:func:`draw_trials`); return the movements of the best trial. Raises MethodError if there
-        is no trial to make, or if the corrective process alone completes no sequence tried;
-        ValueError for ``hands`` that do not fit the task."""
+        """Make a trial of the corrective process alone with parameter ``hands``, or by default with
+        each of the sequences that :func:`draw_trials` names, then trials with noise with the best
+        of them until none is left; return the movements of the best trial. Raises MethodError if
+        there is no trial to make, or if that process completes no sequence tried; ValueError for
+        ``hands`` that do not fit the task."""
         parameters: RandomSearchParameters = self.parameters
         with session.solving():
             best, evaluations = draw_trials(session, parameters.hands, parameters)

@@ -83,10 +83,10 @@ def fewest_ticks(
     """Round plans of a task to whole ticks, with and without goals that are hit without a movement,
     and execute the roundings; return, of the roundings that hit every goal when executed, the one
     with the fewest ticks, then the fewest corrections. Left out are roundings beyond the nearest 64
-    of a plan (:meth:`.Rounding.every`), and, before they are solved or executed, roundings that
-    promise no fewer ticks than the best so far (:meth:`.Rounding.least`). The session counts the
-    solver's effort and forward kinematics, not iterations and Jacobians of corrections. Raises
-    MethodError if no rounding is solved and hits every goal."""
+    of a plan (:meth:`.Rounding.every`), and roundings that, before or after they are solved,
+    promise no fewer ticks than the best so far. The session counts the solver's effort and forward
+    kinematics, not iterations and Jacobians of corrections. Raises MethodError if no rounding is
+    solved and hits every goal."""
     fewest: PlanInTicks | None = None
     least: tuple[float, float] = math.inf, math.inf
 
