@@ -53,10 +53,11 @@ def hits_from_markers(
     radius, or after such a place on the straight line between samples, in the order of the goals;
     its time and posture are interpolated to where the tip enters the goal. Gaps of up to 50 ms
     (empty, NaN, or, far from the origin, both coordinates 0) are bridged by a straight line, with a
-    warning. An arm of the task without markers keeps its start, with a warning. Warns, too, of
-    samples that repeat, places that are rounded, frames that seem lost, links whose length follows
-    a joint, an arm that starts later than the other in all trials, trials that begin away from the
-    task's start, rests on the way, and hits of two goals in successive samples.
+    warning unless after the last hit. An arm of the task without markers keeps its start, with a
+    warning. Warns, too, of samples that repeat, places that are rounded, frames that seem lost,
+    links whose length follows a joint, an arm that starts later than the other in all trials,
+    trials that begin away from the task's start, rests on the way, and hits of two goals in
+    successive samples.
 
     Parameters
     ----------
