@@ -52,11 +52,11 @@ def checked(
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
     """Return a copy of a user's frame with these columns alone: ``numbers`` as float64 with NaN for
-    missing numbers, ``names`` and ``others`` as they are. With ``reward``, a column ``status`` is
-    kept and has to agree: all runs with a reward, and no others, are ``ok``.
+    missing numbers, ``names`` and ``others`` as they are. With number ``reward``, a column
+    ``status`` is kept and has to agree: all runs with a reward, and no others, are ``ok``.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
-    that is no frame, a missing column, a column that is there twice, no rows, a value of ``names``
+    that is no frame, such a column that is missing or there twice, no rows, a value of ``names``
     that is missing, a value of ``names`` or ``others`` without a hash, such as a list, and for
     ``numbers`` that are no numbers, or neither 0 nor from 1e-100 to 1e100 in size.
     """
@@ -110,7 +110,8 @@ def inline(name: object) -> str:
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
     """Return a list of the names of columns in ``names``, an argument called ``what``; a text is
-    one name. Raises CoarticError for an argument that is no list of names."""
+    one name. Raises CoarticError for an argument that is not iterable, or has values without a
+    hash."""
     if isinstance(names, str):
         return [names]
     if not isinstance(names, Iterable) or not all(map(is_hashable, listed := list(names))):
@@ -158,7 +159,7 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """Return a user's frame of methods on tasks, checked, with the ``gap`` of each row, and its
     ``share`` where the frame has ``corrective_best``.
 
-    ``method`` includes the setting if a method of the frame has several settings; ``task`` is the
+    ``method`` includes the setting if the method has several settings in the frame; ``task`` is the
     number of the task, from 0, in the order of names; ``key`` is the same number in all rows of a
     run (:data:`_SOURCES`). ``more``: names of other columns of numbers to keep. Raises CoarticError
     as :func:`checked` and :func:`_with_gaps` do, and for a task with several ``best_known`` or

@@ -64,10 +64,10 @@ def read_hits(
     """Read recorded trials: a CSV file with a row for each hit.
 
     Blank lines, lines that begin with ``#``, commas at the end of a line, and other columns do not
-    count; columns of an arm or a joint that the task does not use are left out, with a warning if
-    they are not as at the start. Angles are unwrapped from hit to hit, from the start of the task
-    on, with a warning if one jumps by more than half a turn (π). Warns, too, of signs that an arm
-    of the task is slower or much faster, trials are cut in two, trials or their times are there
+    count; columns of an arm or a joint that the task does not use are left out, with a warning
+    unless they are as at the start. Angles are unwrapped from hit to hit, from the start of the
+    task on, with a warning if one jumps by more than half a turn (π). Warns, too, of signs that an
+    arm of the task is slower or much faster, trials are cut in two, trials or their times are there
     twice, a name is spelt in two ways, rows are in no order of goals, values are rounded, repeat or
     never vary, times do not follow paths, or are of reactions or of a clock that runs on in some
     trials, and hits contradict the place or the radius of goals, or do so in some trials, as if a
@@ -77,8 +77,8 @@ def read_hits(
     radii from its goal (up to ten, if motor noise puts a quarter of the hits outside of goals),
     whose locked base is moved as far, whose arm has an angle beyond ±20 rad, one number in place of
     all its angles once it has moved, or, in three hits or more, exact means of the hits around it,
-    or whose time is over 20 times the longest subtask of the corrective process, or clearly too
-    short for a straight movement.
+    or whose time is over 20 times the longest subtask of the corrective process, if that completes
+    the task, or clearly too short for a straight movement.
 
     Parameters
     ----------
@@ -86,8 +86,9 @@ def read_hits(
         The file (UTF-8), with columns ``subject``, ``trial`` and ``goal`` (both from 1), ``hand``
         (left or right), ``ticks`` or ``duration``, and one for each entry of
         ``task.robot.joint_names`` (length unit and rad). ``ticks`` and ``duration`` count from the
-        hit before. Rows of trials and goals may be missing, and so may columns of an arm that is
-        not among ``task.hands`` and of a locked base: their values are then those at the start.
+        hit before, or the start. Rows of trials and goals may be missing, and so may columns of an
+        arm that is not among ``task.hands`` and of a locked base: their values are then those at
+        the start.
     task : Task
         The task that was practised.
     ticks_per_unit : float, optional
@@ -125,8 +126,9 @@ def read_hits(
 
 def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
     """Return a CSV file as a frame of texts and numbers, and a name, such as ``line 2``, for each
-    row. Raises CoarticError for a file that cannot be read, is no table of text separated by
-    commas, or repeats a heading; ``kind``, such as ``recorded hits are``, is for a message."""
+    row. Raises CoarticError for a file that cannot be read, is not in UTF-8, has rows that do not
+    fit its headings, or repeats one or all of these; ``kind``, such as ``recorded hits are``, is
+    for a message."""
     if words := foreign_file(str(path), f"{kind} a CSV file, see docs/howto/people.md"):
         raise CoarticError(words)
     try:
@@ -179,7 +181,8 @@ def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
 def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
     """Return frame and names of rows as :func:`read_table` does, line by line. Raises CoarticError
     for another separator, a row with another number of values than the headings, an open quote, and
-    a repeated heading. Warns of rows that are left out because they begin with #."""
+    a repeated heading. Warns of rows with as many values as headings that are left out because they
+    begin with #."""
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     headings: list[str] = []
     rows, lines, wrong, hidden = [], [], [], []
@@ -274,8 +277,8 @@ def as_names(values: pd.Series) -> pd.Series:
 
 
 def as_numbers(values: pd.Series) -> NDArray[np.float64]:
-    """Return numbers, shape ``(n,)``, also of texts with typographic minus signs; NaN for a value
-    that is no real number. Infinity is a number, True and False are not."""
+    """Return values as numbers, shape ``(n,)``, also texts with typographic minus signs; NaN for a
+    value that pandas reads as no real number. Infinity is a number, True and False are not."""
     values = values.astype(object) if isinstance(values.dtype, pd.CategoricalDtype) else values
     if infer_dtype(values, skipna=True) in ("boolean", "complex", "mixed", "mixed-integer"):
         values = values.astype(object).where(
@@ -493,9 +496,9 @@ def _implausible(
     frame: pd.DataFrame, task: Task, source: str, unit: float, slowest: float
 ) -> NDArray[np.object_]:
     """Return why sorted hits of a subject are implausible, a text for each, empty for a plausible
-    hit; warn of odd places, and check times (:func:`_odd_times`). ``source`` begins messages;
-    ``unit``: ticks in a unit of the recording; ``slowest``: ticks of the longest subtask of the
-    corrective process."""
+    hit; warn of odd places, and, unless places make most hits implausible, check times
+    (:func:`_odd_times`). ``source`` begins messages; ``unit``: ticks in a unit of the recording;
+    ``slowest``: ticks of the longest subtask of the corrective process."""
     q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
     goal, ticks = frame.goal.to_numpy(np.int64), frame.ticks.to_numpy(np.float64)
     why = np.full(len(frame), "", dtype=object)
@@ -667,9 +670,10 @@ def _clocks(hits: pd.DataFrame, paces: pd.Series, rises: Array, source: str) -> 
 
 
 def _changed(odd: NDArray[np.bool_], trial: Array) -> tuple[NDArray[np.bool_], str]:
-    """Return a mask of hits ``(n,)`` in a row, or of all before and after them, that are odd more
-    often than others, and their trials in words. It has no hit if n is below 20, or if the range of
-    the sum of deviations from the mean (Kuiper's statistic) is, as by chance, at most 2.6 √n SD."""
+    """Return a mask of hits in a row, or of all before and after them, that are True in ``odd``,
+    ``(n,)``, more often than others, and their trials in words; ``trial``, ``(n,)``, has numbers of
+    trials. The mask has no hit if n is below 20, or if the range of the sum of deviations from the
+    mean (Kuiper's statistic) is, as by chance, at most 2.6 √n SD."""
     part, number = np.zeros(len(odd), dtype=bool), np.arange(len(odd))
     sums = np.cumsum(odd) - (number + 1) * (odd.sum() / max(len(odd), 1))
     if len(odd) >= MANY and np.ptp(sums) > 2.6 * np.sqrt(len(odd)) * odd.std():
@@ -768,8 +772,8 @@ def _repeats(values: Array, edge: float) -> NDArray[np.bool_]:
 
 def _between(arm: Array, goal: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Return a mask of the hits of a subject in which all angles of an arm of two joints or more,
-    ``(n, joints)``, are means of the hits before and after it, or of those at its ``goal``,
-    ``(n,)``, more often than by chance."""
+    ``(n, joints)``, are means of the hits before and after, between which it moves, or of the hits
+    before and after at the same ``goal``, ``(n,)``, more often than by chance."""
     q, found = arm.round(9), np.zeros(len(arm), dtype=bool)
     steps = np.array([np.diff(np.unique(angles)).min(initial=1.0) for angles in q.T])
     for order in (np.arange(len(q)), np.argsort(goal, kind="stable")):
@@ -816,9 +820,9 @@ def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
 
 
 def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> None:
-    """Warn, once, if an angle of an arm is rounded or the same in all hits, or if many hits of a
-    goal have a posture or an angle in common. ``hits`` are the hits of a subject with this arm,
-    ``joints`` the columns of its angles; ``source`` begins the warning."""
+    """Warn, at most once, of signs that an angle of an arm is rounded or not measured, or that the
+    posture or an angle of many hits of a goal is filled in. ``hits`` are the hits of a subject with
+    this arm, ``joints`` the columns of its angles; ``source`` begins the warning."""
     postures = len(hits[joints].drop_duplicates())
     for name in joints:
         angles = np.unique(hits[name])
@@ -846,8 +850,8 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
 
 def _cut_trials(frame: pd.DataFrame, goals: int) -> list[str]:
     """Return a sentence for each subject with two or more trials that are cut in two: the next
-    trial has the goals left, of ``goals`` in all. Half of the trials that lack hits have to be such
-    halves."""
+    trial has the goals left, of ``goals`` in all. At least half of the trials that lack hits have
+    to be such halves."""
     sentences = []
     for subject, of_subject in frame.groupby("subject", sort=False):
         trials = of_subject.groupby("trial", as_index=False).goal.agg(["min", "max", "count"])

@@ -53,10 +53,11 @@ def hits_from_markers(
     radius, or after such a place on the straight line between samples, in the order of the goals;
     its time and posture are interpolated to where the tip enters the goal. Gaps of up to 50 ms
     (empty, NaN, or, far from the origin, both coordinates 0) are bridged by a straight line, with a
-    warning. An arm of the task without markers keeps its start, with a warning. Warns, too, of
-    samples that repeat, places that are rounded, frames that seem lost, links whose length follows
-    a joint, an arm that starts later than the other in all trials, trials that begin away from the
-    task's start, rests on the way, and hits of two goals in successive samples.
+    warning unless after the last hit. An arm of the task without markers keeps its start, with a
+    warning. Warns, too, of samples that repeat, places that are rounded, frames that seem lost,
+    links whose length follows a joint, an arm that starts later than the other in all trials,
+    trials that begin away from the task's start, rests on the way, and hits of two goals in
+    successive samples.
 
     Parameters
     ----------
@@ -79,14 +80,14 @@ def hits_from_markers(
     DataFrame
         A row for each hit, with the columns of :func:`.read_hits`. Trials in which a goal is never
         reached have no hits, with a warning; ``attrs["unfinished"]``, which :func:`pandas.concat`
-        loses, is the number of such trials.
+        may lose, is the number of such trials.
 
     Raises
     ------
     CoarticError
         The recording is no such table, of several people, or not of 25 to 2000 samples in a second;
         the median length of a link in a trial differs from the task's by more than 10 %; trials of
-        20 samples or more differ in the time between samples by more than 10 %, or, without a tenth
+        over 20 samples differ in the time between samples by more than 10 %, or, without a tenth
         at either end, in a locked base by more than two radii; a finished trial begins far from the
         task's start or with a rest, or has a second start; most trials are unfinished; before the
         last goal is hit, a marker has a longer gap or jumps, a link's length jumps by more than 10
@@ -152,7 +153,7 @@ def hits_from_markers(
         return pd.DataFrame(values).groupby(number).median().to_numpy()
 
     def agree(name: str, each: Array, share: float, most: float, doubt: float, words: str) -> None:
-        """Refuse a quantity, ``each`` by trial, that differs between trials of 20 samples or more
+        """Refuse a quantity, ``each`` by trial, that differs between trials of over 20 samples
         by over ``most``, and warn if by over ``doubt``; a share ``share`` at either end does not
         count."""
         long = np.flatnonzero(many & np.isfinite(each))
@@ -512,8 +513,8 @@ def _finished_by(trials: Sequence[Array], task: Task) -> str:
 
 def _bridge(place: Array, time: Array, parts: Sequence[slice], step: float) -> Array:
     """Fill the gaps (NaN) of a marker, ``(n, 2)``, in place by straight lines in time, trial by
-    trial (at ends by the nearest place). Return, at the first sample of each gap, its duration in
-    s, and 0 elsewhere; ``step``: time between samples, s."""
+    trial (at ends by the nearest place; not in trials without a place). Return, at the first sample
+    of each gap, its duration in s, and 0 elsewhere; ``step``: time between samples, s."""
     gap, durations = np.isnan(place[:, 0]), np.zeros(len(place))
     for part in parts if gap.any() else ():
         if not gap[part].any():

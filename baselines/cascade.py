@@ -51,9 +51,9 @@ class Solution(NamedTuple):
 
 
 def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
-    """Find changes x of the joints with A x >= b as nearly as they can be, at most 2 in absolute
-    value (level 1), then the x nearest to z among these (level 2); return both, with the
-    iterations.
+    """Find changes x of the joints with A x >= b as nearly as damping allows, at most 2 in absolute
+    value (level 1), then the x nearest to z that is as good for level 1, to 1e-6 (level 2); return
+    both, with the iterations.
 
     ``rows`` is A, shape ``(m, joints)``, length unit per unit of change; ``least`` is b, shape
     ``(m,)``, length unit; ``preferred`` is z, shape ``(joints,)``. Raises MethodError if the solver

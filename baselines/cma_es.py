@@ -107,8 +107,8 @@ class CMAES(Method):
     Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
-        """Make a trial by the corrective process with each hand sequence (of more than 4096 only
-        with the initial one), then, if one succeeds, generations of trials until none is left;
+        """Make a trial by the corrective process with each hand sequence while trials are left (of
+        more than 4096 only with the initial one), then, if one succeeds, generations of trials;
         return the movements of the best trial. Raises MethodError if no trial hit every goal."""
         attempts = Attempts(session, self.parameters.trials)
         with session.solving():

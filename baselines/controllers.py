@@ -144,10 +144,10 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Return the changes x of the joints with A x >= b (``rows`` A, ``(m, joints)``; ``least``
-        b, ``(m,)``) as nearly as they can be and, of these, nearest to ``preferred``
-        (:func:`solve_cascade`); count two programmes in ``solves``, and the iterations in the
-        session. Raises MethodError if the solver fails."""
+        """Return the solution of the cascade (:func:`solve_cascade`) for A x >= b (``rows`` A,
+        ``(m, joints)``; ``least`` b, ``(m,)``) and the changes ``preferred``, ``(joints,)``; count
+        two programmes in ``solves``, and the iterations in the session. Raises MethodError if the
+        solver fails."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)
@@ -161,8 +161,9 @@ class Controller(ABC):
         )
 
     def add(self, q: Array, change: Array) -> Array:
-        """Return a copy of configuration ``q`` with ``change``, shape ``(joints,)``, length unit
-        and rad, added to the joints that are not locked."""
+        """Return a copy of configuration ``q``, ``(dof,)``, with ``change`` added to its entries
+        that are not locked; ``change`` has a number for each of these alone, shape ``(joints,)``,
+        length unit and rad."""
         result = q.copy()
         result[self.moving] += change
         return result
@@ -197,8 +198,8 @@ class Control(Method):
 
     def solve(self, session: Session) -> Result:
         """Simulate the control of all hand sequences as far as they can be best; return the paths,
-        a movement for each goal, of the sequence with the fewest ticks. Raises MethodError if the
-        hand gets stuck in all sequences, or the solver fails."""
+        a movement for each goal, of the sequence that hits every goal in the fewest ticks. Raises
+        MethodError if the hand gets stuck in all sequences, or the solver fails."""
         task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = self.controller(session, task, self.parameters.period)
         ordered = [hand for hand in HANDS if hand in task.hands]

@@ -43,9 +43,10 @@ class HandController(Controller):
         self, q: Array, aims: tuple[Aim, ...], memory: Array, first: bool
     ) -> tuple[Solution, Array, Array]:
         """Return three things for a control step from configuration ``q``: the solution, which
-        moves the hand of the first aim straight towards its goal, with joint changes as near to the
-        preferred ones as that allows; the preferred changes, ``(joints,)``, in lengths of a control
-        step; and ``memory``, unchanged. ``first`` is not used."""
+        moves the hand of the first aim straight towards its goal, to first order and if the joints
+        can, with changes as near to the preferred ones as that allows; the preferred changes,
+        ``(joints,)``, in lengths of a control step; and ``memory`` itself. ``first`` is not used.
+        """
         jacobian = self.session.jacobian(q, aims[0].hand)[:, self.moving]
         error = self.error(q, aims[0])
         direction = error / np.linalg.norm(error)

@@ -60,9 +60,9 @@ class OptimumSearch(Method):
     quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
 
     def solve(self, session: Session) -> Result:
-        """Search for the shortest path over hand sequences (at most 64 a graph), round it to whole
-        ticks, and return the movements with the fewest ticks found. Raises MethodError if none are
-        found, and if locks of the base make the task invalid."""
+        """Search for the shortest path over hand sequences (at most 64 a graph), round plans to
+        whole ticks, and return the movements with the fewest ticks found. Raises MethodError if
+        none are found, and if locks of the base make the task invalid."""
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
         task = with_locks(session.reveal(*self.information), parameters.base)

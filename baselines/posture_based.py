@@ -86,7 +86,7 @@ class PostureBased(Method):
 
     def solve(self, session: Session) -> Result:
         """Plan a movement for each goal, from where the movement before it is expected to end;
-        return the movements. Raises MethodError for a goal that no corrected posture hits."""
+        return the movements. Raises MethodError if correction brings no posture to a goal."""
         with session.building():
             planner = PosturePlanner(session, self.parameters, self.horizon)
         with session.solving():
@@ -147,8 +147,8 @@ class PosturePlanner:
 
     def plan(self) -> tuple[tuple[Movement, ...], list[int]]:
         """Return the movement to each goal, and the ticks that each movement is expected to take.
-        To be called once: ``q`` and ``store`` of the planner change. Raises MethodError for a goal
-        that no corrected posture hits."""
+        To be called once: ``q`` and ``store`` of the planner change. Raises MethodError if
+        correction brings no posture to a goal (:meth:`retrieve`)."""
         movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
             ahead = range(goal, min(goal + self.horizon, len(self.goals)))
@@ -184,10 +184,11 @@ class PosturePlanner:
         return tuple(movements), ticks
 
     def retrieve(self, goals: range) -> Layers:
-        """Return, by goal (from 0) and hand, postures ``(n, dof)`` with the hand at the goal: the
-        hand's arm has stored joint angles, the other arm its angles in ``q``, and the base carries
-        the hand to the goal if it can move; then base and hand's arm are corrected. Postures that
-        correction does not bring there are left out."""
+        """Return, by goal (from 0) and hand, postures ``(n, dof)`` with the hand at the goal. Each
+        has the angles of the hand's arm from a posture of the planner's ``store``, and all else
+        from the planner's ``q``, where the robot is to stand. Each free base coordinate is moved by
+        the way from hand to goal; then base and arm are corrected (:meth:`correct`). Postures that
+        are not at the goal then are left out."""
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
             postures = np.tile(self.q, (len(self.store), 1))
@@ -199,10 +200,10 @@ class PosturePlanner:
         return retrieved
 
     def most_promising(self, hands: HandSequence, layers: list[Array]) -> Array:
-        """Return the sequence of postures with the shortest joint-space path from ``q``, one out of
-        each of ``layers``, the retrieved postures ``(n, dof)`` for one goal or for two goals in
-        turn, hit by ``hands``; shape ``(goals, dof)``. From the first to the second only the base
-        and the arm of the second hand move."""
+        """Return the sequence of postures with the shortest joint-space path from the planner's
+        ``q``, one out of each of ``layers``, the retrieved postures ``(n, dof)`` for one goal or
+        for two goals in turn, hit by ``hands``; shape ``(goals, dof)``. From the first to the
+        second only base and arm of the second hand move: the other arm stays as in the first."""
         first = layers[0]
         cost = np.linalg.norm(first - self.q, axis=1)
         if len(layers) == 1:
@@ -222,8 +223,8 @@ class PosturePlanner:
     ) -> list[tuple[float, HandSequence, Array]]:
         """Return for each hand sequence the cheapest postures ``(goals, dof)`` found around its
         ``promising`` postures, these included, as a triple: their cost (joint-space length of the
-        path from ``q``), the hands, the postures. ``noises`` are standard normal, shape ``(hand
-        sequences, rounds, PER_ROUND, goals, dof)``; ``goals`` are from 0."""
+        path from the planner's ``q``), the hands, the postures. ``noises`` are standard normal,
+        shape ``(hand sequences, rounds, PER_ROUND, goals, dof)``; ``goals`` are from 0."""
         sequences = [*promising]
         centre = best = np.stack([*promising.values()])
         costs = _path_length(self.q, best)
@@ -255,9 +256,9 @@ class PosturePlanner:
         return list(zip(costs.tolist(), sequences, best, strict=True))
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
-        """Bring a hand of contiguous postures ``(..., dof)``, in place, to a goal (from 0), in at
-        most ``steps`` steps each; return True where the hand is then within ``tolerance`` of the
-        goal's centre, shape ``(...)``. The session counts the evaluations."""
+        """Bring a hand of contiguous postures ``(..., dof)``, in place, towards a goal (from 0), in
+        at most ``steps`` steps each; return True where the hand is then within the planner's
+        ``tolerance`` of the goal's centre, shape ``(...)``. The session counts the evaluations."""
         flat = postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)
         far = np.arange(len(flat))

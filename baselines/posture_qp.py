@@ -78,8 +78,8 @@ class PostureController(Controller):
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
         """Return a posture ``(dof,)``, sought to hit the goal, for each of ``aims`` (hand and
-        goal), by aim, for the movement from configuration ``q``; postures in ``memory`` are taken
-        over, and moved on if there are several aims (:meth:`find_postures`)."""
+        goal), by aim, for the movement from configuration ``q``; a posture that ``memory`` has for
+        an aim is taken over, and moved on if there are several aims (:meth:`find_postures`)."""
         return dict(zip(aims, self.find_postures(q, aims, memory or {}), strict=True))
 
     def step(
@@ -123,7 +123,7 @@ class PostureController(Controller):
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
         """Replace each of ``postures``, one for each aim (hand and goal), in place, by a posture a
-        step nearer to where the path from ``q`` through all is shortest; return the largest length
+        step towards where the path from ``q`` through all is shortest; return the largest length
         of these steps before they were limited (:meth:`step_nearer`). Preferred is the mean of the
         postures before and after, weighted by inverse distances (Weiszfeld 1937), for the last the
         posture before."""
@@ -141,10 +141,10 @@ class PostureController(Controller):
         return largest
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
-        """Make a Gauss-Newton step from a posture towards the posture that hits the goal of an aim
-        (hand and goal) and is then nearest to a preferred posture. Return a copy, the posture after
-        the step, and the length of the step before it was limited to 0.1, length unit and rad
-        mixed."""
+        """Make a Gauss-Newton step, and bend the arm where that brings the hand hardly nearer, from
+        a posture towards the posture that hits the goal of an aim (hand and goal) and is then
+        nearest to a preferred posture. Return a copy, the posture after the step, and the length of
+        the step before it was limited to 0.1, length unit and rad mixed."""
         rows, outside = self.faces(posture, aim)
         wanted = _POSTURE_GAIN * (preferred - posture)[self.moving]
         change = self.solve(rows, outside, wanted).changes

@@ -138,9 +138,10 @@ class RandomSearchHands(Method):
         return runs_at_once(self.parameters.trials)
 
     def solve(self, session: Session) -> Result:
-        """Make equal shares of the trials with one hand sequence after the other; return the
-        movements of the best trial. Raises MethodError if the corrective process completes no hand
-        sequence that has a trial."""
+        """Give one hand sequence after the other an equal share of the trials, to a trial, of which
+        only the first is made if the corrective process fails there; return the movements of the
+        best trial. Raises MethodError if that process completes no hand sequence that has a trial.
+        """
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
@@ -165,11 +166,11 @@ class RandomSearch(RandomSearchHands):
     Parameters = RandomSearchParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials with one hand sequence, parameter ``hands`` or by default the sequence with
-        which the corrective process alone does best, until none is left; return the movements of
-        the best trial. Raises MethodError if there is no trial to make, or if the corrective
-        process alone misses a goal with this sequence, or by default with every sequence tried;
-        ValueError for ``hands`` that do not fit the task."""
+        """Make a trial of the corrective process alone with parameter ``hands``, or by default with
+        each of the sequences that :func:`draw_trials` names, then trials with noise with the best
+        of them until none is left; return the movements of the best trial. Raises MethodError if
+        there is no trial to make, or if that process completes no sequence tried; ValueError for
+        ``hands`` that do not fit the task."""
         parameters: RandomSearchParameters = self.parameters
         with session.solving():
             best, evaluations = draw_trials(session, parameters.hands, parameters)

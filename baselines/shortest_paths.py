@@ -80,11 +80,13 @@ def shortest_plans(
 def fewest_ticks(
     session: Session, task: Task, problem: TrajectoryProblem, plans: ShortestPlans
 ) -> PlanInTicks:
-    """Round plans of a task to whole ticks, as far as they may be best (of a plan at most the
-    nearest 64 roundings, :meth:`.Rounding.every`), with and without goals that are hit without a
-    movement; return, of the roundings executed, the one with the fewest ticks, then the fewest
-    corrections. The session counts the effort. Raises MethodError if no rounding is solved and hits
-    every goal."""
+    """Round plans of a task to whole ticks, with and without goals that are hit without a movement,
+    and execute the roundings; return, of the roundings that hit every goal when executed, the one
+    with the fewest ticks, then the fewest corrections. Left out are roundings beyond the nearest 64
+    of a plan (:meth:`.Rounding.every`), and roundings that, before or after they are solved,
+    promise no fewer ticks than the best so far. The session counts the solver's effort and forward
+    kinematics, not iterations and Jacobians of corrections. Raises MethodError if no rounding is
+    solved and hits every goal."""
     fewest: PlanInTicks | None = None
     least: tuple[float, float] = math.inf, math.inf
 

@@ -110,7 +110,8 @@ class TrajectoryOptimisation(Method):
 
     def solve(self, session: Session) -> Result:
         """Plan for each hand sequence of :meth:`starts`, and return the movements of the plan with
-        the least cost by the method's own cost. Raises MethodError if no plan is found."""
+        the least cost by the method's own cost, for path length after solving it again in whole
+        ticks or, failing that, inside the discs. Raises MethodError if the solver finds no plan."""
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
@@ -163,10 +164,10 @@ class TrajectoryOptimisation(Method):
         return Result(solution, details)
 
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
-        """Return a list of starts, each ``(G, dof)``, for each hand sequence planned: the cheapest
-        chain (a posture for each goal) of each random graph; with two hands, except for jerk of the
-        hand, each chain also with the idle arm moving in equal steps; and copies of the first start
-        with noise. Raises MethodError if a goal has no posture."""
+        """Return, by hand sequence planned, a list of starts, each ``(G, dof)``: the cheapest chain
+        (a posture for each goal) of each random graph that has one; with two hands, except for jerk
+        of the hand, each chain also with the idle arm moving in equal steps; and copies of the
+        first start with noise. Raises MethodError if a goal has no posture in a graph."""
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(0)  # the same starts for all seeds
         chains = cheapest_chains(

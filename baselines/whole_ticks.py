@@ -54,7 +54,7 @@ class Rounding:
         self._step = session.model.step
 
     def nearest(self, plan: PathPlan) -> TickPlan | None:
-        """Return the plan solved again with each segment except the last at the nearest whole
+        """Return the plan solved again with each segment except the last in the nearest whole
         number of steps, and the last, as short as it then can be, rounded up; None if a solve
         fails. To first order all roundings of a shortest path (:meth:`every`) have equal ticks."""
         exact = plan.lengths()[:-1] / self._step
