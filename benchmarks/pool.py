@@ -125,13 +125,14 @@ class Workers:
         self, jobs: Sequence[Job], *, in_order: bool = False
     ) -> Iterator[tuple[Job, list[Outcome]]]:
         """Yield each job with the outcomes of its runs, as jobs finish. The jobs of a method are
-        divided among as many workers as may work at once; with ``in_order`` one worker performs
-        them all, in their order, while its process lives.
+        divided among at most as many workers as may work at once; with ``in_order`` one worker
+        performs them all, in their order, while its process lives.
 
         A job during which its process ends is repeated once if the process was late, was killed by
-        SIGKILL, lost its server or could not write an answer; otherwise, and the second time, its
-        outcomes are ``timeout`` or ``crashed``. Raises CoarticError if five processes in a row end
-        before their first job, and if answers cannot be written.
+        SIGKILL, or has exit code 255 (its server ended) or 74 (it could not write an answer);
+        otherwise, and the second time, its outcomes are ``timeout`` or ``crashed``. Raises
+        CoarticError if five processes in a row end before their first job, and if the folder of
+        answers is gone or full.
         """
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
@@ -200,7 +201,7 @@ class Workers:
 
     def worker_for(self, method: tuple[str, str, str]) -> Worker:
         """Return the worker that waits for jobs if it has this method (:attr:`MethodInfo.key`);
-        otherwise end it, and return a new worker, not yet started."""
+        otherwise end it, if there is one, and return a new worker, not yet started."""
         waits, self._idle = self._idle, None
         if waits is not None:
             if waits.method == method:
@@ -263,8 +264,9 @@ class Worker:
 
     @property
     def spins(self) -> bool:
-        """True if the current job has used more than 2 s of CPU time beyond its limit (a day
-        without a limit): its method ignores the signal that ends the process."""
+        """True if the current job has used more than 2 s of CPU time, as far as :attr:`cpu_s` shows
+        it, beyond its limit (a day without a limit): its method ignores the signal that ends the
+        process."""
         limit_s = (self.jobs and self.jobs[0].time_limit_s) or _LONGEST_S
         return self.cpu_s > self._since_cpu_s + limit_s + _SPINS_S
 
@@ -299,7 +301,7 @@ class Worker:
     @property
     def last_output(self) -> str:
         """End of the process, and the last three lines that it printed in the current job (if not
-        ``verbose``), as in ``(exit code 1): LINES``."""
+        ``verbose``), or why it did not start, as in ``(exit code 1): LINES``."""
         code = self.exit_code or 0
         if self._reader.is_alive():
             self._reader.join(_END_S)

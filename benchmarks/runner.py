@@ -146,7 +146,8 @@ class Progress:
 
 Watcher = Callable[[Progress, Cell | None], None]
 """Function that is called with the progress: before the first run with None, then with the cell of
-each run. After an exception in it, which gives a warning, it is not called again."""
+each run, also of repeats, and once before the repeats. After an exception in it, which gives a
+warning, it is not called again."""
 
 
 def run_suite(
