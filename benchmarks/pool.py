@@ -308,7 +308,7 @@ class Worker:
         text = bytes(self._printed).rpartition(_NEXT_JOB)[2]
         lines = text.decode(errors="replace").strip().splitlines()
         last = "\n".join(line[:300] for line in lines[-_LAST_LINES:])
-        how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        how = f"killed by {signal_name(-code)}" if code < 0 else f"exit code {code}"
         return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
     def failure(self, exit_code: int | None, *, spins: bool) -> list[Outcome]:
@@ -318,7 +318,7 @@ class Worker:
         if exit_code is None and not spins:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
             return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
-        if exit_code is None or (exit_code < 0 and signal.Signals(-exit_code).name == "SIGPROF"):
+        if exit_code is None or (exit_code < 0 and signal_name(-exit_code) == "SIGPROF"):
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         if exit_code == _UNKEPT:
             why = "a method removes its folder or limits the size of files"
@@ -330,6 +330,15 @@ class Worker:
         if self.process.pid is not None:
             end_group(self.process.pid)
             self.process.join(_END_S)
+
+
+def signal_name(number: int) -> str:
+    """Return the name of a signal, such as ``SIGKILL``, or, for a signal without a name here, its
+    number, as in ``signal 40``."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _read(output: connection.Connection, kept: bytearray) -> None:
