@@ -261,7 +261,7 @@ def cite(
         bool, typer.Option("--analysis", help="Also works behind statistics and signatures.")
     ] = False,
 ) -> None:
-    """Print BibTeX for coartic, the paper and the methods of a folder, or all methods."""
+    """Print BibTeX for coartic, the paper and the methods of a folder, or all built-in methods."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
     from coartic.runs.store import open_store
