@@ -397,7 +397,8 @@ def _perform_jobs(folder: Path, pipe: Any, prints: Any, workers: int, verbose: b
 
 def _answer_to(job: Job) -> bytes:
     """Perform a job, and return its outcomes as JSON, an outcome ``crashed`` for each run if JSON
-    cannot hold them. The job's limit of CPU time is set (:func:`_limit_cpu_time`)."""
+    cannot hold them. Meanwhile the job's limit of CPU time, a day without one, is set
+    (:func:`_limit_cpu_time`)."""
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
     outcomes = perform_job(job)
     _limit_cpu_time(0)

@@ -94,9 +94,10 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
 
     The table has ranked methods with the smallest gaps (all if a parameter is varied), the learner
     and random search; and, ranked or not, if they have a gap, methods from files, and methods of
-    the labels ``asked``, except conditions that a row joins. Settings and ablations of built-in
-    methods with a gap are left out. The pairs say why methods are not ranked, what was found on
-    coarticulation and cost, how runs differ from the paper's, how many failed, and ``more``.
+    the labels ``asked``, except conditions that a ranked row joins. Settings and ablations of
+    built-in methods with a gap are left out. The pairs say why methods are not ranked, what was
+    found on coarticulation and cost, how runs differ from the paper's, how many failed, and
+    ``more``.
     """
     from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
