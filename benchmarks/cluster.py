@@ -35,7 +35,7 @@ class Dask:
     address : str
         Address that the scheduler prints, such as ``tcp://127.0.0.1:8786``.
     say : callable
-        Function that is called with a sentence before a wait for workers.
+        Function that is called with a sentence before a long wait for workers.
 
     Examples
     --------
@@ -52,8 +52,8 @@ class Dask:
         ``crashed``.
 
         When iterated, raises CoarticError if the scheduler is missing or lost or has no worker for
-        10 minutes, if a worker has another version or code of a method or cannot perform jobs, and
-        if this machine lacks the extra ``cluster``.
+        10 minutes, if a job, tried three times, meets only workers that have another version or
+        code of its method or cannot perform it, and if this machine lacks the extra ``cluster``.
         """
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed

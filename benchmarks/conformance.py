@@ -65,8 +65,8 @@ def check_method(
 ) -> list[Law]:
     """Check every law of a method, and return the laws in order, kept and broken. The method runs
     on ``tasks``, by default the shipped tasks; tasks to which it does not apply are left out, and
-    without any task left the last law, ``solution``, is broken. ``verbose`` shows prints, logs and
-    crashes of the method."""
+    without any task left ``solution`` is the last law, and broken. ``verbose`` shows prints, logs
+    and crashes of the method, not of its run in another process."""
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 

@@ -41,8 +41,9 @@ def include_folders(
 
     ``plan`` has one job at least; folder ``shipped`` stands for the shipped results. The joined
     plan has the cells of ``plan`` and, on ``tasks`` (None: on all), cells with a run 0 of the
-    folders. Missing runs are left to :func:`.perform`. A warning names an unfinished folder, and a
-    folder with fewer runs of another stochastic cell than ``plan`` asks for of its own.
+    folders. Missing runs are left to :func:`.perform`. A warning names a folder whose plan has, on
+    ``tasks``, runs that the joined plan lacks, or another stochastic cell of which the joined plan
+    has fewer runs than ``plan`` asks for of its own.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
     at 0, if the folders do not go together, if a folder does not pass the checks of ``coartic
@@ -90,7 +91,8 @@ def _join(
 ) -> list[Job]:
     """Return the plan with the cells of the sources (stores by name), with ``tasks`` only their
     cells on these tasks. A cell has the runs that the plan asks for, and the runs that follow in
-    the sources without a gap. Raises CoarticError for a contradiction (:func:`_check_together`)."""
+    the sources without a gap; without any it is left out. Raises CoarticError for a contradiction
+    (:func:`_check_together`)."""
     whole = {name: source.plan() for name, source in sources.items()}
     plans = {
         name: [job for job in jobs if tasks is None or job.cell.task.name in tasks]
@@ -128,10 +130,10 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of a source whose plan has runs that the joined plan lacks, or else a cell of a
-    stochastic method, not in ``asked``, of which the joined plan has fewer runs than the largest
-    number in ``asked``. ``asked``: numbers of runs asked for, by digest of the cell; ``plans``:
-    plans by name of the source; ``jobs``: joined plan, by digest."""
+    """Warn of a source whose plan has runs that the joined plan lacks, and of one with a complete
+    cell of a stochastic method, not in ``asked``, of which the joined plan has fewer runs than the
+    largest number in ``asked``. ``asked``: numbers of runs asked for, by digest of the cell;
+    ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()

@@ -12,7 +12,6 @@ import itertools
 import json
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -22,7 +21,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from coartic.benchmarks.own_code import code_of
-from coartic.benchmarks.pool import CONTEXT, MORE_FILES, start_process
+from coartic.benchmarks.pool import CONTEXT, MORE_FILES, signal_name, start_process
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, error_line, plain
 from coartic.internal.threads import begin_worker, end_group
@@ -74,7 +73,7 @@ def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
             process.join(1.0)
             code = process.exitcode
             if code is None or code < 0 or code == 255:  # 255: its server was killed
-                name = signal.Signals(-code).name if code and code < 0 else "a signal"
+                name = signal_name(-code) if code and code < 0 else "a signal"
                 raise CoarticError(
                     f"{shown} is not read: {name} ended the process that reads it, from outside or "
                     "by the file itself. Repeat the command"

@@ -149,7 +149,7 @@ def _distributions() -> dict[str, list[str]]:
 
 def _imports(path: str) -> Iterator[str]:
     """Yield the full name of each module or attribute that a statement of a Python file imports,
-    such as ``numpy.linalg``, and of each attribute of ``coartic`` that the file uses, such as
+    such as ``numpy.linalg``, and of each attribute of ``coartic`` that the file names, such as
     ``coartic.learn``; no relative imports, and nothing of a file that is gone or malformed."""
     try:
         tree = ast.parse(Path(path).read_bytes())

@@ -135,15 +135,15 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     Returns
     -------
     list of Job
-        A job for each cell (a method with parameters on a task), with the numbers of its runs.
+        A job for each cell (a method with parameters on a task) that has runs, with their numbers.
 
     Raises
     ------
     CoarticError
-        A name is unknown or taken, a number or a parameter is refused, ``trials``, ``runs`` or a
-        family file has no effect, a task or method that is named has no runs of any number, a cell
-        has two numbers of runs, or a method does not apply to a task of its block (without a
-        wildcard; otherwise, and for added tasks and methods, it is left out).
+        A name is unknown or taken, a number or a parameter is refused, ``trials``, ``runs``
+        (except 1) or a family file has no effect, a task or method that is named has no runs of any
+        number, a cell has two numbers of runs, or a method does not apply to a task of its block
+        (without a wildcard; otherwise, and for added tasks and methods, it is left out).
     """
     request = request_for(**options)
     if not isinstance(suite, Suite):
@@ -335,7 +335,8 @@ def _why_nothing_runs(
     suite: Suite, idle: Sequence[Task], methods: Iterable[MethodInfo], jobs: Sequence[Job]
 ) -> str:
     """Return a sentence that says why methods have nothing to run: on the first task of ``idle``,
-    tasks that a request names and that have no job, or else on the tasks of ``jobs``."""
+    tasks that a request names and for which these methods have no job, or else on the tasks of
+    ``jobs``."""
     tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
     reasons = dict.fromkeys(method.why_not(task) for task in tasks for method in methods)
     there_is = ", ".join(dict.fromkeys(job.cell.label for job in jobs)) or "nothing there"

@@ -125,13 +125,14 @@ class Workers:
         self, jobs: Sequence[Job], *, in_order: bool = False
     ) -> Iterator[tuple[Job, list[Outcome]]]:
         """Yield each job with the outcomes of its runs, as jobs finish. The jobs of a method are
-        divided among as many workers as may work at once; with ``in_order`` one worker performs
-        them all, in their order, while its process lives.
+        divided among at most as many workers as may work at once; with ``in_order`` one worker
+        performs them all, in their order, while its process lives.
 
         A job during which its process ends is repeated once if the process was late, was killed by
-        SIGKILL, lost its server or could not write an answer; otherwise, and the second time, its
-        outcomes are ``timeout`` or ``crashed``. Raises CoarticError if five processes in a row end
-        before their first job, and if answers cannot be written.
+        SIGKILL, or has exit code 255 (its server ended) or 74 (it could not write an answer);
+        otherwise, and the second time, its outcomes are ``timeout`` or ``crashed``. Raises
+        CoarticError if five processes in a row end before their first job, and if the folder of
+        answers is gone or full.
         """
         by_method = defaultdict[Any, list[Job]](list)
         for job in jobs:
@@ -200,7 +201,7 @@ class Workers:
 
     def worker_for(self, method: tuple[str, str, str]) -> Worker:
         """Return the worker that waits for jobs if it has this method (:attr:`MethodInfo.key`);
-        otherwise end it, and return a new worker, not yet started."""
+        otherwise end it, if there is one, and return a new worker, not yet started."""
         waits, self._idle = self._idle, None
         if waits is not None:
             if waits.method == method:
@@ -263,8 +264,9 @@ class Worker:
 
     @property
     def spins(self) -> bool:
-        """True if the current job has used more than 2 s of CPU time beyond its limit (a day
-        without a limit): its method ignores the signal that ends the process."""
+        """True if the current job has used more than 2 s of CPU time, as far as :attr:`cpu_s` shows
+        it, beyond its limit (a day without a limit): its method ignores the signal that ends the
+        process."""
         limit_s = (self.jobs and self.jobs[0].time_limit_s) or _LONGEST_S
         return self.cpu_s > self._since_cpu_s + limit_s + _SPINS_S
 
@@ -299,14 +301,14 @@ class Worker:
     @property
     def last_output(self) -> str:
         """End of the process, and the last three lines that it printed in the current job (if not
-        ``verbose``), as in ``(exit code 1): LINES``."""
+        ``verbose``), or why it did not start, as in ``(exit code 1): LINES``."""
         code = self.exit_code or 0
         if self._reader.is_alive():
             self._reader.join(_END_S)
         text = bytes(self._printed).rpartition(_NEXT_JOB)[2]
         lines = text.decode(errors="replace").strip().splitlines()
         last = "\n".join(line[:300] for line in lines[-_LAST_LINES:])
-        how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        how = f"killed by {signal_name(-code)}" if code < 0 else f"exit code {code}"
         return f"({how}): {plain(last, 1000) or 'it left no message'}"
 
     def failure(self, exit_code: int | None, *, spins: bool) -> list[Outcome]:
@@ -316,7 +318,7 @@ class Worker:
         if exit_code is None and not spins:
             reason = f"wall time limit of {self.wall_limit_s:g} s exceeded twice: it waited"
             return fail(job, "timeout", reason, wall_s=self.wall_limit_s)
-        if exit_code is None or (exit_code < 0 and signal.Signals(-exit_code).name == "SIGPROF"):
+        if exit_code is None or (exit_code < 0 and signal_name(-exit_code) == "SIGPROF"):
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         if exit_code == _UNKEPT:
             why = "a method removes its folder or limits the size of files"
@@ -328,6 +330,15 @@ class Worker:
         if self.process.pid is not None:
             end_group(self.process.pid)
             self.process.join(_END_S)
+
+
+def signal_name(number: int) -> str:
+    """Return the name of a signal, such as ``SIGKILL``, or, for a signal without a name here, its
+    number, as in ``signal 40``."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
 
 
 def _read(output: connection.Connection, kept: bytearray) -> None:
@@ -386,7 +397,8 @@ def _perform_jobs(folder: Path, pipe: Any, prints: Any, workers: int, verbose: b
 
 def _answer_to(job: Job) -> bytes:
     """Perform a job, and return its outcomes as JSON, an outcome ``crashed`` for each run if JSON
-    cannot hold them. The job's limit of CPU time is set (:func:`_limit_cpu_time`)."""
+    cannot hold them. Meanwhile the job's limit of CPU time, a day without one, is set
+    (:func:`_limit_cpu_time`)."""
     _limit_cpu_time(job.time_limit_s or _LONGEST_S)
     outcomes = perform_job(job)
     _limit_cpu_time(0)

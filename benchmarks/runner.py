@@ -146,7 +146,8 @@ class Progress:
 
 Watcher = Callable[[Progress, Cell | None], None]
 """Function that is called with the progress: before the first run with None, then with the cell of
-each run. After an exception in it, which gives a warning, it is not called again."""
+each run, also of repeats, and once before the repeats. After an exception in it, which gives a
+warning, it is not called again."""
 
 
 def run_suite(
@@ -335,7 +336,8 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs for workers, and return the parts, long parts first."""
+    """Divide jobs for workers, and return the parts: parts without a number of trials first, then
+    parts with the most trials."""
     # A run among many takes a fraction of its time alone: jobs are as large as methods allow, and
     # each worker has a part. Long jobs come first, so that none is alone at the end; one run of a
     # planner, which has no number of trials, can take as long as thousands of trials: it is first.

@@ -14,8 +14,9 @@ from coartic.tasks.task import Task, hands_of
 
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
-    """Return the scored runs of a job from their outcomes, in order. All ``parts`` that outcomes
-    have (solution, initial, replay) are executed; only runs that are ok have scores."""
+    """Return the scored runs of a job from their outcomes, in order. All ``parts`` of outcomes
+    (solution, initial, replay) are executed, except parts that are too long or break the task's
+    rules; only runs that are ok have scores."""
     task = job.cell.task
     executions = iter(execute_all(task, [m for each in outcomes for m in each.parts.values()]))
     runs = []

@@ -32,9 +32,9 @@ TaskNamed = Callable[[str], Task]
 
 
 def _plain_value(value: Any) -> _Plain:
-    """Return the value of a parameter: a bool, finite number or text as it is, a list of finite
-    numbers or bools, not empty, as a tuple of floats. Raises PydanticCustomError for any other
-    value."""
+    """Return the value of a parameter: a bool, a text or a number that is finite as a float, as it
+    is; a list of such numbers or bools, not empty, as a tuple of floats. Raises PydanticCustomError
+    for any other value."""
     numbers = value if isinstance(value, list | tuple) else [value]
     most = sys.float_info.max
     if numbers and all(isinstance(each, int | float) and abs(each) <= most for each in numbers):
@@ -151,7 +151,7 @@ def kind_of(name: str) -> str:
 
 def check_kind(name: str, *kinds: str) -> None:
     """Check that the thing that is named has no kind (:func:`kind_of`), or one of these kinds, such
-    as ``suite``. Raises CoarticError for another kind, which names the command that takes it."""
+    as ``suite``. Raises CoarticError, with the command that takes the thing, for another kind."""
     kind = kind_of(name)
     if kind and kind not in kinds:
         raise CoarticError(f"{name} is a {kind}: {_TAKEN_BY[kind].format(quote(name))}")

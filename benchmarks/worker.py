@@ -72,8 +72,9 @@ def fail(
 
 
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
-    """Return outcomes as JSON, a list of objects with the fields of :class:`Outcome`. Raises
-    TypeError, ValueError or RecursionError for data that JSON cannot hold."""
+    """Return outcomes as JSON (with NaN and infinity as Python writes them), a list of objects with
+    the fields of :class:`Outcome`. Raises TypeError, ValueError or RecursionError for data that
+    JSON cannot hold."""
 
     def plain(outcome: Outcome) -> dict[str, Any]:
         parts = {part: [*map(movement_data, made)] for part, made in outcome.parts.items()}

@@ -13,7 +13,7 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks.pool import Local, Workers
+from coartic.benchmarks.pool import Local, Workers, signal_name
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
 from coartic.runs.store import writing
@@ -188,6 +188,10 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.isna().wall_s == (died or "CPU" in words)
     assert run.isna().cpu_s == died
     assert run.isna().reward if status != "ok" else run.reward == HONEST
+
+
+def test_a_signal_without_a_name_has_its_number():
+    assert [signal_name(9), signal_name(999)] == ["SIGKILL", "signal 999"]
 
 
 def test_a_run_that_waits_twice_is_stored_as_timed_out(tmp_path):

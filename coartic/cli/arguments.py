@@ -23,15 +23,16 @@ if TYPE_CHECKING:
 
 
 def file_or_folder(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for the name of a file or folder, which need not exist, read as a Path. Its
-    flags are ``names``, or follow from its parameter; ``metavar`` names its value in the help,
-    ``what`` is its help. An empty or impossible name raises CoarticError."""
+    """Return a command-line option for the name of a file or folder, which need not exist, read as
+    a Path. Its flags are ``names``, or follow from its parameter; ``metavar`` names its value in
+    the help, ``what`` is its help. An empty or impossible name raises CoarticError."""
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
 
 def option(metavar: str, what: str, *names: str) -> Any:
-    """Return an option for text, or for names of files that are read later; parameters as in
-    :func:`file_or_folder`."""
+    """Return a command-line option for text, or for names of files that are read later, with help
+    ``what`` and flags ``names`` (without any, a flag from its parameter); ``metavar`` names its
+    value in the help."""
     return typer.Option(*names, readable=False, metavar=metavar, help=what)
 
 
@@ -46,9 +47,9 @@ MethodFiles = Annotated[
 
 
 def within(option: str, what: str, least: float, most: float) -> Any:
-    """Return an option, with the flag ``option`` and the help ``what``, for a number from ``least``
-    to ``most``, a whole number if ``least`` is an int. Reading any other value raises CoarticError.
-    """
+    """Return a command-line option, with the flag ``option`` and the help ``what``, for a number
+    from ``least`` to ``most``, whole if ``least`` is an int. Reading any other value raises
+    CoarticError."""
 
     def read(text: str) -> Any:
         value = _value_in(text)
@@ -73,10 +74,10 @@ def _value_in(text: str) -> Any:
 
 
 def request_option(name: str, what: str, unit: str = "N") -> Any:
-    """Return an option for a value, a number or ``50..99``, that :func:`.request_for` takes by
-    ``name``, such as ``time_limit_s``; ``what`` is its help, ``unit`` names its value in the help.
-    Its flag is the name without ``_s``: ``--time-limit``. Reading a value that is refused raises
-    CoarticError."""
+    """Return a command-line option for a value, a number or ``50..99``, that :func:`.request_for`
+    takes by ``name``, such as ``time_limit_s``; ``what`` is its help, ``unit`` names its value in
+    the help. Its flag is the name without ``_s``: ``--time-limit``. Reading a value that is refused
+    raises CoarticError."""
     option = f"--{name.removesuffix('_s').replace('_', '-')}"
 
     def read(text: str) -> Any:
@@ -91,8 +92,8 @@ def request_option(name: str, what: str, unit: str = "N") -> Any:
 
 
 def names_in(text: str | None) -> list[str]:
-    """Return the names in ``text``, also empty, separated by commas, without blanks around them; an
-    empty list for None."""
+    """Return the names, also empty names, between the commas of ``text``, without blanks around
+    them; an empty list for None."""
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
@@ -161,8 +162,8 @@ def check_used(
 
 
 def file_name(method: str) -> str:
-    """Return the name of the file that ``coartic new`` writes for the id of a method: a file that
-    Python can import, and that hides no standard module, coartic or NumPy."""
+    """Return the name of the file that ``coartic new``, without ``--out``, writes for the id of a
+    method: a file that Python can import, and that hides no standard module, coartic or NumPy."""
     stem = re.sub(r"\W", "_", method)
     taken = {*keyword.kwlist, *sys.stdlib_module_names, "coartic", "numpy"}
     return f"{stem if stem.isidentifier() and stem not in taken else f'my_{stem}'}.py"

@@ -82,9 +82,10 @@ def draw(
 def _film(
     folder: Path, run_ids: Sequence[str], out: Path, initial: bool, width: int, replace: bool
 ) -> None:
-    """Write a film (.gif, .mp4), ``width`` pixels wide, of one or two runs of a results folder side
-    by side, or, with ``initial``, of one run next to the corrective process alone. Raises
-    CoarticError for more or unknown runs, and if the film cannot be made or written."""
+    """Write a film (.gif, .mp4), ``width`` pixels wide (MP4: rounded down to even), of one or two
+    runs of a results folder side by side, or, with ``initial``, of one run next to the corrective
+    process alone. Raises CoarticError for more or unknown runs, and if the film cannot be made or
+    written."""
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of

@@ -92,10 +92,12 @@ def _with_id(name: str, row: Mapping[Any, Any]) -> str:
 def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> None:
     """Print the ranking of a study as a table, then pairs of a word and a text.
 
-    The table has ranked methods: some with the smallest gaps, the learner and random search; and,
-    ranked or not, if they have a gap, methods from files, and methods of the labels ``asked`` for
-    which no other row stands. The pairs say why methods are not ranked, what was found on
-    coarticulation and cost, how runs differ from the paper's, which failed, and ``more``.
+    The table has ranked methods with the smallest gaps (all if a parameter is varied), the learner
+    and random search; and, ranked or not, if they have a gap, methods from files, and methods of
+    the labels ``asked``, except conditions that a ranked row joins. Settings and ablations of
+    built-in methods with a gap are left out. The pairs say why methods are not ranked, what was
+    found on coarticulation and cost, how runs differ from the paper's, how many failed, and
+    ``more``.
     """
     from coartic.analysis.method_frame import without_settings
     from coartic.analysis.report.about import RUNS, finding, leading, limits
@@ -192,8 +194,9 @@ def verify(
 def _perform_again(
     folder: Path, count: int, run_id: str | None, method_file: list[Path] | None
 ) -> int:
-    """Perform a run of a folder again, or, without ``run_id``, at most ``count`` of its runs; print
-    the differences from the stored runs and return the number of runs with another result."""
+    """Perform the run of a folder whose id begins with ``run_id`` again, or, for None, at most
+    ``count`` of its runs; print the differences from the stored runs and return the number of runs
+    with another result."""
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again, some_runs
     from coartic.runs.store import open_store
@@ -259,7 +262,7 @@ def cite(
         bool, typer.Option("--analysis", help="Also works behind statistics and signatures.")
     ] = False,
 ) -> None:
-    """Print BibTeX for coartic, the paper and the methods of a folder, or all methods."""
+    """Print BibTeX for coartic, the paper and the methods of a folder, or all built-in methods."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
     from coartic.runs.store import open_store

@@ -213,8 +213,9 @@ def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
 
 
 def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: label, description, goals, hands and base of a task, and where
-    the goals of a task of the paper come from. ``name``: its name or file, as the user gave it."""
+    """Yield pairs of word and text: label, description, goals, hands and base of a task, and, if
+    ``name`` names a task of the paper, where its goals come from. ``name``: its name or file, as
+    the user gave it."""
     yield "Task", f"{name} ({task.label}): {task.description}"
     yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
     yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"

@@ -112,7 +112,8 @@ class Display:
 
     def show(self, doing: str, *, at_once: bool = False) -> None:
         """Note what the command is ``doing`` from now on, and print it: on a terminal or with
-        ``at_once`` always, else if ten seconds have passed since the last line."""
+        ``at_once`` always, else if ten seconds have passed since the last such line or the
+        beginning."""
         self._doing, self._since = doing, time.monotonic()
         if self._is_live or at_once or self._since - self._last >= self.EVERY_S:
             self._print(doing)
