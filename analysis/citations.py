@@ -36,8 +36,8 @@ def bibliography(
     environment: Mapping[str, Any] | None = None,
     imports: Mapping[str, Sequence[str]] | None = None,
 ) -> str:
-    """Return BibTeX for the software, the paper and the methods, each work of ``references.bib``
-    that is cited once.
+    """Return BibTeX for the software, the paper and the methods, each cited work of
+    ``references.bib`` once.
 
     Parameters
     ----------

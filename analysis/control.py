@@ -178,7 +178,8 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 @checked_arguments
 def control_suite(study: Study, *, runs: Annotated[int, Field(ge=1, le=MOST_RUNS)] = 20) -> str:
-    """Return a suite of random search, the control of signatures, where the study lacks it.
+    """Return a suite of random search, the control of signatures except ``hand``, where the study
+    lacks it.
 
     For each method that may select its solution by rewards (:func:`selects`), on each task, the
     suite has random search with as many trials as the method, with noise on the idle arm if the

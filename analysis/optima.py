@@ -43,7 +43,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     ----------
     runs : DataFrame
         Stored runs of the plan, with ``task``, ``method``, ``setting``, ``run_id``, ``status``,
-        ``parameters``, ``reward`` (ticks), ``hands``.
+        ``parameters``, ``reward`` (negative ticks), ``hands``.
     tasks : iterable of Task
 
     Returns

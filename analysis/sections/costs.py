@@ -40,8 +40,9 @@ PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluati
 
 @cached
 def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
-    """Return for each run that made trials, by run id, the numbers, from 1, of the trials with a
-    higher reward than all trials before, and these rewards, negative ticks; shape ``(n,)`` each."""
+    """Return for each run with rewards of trials, by run id, the numbers, from 1, of the trials
+    with a higher reward than all trials before, and these rewards, negative ticks; shape ``(n,)``
+    each."""
     by_run = {}
     for run_id, rewards in study.rewards():
         best = np.fmax.accumulate(np.append(-np.inf, rewards))  # without NaN
@@ -60,7 +61,7 @@ def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
 
 @cached
 def spans(study: Study) -> dict[str, tuple[float, int]]:
-    """Return the two rewards between which targets lie, ticks, by name of the task:
+    """Return the two rewards between which targets lie, negative ticks, by name of the task:
     :attr:`.Study.corrective_best`, of the corrective process alone, and the best known reward.
 
     Tasks without one of the two, or with equal ones, are left out.

@@ -221,7 +221,8 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
 
 def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
     """Draw the gap against the values of the only parameter that is varied (:attr:`.Study.varied`),
-    or else the gap of every method; None without a gap. ``how``: see :data:`.DrawsFigure`."""
+    or else, also with fewer than two gaps of values, gaps of methods (:func:`.board`); None without
+    a gap. ``how``: see :data:`.DrawsFigure`."""
     plot = _draw_varied(study, **how) or _draw_gaps(study, **how)
     return plot and replace(plot, id="ranking")
 
