@@ -127,9 +127,9 @@ def list_signatures(study: Study) -> Rows:
     """Yield rows with the signatures of every method, except searches, on every task of
     :func:`.one_by_one`, and of random search there for methods that select among trials.
 
-    A row for each hand sequence with which at least a tenth of a method's solved runs end, and a
-    row for the choice of hands (``hands`` empty) on a task for two with two goals or more. Means
-    over runs; p is of the one-tailed exchange test and uncorrected. ``control_idle_arm``: ``with
+    A row for each hand sequence of :func:`.with_control`, which a tenth of the solved runs or more
+    have, and a row for the choice of hands (``hands`` empty) on a task for two with two goals or
+    more. Means over runs; p is of the one-tailed exchange test and uncorrected. ``control_idle_arm``: ``with
     noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
