@@ -129,8 +129,8 @@ def list_signatures(study: Study) -> Rows:
 
     A row for each hand sequence of :func:`.with_control`, which a tenth of the solved runs or more
     have, and a row for the choice of hands (``hands`` empty) on a task for two with two goals or
-    more. Means over runs; p is of the one-tailed exchange test and uncorrected. ``control_idle_arm``: ``with
-    noise``, or ``still`` as under EC3.
+    more. Means over runs; p is of the one-tailed exchange test and uncorrected.
+    ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
