@@ -36,13 +36,14 @@ def bibliography(
     environment: Mapping[str, Any] | None = None,
     imports: Mapping[str, Sequence[str]] | None = None,
 ) -> str:
-    """Return BibTeX for the software, the paper and the methods, each entry of ``references.bib``
-    once.
+    """Return BibTeX for the software, the paper and the methods, each cited work of
+    ``references.bib`` once.
 
     Parameters
     ----------
     methods : mapping of str to MethodInfo
-        Methods by id. A comment before an entry names the methods that use the work. A method from
+        Methods by id. A comment before an entry names the methods that use the work, or what else
+        does. A method from
         a file is cited as its author declares; a comment alone names it if its author does not.
     analysis : bool
         Add the works behind statistics and signatures.

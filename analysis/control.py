@@ -56,11 +56,12 @@ def with_control(
     Returns
     -------
     dict
-        For each hand sequence with which at least a tenth of the method's solved runs end, the
-        commonest first: the values of the runs of the method with these hands and of the runs of
-        random search (:func:`control_of`) with these hands and as many trials, shape ``(n,)`` each,
+        For each hand sequence with which at least a tenth of the method's solved runs end and have
+        the signature, the commonest first: the values of these runs and of the runs of random
+        search (:func:`control_of`) with these hands and as many trials, shape ``(n,)`` each,
         without runs that lack the signature; the second empty if there is no such random search.
-        For signature ``hand`` one entry, ``""``, with all solved runs.
+        For signature ``hand`` at most one entry, ``""``, whatever the hands. Of each method only
+        the first 500 solved runs count.
 
     Examples
     --------
@@ -93,8 +94,8 @@ def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool =
 
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
     """Return True if a method adds exploration noise to the arm that is not to hit: the learner by
-    its condition, others, such as random search, by their parameter ``idle_arm``. Always True
-    without this parameter, and on tasks for one arm."""
+    its condition, others, such as random search, by their parameter ``idle_arm``, True without it.
+    Always True on tasks for one arm."""
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
         return True
@@ -107,9 +108,10 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
 
 @cached
 def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
-    """Return the labels of forms of random search on a task, by hand sequence of all runs (empty if
-    every hand sequence is tried), number of trials, and True if the idle arm is explored, too. Left
-    out are random search in several ``stages``, and with several given hand sequences."""
+    """Return the labels of forms of random search on a task, by hand sequence of all solved runs
+    (empty if every hand sequence is tried), number of trials, and True if the idle arm is explored,
+    too; of forms alike in these the first. Left out are random search in several ``stages``, with
+    several given hand sequences, and without a solved run."""
     labels = dict[tuple[str, float, bool], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
     for label in map(str, of_search.index):
@@ -133,8 +135,8 @@ def _most_trials(study: Study, task: str, label: str) -> float:
 @checked_arguments
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
     """Return by how much a method's signature exceeds the mean signature of random search with the
-    same hands, in the unit of the signature: a mean over the runs for which :func:`with_control`
-    has random search; NaN without such runs."""
+    same hands (``hand``: with any), in the unit of the signature: a mean over the runs for which
+    :func:`with_control` has random search; NaN without such runs."""
     pairs = with_control(study, signature, task, label).values()
     excess = [values - control.mean() for values, control in pairs if len(control)]
     return float(np.concatenate(excess).mean()) if excess else math.nan
@@ -176,7 +178,8 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 @checked_arguments
 def control_suite(study: Study, *, runs: Annotated[int, Field(ge=1, le=MOST_RUNS)] = 20) -> str:
-    """Return a suite of random search, the control of signatures, where the study lacks it.
+    """Return a suite of random search, the control of signatures except ``hand``, where the study
+    lacks it.
 
     For each method that may select its solution by rewards (:func:`selects`), on each task, the
     suite has random search with as many trials as the method, with noise on the idle arm if the

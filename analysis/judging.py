@@ -117,9 +117,10 @@ def mean_beyond(
     -------
     Finding
         ``holds``: the mean lies on this side; None, without a test, with fewer than three tasks.
-        ``evidence``: the sentence. ``tests`` has a test of the claim; ``without`` a test of the
-        claim without the task that favours it most; ``against`` a test of the opposite, with all
-        tasks or without the task that favours the opposite most, whichever has the larger p.
+        ``evidence``: the sentence, or that tasks are too few. ``tests`` has a test of the claim;
+        ``without`` a test of the claim without the task that favours it most; ``against`` a test of
+        the opposite, with all tasks or without the task that favours the opposite most, whichever
+        has the larger p.
 
     Raises
     ------

@@ -49,7 +49,8 @@ def methods_of(
 ) -> pd.DataFrame:
     """Return a row for each method with its setting, and for each pair of learners that
     :func:`_joined_learners` joins: built-in methods in the order of ``methods.toml``, then methods
-    from files in the order of the suite.
+    from files in the order of the suite. The row of a pair stands for the runs of the second
+    learner, and of the first on other tasks; most columns are as in the row of the second.
 
     Parameters
     ----------
@@ -110,10 +111,10 @@ def methods_of(
 
 
 def parameter_varied(runs: pd.DataFrame) -> tuple[str, dict[str, Any]]:
-    """Return the name of a parameter and its values by label, numbers from low to high, if all runs
-    except searches for the optimum are of one method, on all tasks, with two or more values of this
-    parameter and equal others; or else an empty name and no value. ``runs`` are as in
-    :func:`methods_of`."""
+    """Return the name of a parameter and its values by label, from low to high if all are numbers,
+    if all runs except searches for the optimum are of one method, with two or more values of this
+    parameter, each on all their tasks, and equal others; or else an empty name and no value.
+    ``runs`` are as in :func:`methods_of`."""
     runs = runs[~runs.method.isin(SEARCHES)]
     tasks = runs.groupby("label", sort=False).task.nunique()
     texts = runs.drop_duplicates("label").set_index("label").parameters
@@ -142,9 +143,8 @@ def _group_of(runs: pd.DataFrame) -> str:
 
 
 def _joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the label of each row of the learner over one-armed and two-armed tasks together, with
-    the ids of the two methods that the row joins: EC1, and on tasks for two arms a condition that
-    draws hands at random; or both informed learners.
+    """Yield the label of each row that joins two methods of the learner, with their ids: EC1 and a
+    condition that draws hands at random; or both informed learners.
 
     ``tasks``: names of the tasks on which each method ran, by label. A row needs tasks of its
     second method, and tasks of its first on which the second did not run.
@@ -157,13 +157,13 @@ def _joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple
 
 
 def joined_label(one: str, two: str) -> str:
-    """Return the label of the learner with method ``one`` (an id) for one arm and ``two`` for two
-    arms, ``dual-process (EC1, EC4)``."""
+    """Return the label of the row that joins the methods ``one`` and ``two`` (ids) of the learner,
+    such as ``dual-process (EC1, EC4)``."""
     return f"{METHOD_PREFIX.rstrip('/')} ({CONDITION_OF[one]}, {CONDITION_OF[two]})"
 
 
 def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
-    """Return runs by label: first the runs of the learner over tasks for one arm and for two, by
+    """Return runs by label: first the runs of joined learners (:func:`_joined_learners`), by
     :func:`joined_label` (runs of the first method on tasks on which the second did not run, and all
     runs of the second), then the runs of each given method."""
     tasks = {method: {*runs.task} for method, runs in by_method.items()}
@@ -176,8 +176,8 @@ def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.Dat
 
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
     """Yield the label of each row with its names of colour and mark: its ``look``, if it has one;
-    for the first methods from files :data:`OWN_COLOR` and a mark; for others the next pair that is
-    not in the ``look`` of a row, colours that are in no ``look`` first."""
+    for the first methods from files :data:`OWN_COLOR` and a mark; for others the next, after the
+    last again the first, of the pairs that are in no ``look``, unused colours before others."""
     fixed = {row["look"] for row in rows.values()}
     taken = {look[0] for look in fixed if look}
     colors = [color for color in COLORS if color not in (OWN_COLOR, "ink")]
@@ -194,7 +194,7 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
     """Return ``rows``, some rows of :attr:`.Study.methods`, without settings and ablations of
-    methods that are in ``rows``, too."""
+    methods that are in ``rows``, too (column ``under``): values of a varied parameter stay."""
     return rows[~rows.under.isin(rows.index)]
 
 
@@ -202,7 +202,7 @@ def headline_methods(rows: pd.DataFrame) -> list[str]:
     """Return the labels of the rows that represent their algorithms (column ``headline``), among
     ``rows``, some rows of :attr:`.Study.methods`; all labels if no row does.
 
-    A setting counts where its method has no row. A row that joins conditions of the learner takes
+    Settings count as in :func:`without_settings`. A row that joins conditions of the learner takes
     the place of all rows of its algorithm; of several such rows only the last counts, with the
     condition that explores most.
     """

@@ -32,7 +32,7 @@ class BestKnown(KnownOptimum):
 
 
 def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown]:
-    """Return the best known reward of each task, from shipped rewards and all runs of a folder.
+    """Return the best known reward of each task, from shipped rewards and the runs of a study.
 
     All solved runs count, including searches and runs copied from other folders, except runs with
     another base, which solve another task. A task is not in the result if its best reward is 0,
@@ -42,8 +42,8 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     Parameters
     ----------
     runs : DataFrame
-        Stored runs of the folder, with ``task``, ``method``, ``setting``, ``run_id``, ``status``,
-        ``parameters``, ``reward`` (ticks), ``hands``.
+        Stored runs of the plan, with ``task``, ``method``, ``setting``, ``run_id``, ``status``,
+        ``parameters``, ``reward`` (negative ticks), ``hands``.
     tasks : iterable of Task
 
     Returns

@@ -66,7 +66,8 @@ def initial_solution(task: Task) -> Execution | None:
     """Return the execution of the corrective process alone with the initial hands of a task.
 
     None if the corrective process does not complete the task with these hands, or if the task does
-    not name them and no hand sequence completes it or over 4,096 would have to be tried.
+    not name them and no hand sequence of its policy completes it or over 4,096 would have to be
+    tried.
     """
     try:
         execution = corrective_trial(task, initial_hands(task))

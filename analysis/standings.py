@@ -129,8 +129,8 @@ def together(study: Study, by_method: Mapping[str, pd.DataFrame]) -> pd.DataFram
 
 
 def common_runs(study: Study) -> pd.DataFrame:
-    """Return the runs of every compared method on :func:`common_tasks` (:func:`runs_on`) as one
-    frame (:func:`together`)."""
+    """Return the runs on :func:`common_tasks` of every compared method that ran on all of them
+    (:func:`runs_on`), as one frame (:func:`together`)."""
     tasks = common_tasks(study)
     return together(study, {method: runs_on(study, method, tasks) for method in compared(study)})
 
@@ -169,7 +169,9 @@ def not_ranked(study: Study, also: frozenset[str] = frozenset()) -> list[str]:
     labels ``also``, that solved every run on no task and so has no row."""
     rows, sentences = without_settings(board(study, also)), []
     for method in rows.index[~rows.ranked]:
-        on, name = solved_tasks(study, method), study.methods.title[method]
+        on, common = solved_tasks(study, method), common_tasks(study)
+        on = common if {*common} <= {*on} else on  # as in the row
+        name = study.methods.title[method]
         text = f"{name} {interval(rows.loc[method], 'gap', scale=100, unit=' %')} is not ranked"
         reasons = [_on_tasks(study, method)]
         if trials_of(study)[method] > equal_trials(study):
@@ -210,9 +212,10 @@ def shown_name(study: Study, method: str) -> str:
     """Return the title of a method and, for a method of :func:`compared`, why its numbers are not
     comparable with the numbers of other methods:
     ``mine (3 of 8 tasks)`` for a method from a file that did not solve every run on
-    :func:`common_tasks`; ``mine (at most 77 of 400 trials)`` for a method from a file whose runs
-    all stopped before their trials were made; ``mine (400 trials)`` for another number of trials
-    than :func:`equal_trials`, where the title has no setting of ``trials``."""
+    :func:`common_tasks`; ``mine (at most 77 of 400 trials)`` for a method from a file that uses the
+    reward of each trial and whose runs all made fewer trials than :func:`trials_of` has; ``mine
+    (400 trials)`` for another number of trials than :func:`equal_trials`, where the title has no
+    setting of ``trials``."""
     row, trials = study.methods.loc[method], trials_of(study)[method]
     if method not in compared(study):
         return str(row.title)

@@ -88,7 +88,8 @@ def cached(
 ) -> Callable[Concatenate[Study, Asked], Computed]:
     """Make a function of a study keep its result for each study and its other arguments.
 
-    Equal calls return the same object, which callers must not change; arguments must be hashable.
+    Calls with equal arguments, written alike, return the same object, which callers must not
+    change; arguments must be hashable.
     The function raises CoarticError for an object that is no study, and for an argument of another
     kind than its hint says.
     """
@@ -133,8 +134,9 @@ def load(folder: str | Path, *, against: str = "") -> Study:
 
 
 def _label_in(study: Study, name: str) -> str:
-    """Return the label of the method that has this label, id, short id such as ``EC4`` or title in
-    a study. Raises CoarticError if no method has it, or several methods or settings do."""
+    """Return the label of the method that has this label, or else this id or short id such as
+    ``EC4``, or else this title in a study. Raises CoarticError if no method has it, or if several
+    methods or settings have this id or title, and none this label."""
     methods = study.methods
     for names in (methods.index, methods.base, methods.title):
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
@@ -172,7 +174,8 @@ class Study:
         return f"Study of {self.folder}: {runs} of suite {self.suite}"
 
     def _repr_html_(self) -> str:
-        """Return HTML for a notebook: a row for each method with its numbers of runs."""
+        """Return HTML for a notebook: a row for each method with its setting, with numbers of
+        tasks, runs and solved runs."""
         solved = self.runs.status == "ok"
         runs = self.runs[["method", "setting", "task"]].assign(solved=solved)
         counts = runs.groupby(["method", "setting"], sort=False).agg(
@@ -246,8 +249,8 @@ class Study:
 
     @cached_property
     def varied(self) -> tuple[str, dict[str, Any]]:
-        """Name of the only parameter in which all compared runs differ, settings of one method, and
-        its values by label (:func:`.parameter_varied`); otherwise both empty."""
+        """Name of the only parameter in which runs, searches left out, differ, settings of one
+        method, and its values by label (:func:`.parameter_varied`); otherwise both empty."""
         return parameter_varied(self.runs)
 
     @cached_property
@@ -282,7 +285,7 @@ class Study:
         the task: the zero of gain, share and targets.
 
         With the task's initial hands where there are over 4,096 hand sequences; NaN if the
-        corrective process completes the task with none of these hands.
+        corrective process completes the task with none of these hands, or they cannot be found.
         """
         alone = {}
         for name, task in self.tasks.items():
@@ -334,17 +337,20 @@ class Study:
         """A row for each method with its setting, by label, in the order of lists and figures.
 
         Two conditions of the learner can make a further row, the second on its tasks, the first on
-        others (for one arm): EC1 with EC4, EC1 with EC3, and the informed EC1 and EC4. Columns:
+        others (mostly for one arm): EC1 with EC4, EC1 with EC3, and the informed EC1 and EC4. Most
+        columns of this row are as in the row of the second. Columns:
 
         - ``base``: id of the method without a setting;
-        - ``condition``: id of the learner's condition or ablation, such as ``EC4``; or empty;
+        - ``condition``: id of the learner's condition, such as ``EC4``, also of an informed one or
+          an ablation; empty for an own condition and other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
         - ``parts``: labels of its runs, a tuple of one text, or two of a joined row, in which runs
           of the second label count on a task with runs of both;
         - ``title``: name on the page, in tables and figures;
         - ``short``: name in figures of one column;
         - ``algorithm``: algorithm that the method is a form of;
-        - ``is_learner``: True for the paper's learner under the paper's conditions;
+        - ``is_learner``: True for the paper's learner under the paper's conditions, with whatever
+          setting;
         - ``is_search``: True for searches for the optimum;
         - ``information``: use of the reward: ``using the reward of each trial``, ``using the reward
           as a formula`` or ``not using the reward``;
@@ -395,7 +401,7 @@ class Study:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the id of each run that made trials, with the rewards of its trials, negative
+        """Yield the id of each run with rewards of trials, with these rewards, negative
         ticks, shape ``(trials,)``, NaN for a trial that failed or whose reward is not kept; of all
         runs of the folder's plan, also in a study by :meth:`only`."""
         with open_results(self.folder) as store:

@@ -30,7 +30,7 @@ class Column(NamedTuple):
     """A column of a table, with heading and format."""
 
     name: str
-    """Name in the CSV file; the beginning of names if ``ending`` is ``*``."""
+    """Name in the CSV file; the beginning of names if ``ending`` has ``*``."""
     ending: str = ""
     """``[]``: the column has an interval (``gap_low``, ``gap_high``); ``±``: the column has a
     standard deviation (``ours_sd``); ``*``: all columns that begin with the name; ``[*]``: all such
@@ -145,10 +145,10 @@ def _rows_of(study: Study, table: Table) -> pd.DataFrame:
 def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     """Return names for showing a table, by kind.
 
-    ``titles``: titles of tasks, families and methods by id, and words for uses of the reward;
-    ``under``: the method of each setting and ablation, by label; ``own``: labels of methods from
-    files; ``reference``: name of the rewards to which gaps are taken; ``compared``: number of
-    compared tasks, such as ``3 tasks``.
+    ``titles``: titles of tasks and families by id and of methods by label, and words for uses of
+    the reward; ``under``: column ``under`` of :attr:`.Study.methods`, where it has a method, by
+    label; ``own``: labels of methods from files; ``reference``: name of the rewards to which gaps
+    are taken; ``compared``: number of compared tasks, such as ``3 tasks``.
     """
     methods, tasks = study.methods, study.tasks
     names = {label: shown_name(study, label) for label in methods.index}
@@ -171,17 +171,20 @@ def caption_of(table: Table, frame: pd.DataFrame) -> str:
 
 
 def is_setting(frame: pd.DataFrame) -> pd.Series:
-    """Return for each row of the frame of a :class:`Table` True if its method (``against``, or
-    ``method``, or else its name) is a setting or an ablation of a method that is there, too."""
+    """Return for each row of the frame of a :class:`Table` True if its method is a setting or an
+    ablation of a method that is there, too, by :attr:`.Study.methods` (``under``); values of a
+    varied parameter are no settings. Methods are in column ``against``, or else in ``method``, or
+    else in the index: "there" is in the same one of these."""
     named = next((name for name in ("against", "method") if name in frame), "")
     label = frame[named] if named else frame.index.to_series()
     return label.map(frame.attrs.get("under", {})).isin([*label])
 
 
 def row_of_cell(study: Study, runs: pd.DataFrame) -> Row:
-    """Return entries of a row on the runs of one method on one task: title of the ``task``, label
-    of the ``method``, numbers of ``runs`` and ``solved`` runs, mean ``reward`` (negative ticks)
-    with ``reward_sd`` and ``reward_median``, mean ``gap`` and ``run_ids``.
+    """Return entries of a row on the runs of one method on one task: title of the ``task``
+    (:func:`.marked`), label of the ``method``, numbers of ``runs`` and ``solved`` runs, mean
+    ``reward`` (negative ticks) with ``reward_sd`` and ``reward_median``, mean ``gap`` and
+    ``run_ids``.
 
     Without a solved run reward and gap are NaN. A table leaves out entries without a column.
     """

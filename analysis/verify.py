@@ -141,7 +141,8 @@ class MoveRow(NamedTuple):
 
 def line(q: Floats, target: Floats, model: Any, most: int = MOST_TICKS) -> Floats:
     """Return points of a straight movement from ``q``, columns ``(dof, points)``, a step of
-    ``model`` apart in joint space, at most ``most`` + 1; the last is always the target."""
+    ``model`` apart in joint space, at most ``most`` + 1; the last, mostly less far, is always the
+    target."""
     difference = target - q
     distance = math.sqrt(np.cumsum(difference * difference)[-1])
     last = math.ceil(distance / model.step)
@@ -186,7 +187,8 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
 
 def _recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
     """Return reward, letters of hands, number of corrections, and joint travel of idle arms from
-    hit to hit, rad. Raises ValueError if a rule is broken or ticks are not as stored."""
+    the start and from hit to hit, rad. Raises ValueError if a rule is broken or ticks are not as
+    stored."""
     _check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):
@@ -238,8 +240,8 @@ class _Report(NamedTuple):
 
 
 def check_runs(folder: Path) -> _Report:
-    """Execute the stored solutions of a results folder, check its tasks, methods and plan, and
-    report what differs or is unchecked. No method is run.
+    """Execute the stored movements of a results folder, check its tasks, methods and plan, and
+    report what differs, is missing or is unchecked. No method is run.
 
     Runs that the last plan does not ask for are checked, too. Raises an error, such as
     sqlite3.Error, if the folder cannot be read.

@@ -245,6 +245,17 @@ def test_a_method_with_more_trials_stands_below(trials, by_suite, equal, is_rank
     assert any(each.replace("\xa0", " ").startswith(below) for each in others) != is_ranked
 
 
+def test_what_is_not_ranked_is_compared_on_the_tasks_of_its_gap():
+    """CMA-ES and mine ran on a third task, which is not compared."""
+    climbing = {(task, "hill-climbing"): [-490] * 3 for task, _ in CMA}
+    third = {("two-armed-2", "cma-es/bandit"): [-612] * 3, ("two-armed-2", "mine"): [-306] * 3}
+    seen = with_trials(study(LEARNER | CMA | climbing | BEST | third), {"mine": 40})
+    seen = MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1", "two-armed-2"))
+    assert standings.common_tasks(seen) == ("ascending", "two-armed-1")
+    (sentence,) = standings.not_ranked(seen)
+    assert sentence.endswith("on these CMA-ES has 0.4 %.")
+
+
 def test_what_was_asked_for_has_a_row_below():
     seen = study(LEARNER | CMA)
     also = frozenset({"dual-process/EC4"})

@@ -135,8 +135,8 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
-    """Draw a legend of ``columns`` columns, or fewer if the figure is narrow, below all panels; for
-    more than two lines of entries the figure becomes taller."""
+    """Draw a legend of ``columns`` columns, or fewer if the figure is too narrow for these entries,
+    below all panels; for more than two lines of entries the figure becomes taller."""
     widths = [0.45 + 0.06 * len(str(handle.get_label())) for handle in handles]  # inches
     while columns > 1:
         if (

@@ -121,12 +121,12 @@ def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
 @cached
 def limits(study: Study) -> dict[str, Any]:
     """Return facts that limit conclusions from a study's runs, by name: numbers of ``runs`` and of
-    ``failed`` runs with ``reasons``; ``reconstructed`` tasks, and tasks whose best reward is
-    ``unproven``, ``unknown`` or of this folder's ``own`` methods; ``trials`` of the learner (unless
-    as in the paper); ``few``, the fewest runs of the learner on a task, if fewer than the paper's;
-    ``seed``; ``processor`` and ``cores``; True for runs ``side_by_side`` and code that is
-    ``dirty``; ``earlier``, methods as of coartic 4.0.0; ``late``, all :attr:`.Study.marks`;
-    ``imports`` by method. 0, False or empty where a limit does not apply."""
+    ``failed`` runs with ``reasons``; of :func:`.one_by_one` ``reconstructed`` tasks, and tasks
+    whose best reward is ``unproven``, ``unknown`` or of this folder's ``own`` methods; ``trials``
+    of the learner (unless as in the paper); ``few``, the fewest runs of the learner on a task, if
+    fewer than the paper's; ``seed``; ``processor`` and ``cores``; True for runs ``side_by_side``
+    and code that is ``dirty``; ``earlier``, methods as of coartic 4.0.0; ``late``, all
+    :attr:`.Study.marks`; ``imports`` by method. 0, False or empty where a limit does not apply."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
@@ -169,7 +169,8 @@ def limits(study: Study) -> dict[str, Any]:
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
     """Return sentences for below a table with these columns: which best known rewards, to which
-    gaps are taken, are not proven, or known from this folder alone; none without such columns."""
+    gaps are taken, are not proven, or known from this folder alone (:func:`limits`); none without
+    such columns."""
     unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
     notes = []
     if unproven and columns & {"gap", "optimum"}:

@@ -122,8 +122,10 @@ def _plots_of(study: Study, section: Section, width: float | None = None) -> lis
 
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     """Return the values of a section for the template: ``finding``, a list of lines; ``figures``,
-    a plot, its SVG and, of the ranking, its SVG at one column, for phones; ``shown``, for each
-    table with rows its ``id``, ``caption``, ``rows`` and ``settings`` (numbers) and ``html``."""
+    a plot, its SVG and, of the ranking, its SVG at one column, for phones, else an empty text;
+    ``shown``, for each table with rows its ``id``, ``caption``, ``rows`` and ``settings`` (numbers)
+    and ``html``, without settings and ablations (:func:`.is_setting`), except in tables
+    ``ranking``, ``contexts`` and ``methods``."""
     tables = []
     for table in section.tables:
         frame = table(study)

@@ -18,10 +18,11 @@ def player(study: Study) -> str:
     """Return the interactive figure with the runs of a folder as HTML; empty without a preset.
 
     The figure has a preset for each task of :func:`.one_by_one` on which a method that moves
-    straight has a solution, with the run of each such method nearest the median reward. If two
-    tasks share goal 1 (:func:`.shared_goal`), the first preset is this goal, with the standardised
-    posture difference of random search there. The method shown first is the first of
-    :func:`.own_methods` in a preset, or else the method at the shared goal, or the first one.
+    straight has a solution, with the run of each such method nearest the median reward. If goal 1
+    is the :func:`.shared_goal` and such a method solved both tasks, this goal is the first preset,
+    with the standardised posture difference of random search there, if any. The method shown first
+    is the first of :func:`.own_methods` in a preset, or else the method at the shared goal, if it
+    is in the first preset, or the first one there.
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:

@@ -181,7 +181,8 @@ def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
 
 def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence[str] = ()) -> str:
     """Return a table in LaTeX, with booktabs and longtable, in the columns that :data:`IN_LATEX`
-    has for its id; without settings and ablations, except in tables ``contexts`` and ``methods``.
+    has for its id; without settings and ablations (:func:`.is_setting`), except in tables
+    ``contexts`` and ``methods``.
 
     ``notes``, sentences, are below the table, with the meaning of a dagger in table or notes.
     """

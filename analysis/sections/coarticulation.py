@@ -42,8 +42,8 @@ ROUNDING = 1e-9
 
 
 def _shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
-    """Yield the solved runs of a method (label) at each of the first goals that two tasks share,
-    for each hand that hits this goal on both tasks."""
+    """Yield the first 500 solved runs of a method (label) on two tasks at each first goal that the
+    tasks share (:func:`.context_pairs`), for each hand that hits this goal on both tasks."""
     for first, second, shared in context_pairs(one_by_one(study)):
         keys = (first, label), (second, label)
         if study.cells.keys() >= {*keys}:
@@ -127,9 +127,10 @@ def list_signatures(study: Study) -> Rows:
     """Yield rows with the signatures of every method, except searches, on every task of
     :func:`.one_by_one`, and of random search there for methods that select among trials.
 
-    A row for each hand sequence with which at least a tenth of a method's runs end, and a row for
-    the choice of hands (``hands`` empty) on a task for two. Means over runs; p is of the one-tailed
-    exchange test and uncorrected. ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
+    A row for each hand sequence of :func:`.with_control`, which a tenth of the solved runs or more
+    have, and a row for the choice of hands (``hands`` empty) on a task for two with two goals or
+    more. Means over runs; p is of the one-tailed exchange test and uncorrected.
+    ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     for name, label in itertools.product(one_by_one(study), labels):
@@ -160,7 +161,7 @@ def list_signatures(study: Study) -> Rows:
 def verdict_of(
     study: Study, shared: TwoContexts, control: Row | None = None, p: float = math.nan
 ) -> str:
-    """Return a verdict on whether the posture at a shared goal depends on the next goal, such as
+    """Return a verdict on whether the posture at a shared goal depends on later goals, such as
     ``different postures``, ``the same posture`` or ``too few runs``.
 
     Of stochastic methods, the permutation test distinguishes postures, and the bootstrap test that
@@ -213,9 +214,10 @@ def _of_random_search(study: Study, shared: TwoContexts) -> Row:
     "task; method; runs; by_goal_[*]: goal {} .1",
 )
 def list_saved(study: Study) -> Rows:
-    """Yield a row for each task and method with the mean difference of ticks at each goal,
-    ``by_goal_1`` and so on: ticks of the movement less the ticks of the corrective process alone
-    with the same hands. Runs with hands with which this process fails are left out."""
+    """Yield a row for each task of :func:`.one_by_one` and method, except searches, that solved a
+    run, with the mean difference of ticks at each goal, ``by_goal_1`` and so on: ticks of the run
+    less the ticks of the corrective process alone with the same hands. Runs with hands with which
+    this process fails are left out, and so are rows without other runs."""
     for (task, label), runs in study.cells.items():
         if task not in one_by_one(study) or study.methods.is_search[label] or not len(solved(runs)):
             continue
@@ -238,8 +240,8 @@ def list_saved(study: Study) -> Rows:
 def draw_saved(study: Study) -> Parts | None:
     """Draw for each task a row for each of some methods (the learner that explores most, random
     search, the best of each kind that uses the reward, methods from files), the smallest mean gap
-    first. A row has a bar for each goal: mean ticks of the movement less the ticks of the
-    corrective process alone with the same hands. None if there is nothing to draw."""
+    first. A row has a bar for each goal: mean ticks of the runs less the ticks of the corrective
+    process alone with the same hands. None if there is nothing to draw."""
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
     drawn, parts = {*headline_methods(single)}, []
@@ -294,8 +296,8 @@ def draw_saved(study: Study) -> Parts | None:
     "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
-    """Draw the postures of the method of :func:`shared_goal` at a goal before two different next
-    goals, and the postures of random search there; None without a shared goal."""
+    """Draw the postures of the method of :func:`shared_goal` at this goal on both tasks, and the
+    postures of random search, its control, if it has one; None without a shared goal."""
     shared = shared_goal(study)
     if shared is None:
         return None

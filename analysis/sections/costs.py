@@ -40,8 +40,9 @@ PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluati
 
 @cached
 def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
-    """Return for each run that made trials, by run id, the numbers, from 1, of the trials with a
-    higher reward than all trials before, and these rewards, ticks; shape ``(n,)`` each."""
+    """Return for each run with rewards of trials, by run id, the numbers, from 1, of the trials
+    with a higher reward than all trials before, and these rewards, negative ticks; shape ``(n,)``
+    each."""
     by_run = {}
     for run_id, rewards in study.rewards():
         best = np.fmax.accumulate(np.append(-np.inf, rewards))  # without NaN
@@ -60,7 +61,7 @@ def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
 
 @cached
 def spans(study: Study) -> dict[str, tuple[float, int]]:
-    """Return the two rewards between which targets lie, ticks, by name of the task:
+    """Return the two rewards between which targets lie, negative ticks, by name of the task:
     :attr:`.Study.corrective_best`, of the corrective process alone, and the best known reward.
 
     Tasks without one of the two, or with equal ones, are left out.
@@ -77,8 +78,9 @@ def times_of(
     run of a method on a task of :func:`spans` reached each target, shape ``(runs, targets)``.
 
     ``shares`` are the targets, as shares of the distance from the corrective process alone to the
-    optimum. Infinite for a target that the run did not reach; a solved run without a known cost has
-    no row. A run without trials reaches its targets at its end. Forward-kinematics evaluations and
+    optimum. Infinite for a target that no trial of the run reached, and for a failed run; a solved
+    run without a known cost has no row. A run without rewards of trials reaches the targets of its
+    solution at its end. Forward-kinematics evaluations and
     time (:func:`solve_times`) are totals of a run, spread evenly over its trials, though early
     trials took 0.6 to 3.4 times as many evaluations.
     """
@@ -161,8 +163,9 @@ def runtimes(
         A row for each budget at which the share rises: ``method``, ``spend`` (``trials``;
         ``forward_kinematics``, evaluations, and ``solve_s``, seconds, both spread evenly over the
         trials of a run), ``budget``, and ``share``, the share of the pairs of run and target
-        reached within the budget. A method that reaches no target has a single row, with share 0
-        and an infinite budget; a method without a known cost on a task has no row for this cost.
+        reached within the budget. A method that reaches no target has a single row for each cost,
+        with share 0 and an infinite budget; a method without a known cost on a task has no row for
+        this cost.
 
     Raises
     ------

@@ -33,8 +33,8 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
 )
 def list_learning(study: Study) -> Rows:
     """Yield a row for each task of :func:`.one_by_one` and each method, except searches, all of
-    whose runs there have a solution and made 100 trials or more: the best reward, ticks, after each
-    number of trials in :data:`BUDGETS` that all runs made, a mean over runs."""
+    whose runs there have a solution and made 100 trials or more: the best reward, negative ticks,
+    after each number of trials in :data:`BUDGETS` that all runs made, a mean over runs."""
     learned = improvements(study)
     for (task, label), every in study.cells.items():
         runs = [learned[run] for run in every.run_id if run in learned]
@@ -107,10 +107,11 @@ def draw_learning_curves(study: Study) -> Parts | None:
 
 
 def learning_curves(study: Study) -> pd.DataFrame:
-    """Return the best reward so far, ticks, by task, method and number of trials.
+    """Return the best reward so far, negative ticks, by task, method and number of trials.
 
-    For solved runs of the :func:`.headline_methods` among :data:`CURVES` and methods from files;
-    EC1 only on tasks without solved runs of EC2 to EC4. Columns ``task``, ``method`` (label),
+    For solved runs with rewards of trials, on tasks of :func:`.one_by_one`, of the
+    :func:`.headline_methods` among :data:`CURVES` and methods from files; EC1 only on tasks without
+    such runs of EC2 to EC4. Columns ``task``, ``method`` (label),
     ``runs`` (number of runs), ``trial`` (at most 120 numbers, from 1 to the trials of the shortest
     run), ``best`` (mean over runs, NaN until all have a solution), quartiles ``best_low`` and
     ``best_high``; no columns without a curve.

@@ -51,8 +51,9 @@ _EARLY = 1_000
     "least_p: -",
 )
 def list_against_learner(study: Study) -> Rows:
-    """Yield a row for each method, except searches and this learner, and each task: mean rewards,
-    ticks, of the method and of the learner (EC1, with two arms EC4), and p of their difference.
+    """Yield a row for each method, except searches and this learner, and each task of
+    :func:`.one_by_one`: mean rewards, negative ticks, of the method and of the learner (EC1, with
+    two arms EC4), and p of their difference.
 
     Only for tasks on which both solved every run. p is two-sided, of the exchange test, or, for a
     deterministic method, whose reward counts as exact, of the bootstrap test, and is corrected over
@@ -103,7 +104,7 @@ def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
 )
 def list_ranking(study: Study) -> Rows:
     """Yield a row for each method: its gap and share of the gain over tasks, and its gap on each
-    task that is not random; in the order of :func:`.board`, settings after their method.
+    task that is not random; in the order of :func:`_ranked`, settings after their method.
 
     ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
     them, which is not ``ranked``, over the ``tasks`` that it solved. Also the gap after a thousand
@@ -165,8 +166,9 @@ def list_differences(study: Study) -> Rows:
     If :attr:`.Study.against` is empty, the compared method is the first of :func:`.board` where one
     parameter is varied; otherwise each method from a file is compared with the built-in methods
     with the same use of the reward. Methods that lack or failed a run there, and settings and
-    ablations of methods that ran, are left out. Intervals are for other runs on the same tasks; p
-    is two-sided (:func:`.stratified_test`), corrected over the rows of the compared method (Holm).
+    ablations of methods that ran (:attr:`.Study.methods`, ``under``), are left out. Intervals are
+    for other runs on the same tasks; p is two-sided (:func:`.stratified_test`), corrected over the
+    rows of the compared method (Holm).
     """
     methods = study.methods
     chosen = [study.against] if study.against in compared(study) else []
@@ -219,7 +221,8 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
 
 def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
     """Draw the gap against the values of the only parameter that is varied (:attr:`.Study.varied`),
-    or else the gap of every method; None without a gap. ``how``: see :data:`.DrawsFigure`."""
+    or else, also with fewer than two gaps of values, gaps of methods (:func:`.board`); None without
+    a gap. ``how``: see :data:`.DrawsFigure`."""
     plot = _draw_varied(study, **how) or _draw_gaps(study, **how)
     return plot and replace(plot, id="ranking")
 

@@ -52,8 +52,8 @@ def list_tasks(study: Study) -> Rows:
     "hit in the order of their numbers.",
 )
 def draw_tasks(study: Study) -> Parts | None:
-    """Draw start configuration and goals of the tasks of a study, a panel each; None without
-    tasks that are shown one by one."""
+    """Draw start configuration and goals of the tasks of :func:`.one_by_one`, a panel each; None
+    without such tasks."""
     shown = list(one_by_one(study).values())
     if not shown:
         return None

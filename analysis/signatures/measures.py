@@ -101,8 +101,7 @@ def ticks_slower(runs: Solutions) -> Array:
     r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h): the ticks of the
     corrective process with the hand h(i, g) from the configuration at the hit before, less the
     ticks with the fastest hand; more than 0 for a hand that is not the fastest for this goal alone.
-    Infinite if the reach with
-    the chosen hand ends without a hit.
+    Infinite if the reach with the chosen hand ends without a hit.
     """
     goals = 1 + np.arange(len(runs.task.goals))
     alone = np.full((len(HANDS), *runs.hands.shape), np.inf)

@@ -36,8 +36,9 @@ step."""
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     """Return ``(name, name, n)`` for each pair of tasks that differ only after their first goals: n
-    is the number of shared first goals that another goal follows in both tasks. Pairs with n = 0,
-    and with different robots, starts, radii, hands or locked bases, are left out."""
+    is the number of shared first goals that a further goal follows in both tasks. Pairs with n = 0,
+    with equal goals, and with different robots, starts, radii, hands or locked bases are left out.
+    """
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
         others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
@@ -82,7 +83,8 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
 
 @dataclass(frozen=True)
 class TwoContexts:
-    """Runs of a method that hit the same goal with the same hand, before different next goals.
+    """Runs of a method that hit the same goal with the same hand, on tasks with different later
+    goals.
 
     Parameters
     ----------
