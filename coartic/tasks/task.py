@@ -192,15 +192,15 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family, with its version, if the task's name is the name of an instance; else
-        None."""
+        """Name of the family, with its version, if the task's name has the form of an instance's;
+        else None."""
         address = address_of(self.name)
         return address and address.family
 
     @property
     def split(self) -> Split | None:
-        """Split of an instance of a family, by the task's name: ``"development"``, ``"test"`` or
-        ``"fresh"``; None for other tasks."""
+        """Split of an instance of a family, by the form of the task's name: ``"development"``,
+        ``"test"`` or ``"fresh"``; None for names of another form."""
         address = address_of(self.name)
         return address and address.split
 
