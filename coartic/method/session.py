@@ -386,8 +386,8 @@ class Session:
         Ticks and counts are the same as with :meth:`trial`, except that :meth:`trial` spends one or
         two more evaluations of forward kinematics per goal tried. Where the corrective process is
         not declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
-        Raises UndeclaredError without ``Information.REWARD_BY_TRIAL``, BudgetError where no trial
-        is left of several asked for, ValueError for hands or arrays that do not fit.
+        Raises UndeclaredError without ``Information.REWARD_BY_TRIAL``, BudgetError for N > 0
+        where no trial is left, ValueError for hands or arrays that do not fit.
         """
         self._use(Information.REWARD_BY_TRIAL)
         given = check_targets(self._task, targets)
