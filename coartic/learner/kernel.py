@@ -120,7 +120,7 @@ class Results(NamedTuple):
     """First completed trial, from 0, with the highest reward, shape ``(N,)``; -1 if none was
     completed."""
     counts: NDArray[np.int64]
-    """Counts of all trials but the replay, by :data:`coartic.motion.trial.COUNTED`, shape
+    """Counts of all trials without the replay, by :data:`coartic.motion.trial.COUNTED`, shape
     ``(N, 5)``."""
     corrections: NDArray[np.int64]
     """Corrective movements in trial 0 and in each tenth of the rest, shape ``(N, 11)``."""
@@ -150,7 +150,7 @@ class _Workspace(NamedTuple):
 def learner_parameters(
     compiled: CompiledTask, condition: ExplorationCondition, first: Sequence[Movement]
 ) -> LearnerParameters:
-    """Return a task and a condition as arrays for the learner's kernel; ``first`` has the movement
+    """Return a task and a condition as the learner's kernel reads them; ``first`` has the movement
     of trial 0 for each goal; a movement without a target is corrective."""
     task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.full((len(first), width), np.nan)
@@ -227,7 +227,8 @@ def _nearest_posture(
 ) -> int:
     """Return the hand, 0 left or 1 right, with which the corrective process **A** finds the posture
     nearest in joint space for the goal of run ``n``; of equal hands, and if **A** fails with all,
-    the first. Iterations and evaluations are counted; the run does not move."""
+    the first. Iterations and evaluations are counted; the run does not move, but its ``hand`` is
+    changed in place."""
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
     for hand in learner.hands:
@@ -262,7 +263,8 @@ def choose_hand(
 ) -> int:
     """Return the hand (0 left, 1 right) of run ``n`` for its present goal: the hand of highest
     value in ``entries`` (value Q and target posture q* by hand); with ``explore``, with probability
-    ε, the hand that the condition explores, if any (random, closest, or nearest in posture)."""
+    ε, the hand that the condition explores, if any (random, closest, of equally close hands a
+    random one, or nearest in posture)."""
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
         if learner.exploration == _NEAREST_POSTURE:
@@ -307,7 +309,7 @@ def drift(
 ) -> None:
     """Move the mean t of exploration, the run's ``target``, in place, by κ N(t) (p − t), and an
     idle arm that is explored by κ (p − t); p is the preferred posture, N projects onto the null
-    space of the hand's Jacobian. Without a drift κ nothing changes."""
+    space of the hand's Jacobian. Entries not explored do not change, without a drift κ none."""
     if run.drift == 0.0:
         return
     x, y, v = workspace.jacobian

@@ -163,7 +163,7 @@ def learn_many(
     start : sequence of Movement
         Arguments of :func:`learn`, the same for every run.
     jobs : int
-        Number of threads; -1 for one a core.
+        Most threads; -1 for one a core.
 
     Returns
     -------
@@ -175,9 +175,9 @@ def learn_many(
     TaskError, NotApplicableError, CoarticError, SolutionError
         Task, condition or first solution cannot be used, as in :func:`learn`.
     TypeError, ValueError
-        An argument is refused by :func:`learn`, seeds are no list or too many (the rewards of at
-        most 1,000,000 runs and 200,000,000 trials are kept), or ``jobs`` is neither -1 nor from 1
-        to 10,000.
+        An argument is refused by :func:`learn`, seeds are a text, not iterable or too many (the
+        rewards of at most 1,000,000 runs and 200,000,000 trials are kept), or ``jobs`` is neither
+        -1 nor from 1 to 10,000.
     """
     task = as_task(task)
     condition = load_condition(condition)
@@ -296,7 +296,7 @@ def warm_up(task: Task, *parts: Kernels) -> None:
     """Compile the kernels for the number of links of the task's robot, or load their machine code,
     which later runs need not do. ``parts`` names the kernels, by default all three:
     ``"learner"``, ``"motion"`` (single movements and corrections), ``"trials"`` (trials and
-    executions).
+    executions without paths).
     """
     hand, goal = task.hands[0], task.goals[0]
     if not parts or "learner" in parts:

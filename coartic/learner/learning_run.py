@@ -86,7 +86,7 @@ class LearningRun:
     @property
     def learned(self) -> tuple[Movement, ...]:
         """Movements of the learned solution: of the best trial, or, if the condition has
-        ``learned="replay"``, of the replay; empty if this trial did not hit every goal."""
+        ``learned="replay"``, of the replay; empty if no such trial hit every goal."""
         if self.condition.learned == "best":
             return self.solution
         return self.replay

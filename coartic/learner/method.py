@@ -85,8 +85,8 @@ class DualProcess(Method):
     def solve(self, session: Session) -> Result:
         """Run the learner; return the movements of its best trial, or, if the condition has
         ``learned="replay"``, of the replay, the noiseless trial after learning. Raises MethodError
-        if that trial missed a goal, no trial hit every goal, or the budget has no trial left, and
-        NotApplicableError if no initial hands are found."""
+        if no such trial hit every goal, or the budget has no trial left, and NotApplicableError if
+        no initial hands are found."""
         (result,) = self.solve_together([session])
         if isinstance(result, MethodError):
             raise result
@@ -94,7 +94,8 @@ class DualProcess(Method):
 
     def most_together(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`: 72, or
-        fewer if their runs have more than 4,000,000 trials together; at least 1."""
+        fewer if their runs have more than 4,000,000 trials together by parameter ``trials``; at
+        least 1."""
         return runs_at_once(self.parameters.trials)
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:

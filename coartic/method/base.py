@@ -106,14 +106,14 @@ class Method(ABC):
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence on why the method does not apply to a task; None if it applies, which
-        every method does whose class does not override this."""
+        """Return a sentence on why the method does not apply to a task; None if it applies, as
+        every method does unless its class or a base overrides this."""
         return None
 
     @abstractmethod
     def solve(self, session: Session) -> Result:
-        """Find a solution of the session's task; return the movements and details. Raises
-        MethodError if no solution is found."""
+        """Find a solution of the session's task; return the movements, in a :class:`Result`. Raises
+        MethodError if none is found, or NotApplicableError if no initial hands are."""
 
     def most_together(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`; a suite
@@ -154,14 +154,14 @@ def run_method(
 ) -> tuple[Result, Session]:
     """Let a method solve a task, in this process.
 
-    Methods of this project may see the task and count by themselves; any other method gets only the
-    information that it declares. ``task`` is a task, its name or its file; ``seed`` is the seed of
-    the method's random numbers; ``model`` has the constants of movement. There is no budget of
-    trials, and the solution is not executed.
+    Methods of this project may see the task and count by themselves; any other method is refused
+    undeclared information whose use a session sees (:data:`METERED`). ``task`` is a task, its name
+    or its file; ``seed`` is the seed of the method's random numbers; ``model`` has the constants of
+    movement. There is no budget of trials, and the solution is not executed.
 
     Returns the solution with its details, and the session in which it was found, with its counts
     and rewards. Raises MethodError if the method finds no solution, UndeclaredError if it uses
-    information that it does not declare, NotApplicableError if it does not apply to the task,
+    such information, NotApplicableError if it does not apply to the task or finds no initial hands,
     SolutionError if its solution is no sequence, and ValueError for a seed that is no whole number
     from 0 to 2^128 - 1.
     """

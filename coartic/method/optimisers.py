@@ -116,8 +116,9 @@ class Objective:
 
     A point holds, goal by goal, the targets of the entries of a configuration that are explored
     (:func:`explored_joints`), length unit (base) and rad (joints). Its cost is minus the reward of
-    the trial, or ``FAILED`` where the trial fails or takes longer. Goals that a movement misses are
-    corrected, and paid for. A point with an entry beyond 100,000 is a trial that fails.
+    the trial, or ``FAILED`` where the trial fails or takes longer. The corrective process acts at
+    goals that a movement misses, and is paid for. A point with an entry beyond 100,000 is a trial
+    that fails.
 
     Where all entries of a goal are NaN, no movement is made to a target: the corrective process
     acts alone at this goal, which costs nothing if the hand is inside already. A movement to a
@@ -222,8 +223,8 @@ class Objective:
         goals that are hit without a movement. Raises UndeclaredError in a method, as :attr:`task`
         does.
 
-        None where no cost is shipped, as for most tasks of your own, for instances of a family
-        except the first 40 of its test split, and for another model than the paper's.
+        None where no cost is shipped, as for most tasks of your own, for instances of families
+        except the first 40 test instances of shipped ones, and for another model than the paper's.
         """
         known = self._known
         return None if known is None else -known.reward
@@ -246,7 +247,8 @@ class Objective:
 
     @property
     def evaluations(self) -> int:
-        """Number of points evaluated; the first trials are not among them."""
+        """Number of points evaluated. The first trials, by the corrective process alone with each
+        hand sequence tried (one if ``hands`` was given), are not among them."""
         return self._evaluations
 
     @property
@@ -272,16 +274,16 @@ class Objective:
 
     @property
     def history(self) -> pd.DataFrame:
-        """Table of the best costs so far, a row each time the best cost fell. Columns:
-        ``evaluations``, the number made until then, 0 for the corrective process alone, and
-        ``cost``, ticks."""
+        """Table of the best costs so far: a row for the corrective process alone, and a row each
+        time the best cost fell. Columns: ``evaluations``, the number made until then, 0 in the
+        first row, and ``cost``, ticks."""
         import pandas as pd  # which a worker does without
 
         return pd.DataFrame(self._better, columns=["evaluations", "cost"])
 
     def evaluations_to(self, targets: ArrayLike) -> Any:
         """Return the number of evaluations after which the best cost was at or below each of
-        ``targets``, ticks: a float for one target, an array of the same shape for several; infinite
+        ``targets``, ticks: a float for a number, else an array of the same shape; infinite
         for a target not reached so far. Raises ValueError for a target that is not from 0 to
         ``FAILED``."""
         wanted = real_array("targets", targets)
@@ -309,8 +311,8 @@ class Objective:
 
     @property
     def solution(self) -> tuple[Movement, ...]:
-        """The movements of the best trial so far, for :func:`coartic.execute`; at first the
-        movements of the corrective process alone."""
+        """Movements that make the best trial so far in :func:`coartic.execute`, which corrects
+        missed goals; at first corrective movements without targets."""
         return movements_of(self.best_hands, self._best_targets)
 
     def movements(self, x: ArrayLike, hands: str | None = None) -> tuple[Movement, ...]:
@@ -319,9 +321,9 @@ class Objective:
 
         ``x`` is the point, shape ``(dim,)``; ``hands`` is the hand sequence of the trial, by
         default :attr:`hands` of this objective. A movement has a target of all joints (a joint that
-        has no entry in the point keeps its value), or none where the entries of its goal are NaN.
-        Goals that are missed are corrected by ``execute``. Raises UndeclaredError in a method,
-        which can use :attr:`solution`, and ValueError if point or hands do not fit.
+        has no entry in the point keeps its value, or, after a goal missed for good, has its value
+        at the start), or none where the entries of its goal are NaN. Raises UndeclaredError in a
+        method, which can use :attr:`solution`, and ValueError if point or hands do not fit.
         """
         task, point = self.task, _entries_of("x", x)
         if point.shape != (self.dim,):
@@ -385,7 +387,7 @@ class Objective:
         """Make a trial for each of ``points``, shape ``(N, dim)``, side by side; return the costs,
         ticks, shape ``(N,)``.
 
-        Entries are finite, or NaN for all joints of a goal (the corrective process alone); an entry
+        Entries are finite, or all NaN for a goal (the corrective process alone); an entry
         beyond 100,000 makes the trial fail. Joints that have no entry in a point keep still.
         ``hands`` is one hand sequence for all points (``"RRLR"``), or a sequence for each point; by
         default :attr:`hands` of this objective.
@@ -451,7 +453,7 @@ class Objective:
 
     def _check(self, points: Array) -> None:
         """Raise ValueError if points ``(N, dim)`` have an infinite entry, or a goal that has NaN
-        for some of its joints but not for all."""
+        for some of its entries but not for all."""
         if points.min(initial=0.0) >= -LARGEST_ENTRY and points.max(initial=0.0) <= LARGEST_ENTRY:
             return
         missing = (np.isnan(self._targets_of(points)) & self.joints).sum(axis=2)
@@ -472,7 +474,8 @@ class Objective:
 
     def _trials_left(self, wanted: int) -> int:
         """Return how many of ``wanted`` trials the budget allows: ``wanted``, or the number left if
-        that is less. Raises BudgetError if none is left, and CoarticError in another process."""
+        that is less. Raises BudgetError if ``wanted`` is above 0 and none is left, and CoarticError
+        in another process."""
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)
         left = self.trials_left
@@ -519,7 +522,7 @@ def objective(
     TypeError
         The model is no MotionModel, or the task is neither a Task nor a text nor a path.
     MethodError
-        The corrective process completes no sequence, or there are more than 4096 to try.
+        The corrective process completes no sequence tried, or there are more than 4096 to try.
     """
     chosen = as_task(task)
     if budget is not None:
@@ -565,7 +568,7 @@ def problems(
     -------
     list of Objective
         Instances 0, 1, ... of the split; ``best_known`` of the first 40 test instances of shipped
-        families is known.
+        families is known under the paper's model.
 
     Raises
     ------
@@ -609,7 +612,7 @@ class Optimiser(Method):
     def solve(self, session: Session) -> Result:
         """Call :meth:`optimise` until it returns or the trials are used up; return the movements of
         the best trial. Raises MethodError if there is no trial to make, if the corrective process
-        completes no hand sequence, or if no point is evaluated although trials are left;
+        completes no hand sequence tried, or if no point is evaluated although trials are left;
         NotApplicableError if of more than 4096 sequences no initial one is found; ValueError for
         ``hands`` that do not fit."""
         parameters: OptimiserParameters = self.parameters

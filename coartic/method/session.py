@@ -276,8 +276,8 @@ class Session:
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
         """Note a use of the corrective process if a corrective movement of a solution has no
-        target: the corrective process finds the target. Raises UndeclaredError if the method does
-        not declare that process, and SolutionError if the solution is no sequence."""
+        target, for which that process is to look. Raises UndeclaredError if the method does not
+        declare such a use, and SolutionError if the solution is no sequence."""
         if not isinstance(solution, Sequence):
             raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
         for m in solution:
@@ -317,8 +317,8 @@ class Session:
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
         """Run the corrective process from ``q``, ``(dof,)``, with a hand for a goal (from 1); count
-        its iterations, Jacobians and evaluations. Return the configuration found: the last
-        iterate, without an error, if the result is not ``converged``. No movement is made.
+        its iterations, Jacobians and evaluations. Return the configuration found, or, without an
+        error, the last iterate if the result is not ``converged``. No movement is made.
 
         Raises UndeclaredError without ``Information.CORRECTIVE_PROCESS``, and ValueError for a goal
         that the task lacks, and a ``q`` or hand that does not fit the robot."""
@@ -343,7 +343,7 @@ class Session:
         """Make one physical trial of a solution; count the trial, its ticks and its evaluations;
         return the execution.
 
-        Goals that are missed are corrected, and the ticks count. Where the corrective process is
+        The corrective process acts where a goal is missed; its ticks count. Where this process is
         not declared, the execution has the movements as given and no configurations. Raises
         UndeclaredError without ``Information.REWARD_BY_TRIAL``, and without
         ``Information.CORRECTIVE_PROCESS`` for a corrective movement without a target; BudgetError
@@ -376,18 +376,18 @@ class Session:
         ``hands`` is one hand sequence for all (``"RRLR"``), or a sequence each. ``targets`` has
         shape ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
         keeps its value, and for a goal without any target the corrective process acts alone, which
-        has to be declared. Goals that are missed are corrected, and the ticks count. A trial with a
-        target beyond 100,000, which :meth:`trial` refuses, fails without a movement.
+        has to be declared. It acts where a goal is missed, too; its ticks count. A trial with a
+        joint's target beyond 100,000, which :meth:`trial` refuses, fails without a movement.
 
         Where the budget has fewer trials left, the first are made: results have a row for each
         trial made. With ``until``, rewards of shape ``(N,)``, trials end after the first whose
         reward exceeds its entry of ``until``; no later trial is counted or returned.
 
-        Rewards and counts are the same as with :meth:`trial`, except that :meth:`trial` spends one
-        or two more evaluations of forward kinematics per goal. Where the corrective process is not
-        declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
-        Raises UndeclaredError without ``Information.REWARD_BY_TRIAL``, BudgetError where no trial
-        is left, ValueError for hands or arrays that do not fit.
+        Ticks and counts are the same as with :meth:`trial`, except that :meth:`trial` spends one or
+        two more evaluations of forward kinematics per goal tried. Where the corrective process is
+        not declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
+        Raises UndeclaredError without ``Information.REWARD_BY_TRIAL``, BudgetError for N > 0
+        where no trial is left, ValueError for hands or arrays that do not fit.
         """
         self._use(Information.REWARD_BY_TRIAL)
         given = check_targets(self._task, targets)
@@ -433,9 +433,9 @@ class Session:
         return hand_codes(self._task, hands, count)
 
     def _make_trials(self, codes: Hands, targets: Configs, until: Array | None = None) -> Accounts:
-        """Make and count N trials (:meth:`trials`) with hands 0 (left) or 1 (right), ``(N, G)``;
-        return their accounts. The caller checks arguments and budget, and holds ``lock``;
-        ``until`` may be longer."""
+        """Make and count N trials, or fewer by ``until`` (:meth:`trials`), which may be longer,
+        with hands 0 (left) or 1 (right), ``(N, G)``; return their accounts. The caller checks
+        arguments and budget, and holds ``lock``."""
         accounts = make_trials(self._compiled, codes, targets[:, :, None], outside=not self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > until[: len(targets)]
@@ -452,9 +452,9 @@ class Session:
         one hand (``"best-single-hand"``) or all (``"best-of-all"``).
 
         Trials of this search are counted as ``initial_trials``, not among the method's trials or in
-        its budget. Raises NotApplicableError if no such sequence completes the task, or there are
-        more than 4096; UndeclaredError without ``Information.CORRECTIVE_PROCESS`` and
-        ``REWARD_BY_TRIAL``.
+        its budget. Raises NotApplicableError if a policy finds no such sequence that completes the
+        task, or has more than 4096 to try; UndeclaredError unless
+        ``Information.CORRECTIVE_PROCESS`` and ``REWARD_BY_TRIAL`` are both declared.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
         chosen, spent = search_initial_hands(
@@ -472,8 +472,9 @@ class Session:
         corrections: int,
         failed: int,
     ) -> None:
-        """Add trials with these rewards (:data:`NO_REWARD` where a trial failed), and their sums of
-        ticks, evaluations, iterations, corrections and failures, to the meter."""
+        """Add trials with these rewards (:data:`NO_REWARD` where a trial failed) to
+        :attr:`rewards`, and to the meter their number and their sums of ticks, evaluations,
+        iterations, corrections and failures; an iteration is a Jacobian, too."""
         before, meter = len(self._rewards), self._meter
         self._rewards.frombytes(rewards.tobytes())
         meter.trials += len(self._rewards) - before
@@ -503,7 +504,8 @@ class Session:
 
     @property
     def rewards(self) -> list[int | None]:
-        """Total reward of each trial made, in order, a new list; None where a trial failed."""
+        """Total reward of each trial made, without trials of the search for the initial hands, in
+        order, a new list; None where a trial failed."""
         return [None if reward == NO_REWARD else reward for reward in self._rewards]
 
     # Counts that the method adds itself.
@@ -543,8 +545,8 @@ class Session:
     # The back door of this project's compiled methods.
 
     def reveal(self, *information: Information) -> Task:
-        """Return the task itself, for compiled methods of this project that count by themselves,
-        with :meth:`spend`. Note ``information``, at least one item, as used. Raises UndeclaredError
+        """Return the task itself, for methods of this project that count by themselves, with
+        :meth:`spend`. Note ``information``, at least one item, as used. Raises UndeclaredError
         for any other method, without an item, and for an item that the method does not declare.
         """
         self._needs_trust("reveal")

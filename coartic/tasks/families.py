@@ -220,10 +220,10 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
 
 
 def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list[tuple[int, int]]:
-    """Draw ``count`` goals and return their x and y, thousandths of a length unit: in a box within
-    the region, or, if the family has a line, on a line (``vertical`` or horizontal) except, if
-    there are more than two, one goal, neither first nor last, that is off it. Goals on a line may
-    be outside the region."""
+    """Draw ``count`` goals and return their x and y, thousandths of a length unit: in a box with a
+    drawn share of the region's sides, or, if the family has a line, on a line (``vertical`` or
+    horizontal) except, if there are more than two, one goal, neither first nor last, which ``off``
+    of the line moves off it. Goals on a line may be outside the region."""
     region, line = family.region, family.line
     share, sides = draws.integer(*region.scale), []
     for low, high in (region.x, region.y):
@@ -251,11 +251,11 @@ def broken_rule(family: Family, task: Task) -> str | None:
     None if it breaks no rule.
 
     ``outside``: a goal is outside the region. ``overlap``: two goals are too near to each other.
-    ``reach``: a goal is too far from a shoulder, with the base of the draft or of a
-    restriction. ``straight``: an arm is straight at the start, or nearly. ``start-hit``: a hand is
-    in a goal at the start, or close by. ``corrective``: the corrective process alone does not
-    complete the task, with the base of the draft or of a restriction, or has more than 4096 hand
-    sequences to try.
+    With hands of the family, ``reach``: a goal is too far from a shoulder, with the base of the
+    draft or of a restriction; ``straight``: an arm is straight at the start, or nearly;
+    ``start-hit``: a hand is in a goal at the start, or close by; ``corrective``: the corrective
+    process alone does not complete the task, with the base of the draft or of a restriction, or has
+    more than 4096 hand sequences to try.
     """
     goals = [(_in_thousandths(x), _in_thousandths(y)) for x, y in task.goals]
     (left, right), (low, high) = family.region.x, family.region.y
@@ -356,7 +356,7 @@ def is_file(family: str) -> bool:
 
 def named_by(text: str) -> list[str]:
     """List the names of the instances of a range such as ``two-armed/v1/i000..i039``, both ends
-    included; for a text that is no range, such as a task's name or a path, list this text alone,
+    included; for a text that is no range, such as a task's name or its file, list this text alone,
     unchecked. Raises TaskError for a range that is malformed, goes backwards or has more than
     10,000 instances. Whether a shipped family exists is not checked."""
     if "/" not in text or ".." not in text.rpartition("/")[2] or text.endswith(".toml"):

@@ -57,7 +57,7 @@ def essence(task: Task) -> str:
 def best_shipped(task: Task) -> KnownOptimum | None:
     """Return the best reward known of a task, and its bound, from the shipped files; the task is
     recognised by :func:`essence`, whatever its name. Return None for a task that is not there, such
-    as instances of a family except the first 40 of its test split."""
+    as instances of a shipped family except the first 40 of its test split."""
     return _by_essence().get(essence(task))
 
 
@@ -81,13 +81,13 @@ def entries() -> list[dict[str, Any]]:
     """Read ``optima.json``; return a new list with a dictionary for each task of the paper and each
     restriction (base and other arm); a task that locks y itself has none for ``y``.
 
-    Keys: ``task``, ``essence`` (:func:`essence`), ``base`` (coordinates that are locked: ``y``,
-    ``xy``, or ``task``, as the task locks them), ``other_arm`` (the idle arm: ``free`` or
-    ``still``), ``run_ids`` and ``made_by``; then ``reward``, ``hands``, ``bound`` (reward that no
-    solution exceeds), ``searches`` (best reward of each search, by its id), ``solution`` (a list
-    ``[goal, hand, kind, target, waypoints]`` for each movement) and, in one entry, ``nodes``
-    (number of nodes of the search that proved the bound); or instead ``infeasible``, the reason why
-    no search has a solution.
+    Keys: ``task``, ``essence`` (:func:`essence`, without the restriction), ``base`` (coordinates
+    that are locked: ``y``, ``xy``, or ``task``, as the task locks them), ``other_arm`` (the idle
+    arm: ``free`` or ``still``), ``run_ids`` and ``made_by`` (versions, and the date); then
+    ``reward``, ``hands``, ``bound`` (reward that no solution exceeds), ``searches`` (best reward of
+    each search, by its id at the time), ``solution`` (a list ``[goal, hand, kind, target,
+    waypoints]`` for each movement) and, in one entry, ``nodes`` (number of nodes of the search that
+    proved the bound); or instead ``infeasible``, the reason why no search has a solution.
     """
     content: dict[str, list[dict[str, Any]]] = json.loads(DATA.read_text(encoding="utf-8"))
     return content["optima"]

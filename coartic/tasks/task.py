@@ -192,15 +192,15 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family, with its version, if the task's name is the name of an instance; else
-        None."""
+        """Name of the family, with its version, if the task's name has the form of an instance's;
+        else None."""
         address = address_of(self.name)
         return address and address.family
 
     @property
     def split(self) -> Split | None:
-        """Split of an instance of a family, by the task's name: ``"development"``, ``"test"`` or
-        ``"fresh"``; None for other tasks."""
+        """Split of an instance of a family, by the form of the task's name: ``"development"``,
+        ``"test"`` or ``"fresh"``; None for names of another form."""
         address = address_of(self.name)
         return address and address.split
 
@@ -429,7 +429,8 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
 
 
 def _all_keys() -> list[str]:
-    """Return the names of all keys that a task file may have, in any of its tables."""
+    """Return the names of the keys of a task file in all its tables, without ``q0``, which can
+    stand for ``start``."""
     robot = [field.name for field in fields(Robot)]
     others = (*Start.model_fields, *robot, *Provenance.model_fields)
     return [*Task.model_fields, *others]
@@ -454,7 +455,7 @@ def task_text(task: Task) -> str:
 
 def _toml_value(value: Any) -> str:
     """Return a string of printable characters, a number, or a list or dictionary of these as TOML
-    text: a string as JSON writes it, a dictionary as an inline table."""
+    text: a string as JSON writes it, a dictionary as an inline table, with keys written bare."""
     if isinstance(value, dict):
         return (
             "{ " + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + " }"
