@@ -3,8 +3,8 @@
 N. Hansen (2016), The CMA evolution strategy: a tutorial (arXiv 1604.00772), whose equations have
 their numbers in brackets here; with negative weights. Constants, stopping criteria and the order of
 operations come from the package ``cma`` 4.5 with its defaults, so that the points are the same to
-the last bit, except in generations of less than six points, as in one dimension, of which the
-package mirrors some. Where the package begins to rescale the coordinates, at variances 1e8 apart or
+the last bit, except in generations of less than six points, as in one dimension: the package
+mirrors some of them. Where the package begins to rescale the coordinates, at variances 1e8 apart or
 a condition number of 1e12, this strategy ends. Weights are added from left to right, as the package
 does up to Python 3.11; later versions round ``sum`` otherwise.
 """

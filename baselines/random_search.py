@@ -138,9 +138,9 @@ class RandomSearchHands(Method):
         return runs_at_once(self.parameters.trials)
 
     def solve(self, session: Session) -> Result:
-        """Give one hand sequence after the other an equal share of the trials, to a trial, of which
-        only the first is made if the corrective process fails there; return the movements of the
-        best trial. Raises MethodError if that process completes no hand sequence that has a trial.
+        """Give one hand sequence after the other an equal share of the trials, to a trial; if the
+        corrective process fails there, only the first is made. Return the movements of the best
+        trial. Raises MethodError if that process completes no hand sequence that has a trial.
         """
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left

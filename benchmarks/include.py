@@ -42,8 +42,8 @@ def include_folders(
     ``plan`` has one job at least; folder ``shipped`` stands for the shipped results. The joined
     plan has the cells of ``plan`` and, on ``tasks`` (None: on all), cells with a run 0 of the
     folders. Missing runs are left to :func:`.perform`. A warning names a folder whose plan has, on
-    ``tasks``, runs that the joined plan lacks, or another stochastic cell of which the joined plan
-    has fewer runs than ``plan`` asks for of its own.
+    ``tasks``, runs that the joined plan lacks, or another stochastic cell with fewer runs in the
+    joined plan than ``plan`` asks for of its own.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
     at 0, if the folders do not go together, if a folder does not pass the checks of ``coartic
@@ -131,8 +131,8 @@ def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
     """Warn of a source whose plan has runs that the joined plan lacks, and of one with a complete
-    cell of a stochastic method, not in ``asked``, of which the joined plan has fewer runs than the
-    largest number in ``asked``. ``asked``: numbers of runs asked for, by digest of the cell;
+    cell of a stochastic method, not in ``asked``, if the joined plan has fewer runs of the cell
+    than the largest number in ``asked``. ``asked``: numbers of runs asked for, by digest of the cell;
     ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():

@@ -271,7 +271,7 @@ class Session:
 
     @property
     def used(self) -> frozenset[Information]:
-        """Set of the declared information of which the session has seen a use so far."""
+        """Set of the declared information that the session has seen used so far."""
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:

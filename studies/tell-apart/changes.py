@@ -28,7 +28,7 @@ def learned(task, seed, start):
 
 
 def informed_next(before, task, done, g, movements):
-    """Return ``movements``, of which ``done`` is the execution before the change, with the posture
+    """Return ``movements`` (``done``: their execution before the change), with the posture
     at goal ``g`` (from 0) corrected for the goal after it, which the change from task ``before`` to
     ``task`` has moved. The corrective process finds from the posture how the robot would hit the
     next goal, before and after the change. Half of the difference is added to the posture, which
