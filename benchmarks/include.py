@@ -132,8 +132,8 @@ def _warn_of_gaps(
 ) -> None:
     """Warn of a source whose plan has runs that the joined plan lacks, and of one with a complete
     cell of a stochastic method, not in ``asked``, if the joined plan has fewer runs of the cell
-    than the largest number in ``asked``. ``asked``: numbers of runs asked for, by digest of the cell;
-    ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
+    than the largest number in ``asked``. ``asked``: numbers of runs asked for, by digest of the
+    cell; ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
