@@ -737,7 +737,7 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
     if len({arm.stop - arm.start for arm in arms}) < len(arms):
         order = [0, 1, *column[arms[1]], *column[arms[0]]]
         tried.append(("in which the columns of the arms are swapped", q[:, order]))
-    swapped, other = "in which hands are swapped", hands.map({"left": "right", "right": "left"})
+    swapped, other = "in which hands are swapped", {"left": "right", "right": "left"}
     tried += [(swapped, q)] * (len(arms) == 2)
     goals, fits = task.goal_array[frame.goal.to_numpy(np.int64) - 1], {}
     off = np.linalg.norm(_hand_places(q, hands, task) - goals, axis=1) / task.radius
@@ -750,8 +750,8 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
             continue
         shares = []
         for words, postures in tried:
-            made_by = other if words == swapped else hands
-            ways = _hand_places(postures[rows], made_by.iloc[rows], task) - goals[rows]
+            made_by = other[hand] if words == swapped else hand
+            ways = task.robot.forward_kinematics(postures[rows], made_by) - goals[rows]
             shares.append((np.linalg.norm(ways, axis=1) <= most).mean())
         if max(shares) > 0.8:
             fits[hand] = tried[int(np.argmax(shares))][0]
@@ -834,16 +834,20 @@ def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> N
             warn(f"{source}: {name} has {len(angles)} values, {least:.2g} rad apart or more: is it "
                  "rounded?")  # fmt: skip
             return
-    numbers = pd.Series(hits.groupby([*joints]).ngroup(), name="the posture")
-    for values in (numbers, *(hits[name] for name in joints)):
-        for goal, of_goal in values.groupby(hits.goal):
-            n = len(of_goal)
-            most, second = [*of_goal.value_counts().tolist(), 0][:2]
-            fewest = 3 if values is numbers else max(5, 0.1 * n)
+    goals = hits.goal.to_numpy()
+    compared = hits[[*joints]].assign(posture=hits.groupby([*joints]).ngroup())
+    for name in ("posture", *joints):
+        values = compared[name].to_numpy()
+        for goal in np.unique(goals):
+            counts = np.sort(np.unique(values[goals == goal], return_counts=True)[1])
+            second, most = [0, *counts.tolist()][-2:]
+            n = int(counts.sum())
+            fewest = 3 if name == "posture" else max(5, 0.1 * n)
             is_odd = most >= max(fewest, 3 * second) and n - most >= 4 and postures >= MANY
-            is_odd &= 2 * (of_goal.nunique() - 1) > n - most
+            is_odd &= 2 * (len(counts) - 1) > n - most
             if is_odd or most == n >= 5:
-                warn(f"{source}: {values.name} is the same in {most} of {n} hits of goal {goal:g}: "
+                what = "the posture" if name == "posture" else name
+                warn(f"{source}: {what} is the same in {most} of {n} hits of goal {goal:g}: "
                      "is it filled in, computed, out of range, or stuck?")  # fmt: skip
                 return
 

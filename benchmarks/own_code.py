@@ -80,7 +80,7 @@ def libraries() -> dict[str, str]:
     names, such as ``yaml``, this process has loaded modules (:func:`_is_installed`)."""
     tops = {name.partition(".")[0] for name, path in _loaded().items() if _is_installed(path)}
     names = sorted({name for top in tops for name in _distributions().get(top, ())})
-    return {name: metadata.version(name) for name in names}
+    return {name: _version(name) for name in names}
 
 
 def content_of(path: str) -> bytes:
@@ -118,15 +118,30 @@ def _between(lines: list[bytes], start: tuple[int, int], end: tuple[int, int]) -
 def _loaded() -> dict[str, str]:
     """Return, by name, the absolute path of the file of each loaded module that has a file, except
     this project's modules."""
-    files = {
-        name: os.path.abspath(path)
+    return {
+        name: outside
         for name, module in [*sys.modules.items()]
         if isinstance(path := getattr(module, "__file__", None), str)
+        and (outside := _outside(path))
     }
+
+
+@cache
+def _outside(path: str) -> str:
+    """Return the absolute path of a file, or an empty text for a file of this project."""
+    absolute = os.path.abspath(path)
+    return "" if absolute.startswith(_our_folders()) else absolute
+
+
+@cache
+def _our_folders() -> tuple[str, ...]:
+    """Return the folders of this project, each with a separator at its end."""
     folders = [PACKAGE, *(PACKAGE / name for name in OUR_PACKAGES)]  # within it, or linked there
     ours = (each(folder) for folder in folders for each in (os.path.abspath, os.path.realpath))
-    inside = tuple(f"{folder}{os.sep}" for folder in ours)
-    return {name: path for name, path in files.items() if not path.startswith(inside)}
+    return tuple(f"{folder}{os.sep}" for folder in ours)
+
+
+_version = cache(metadata.version)
 
 
 @cache
@@ -187,10 +202,15 @@ def _packages(imported: Iterable[str]) -> list[str]:
     """Return a line with name and version for each installed package that has the first part of one
     of the ``imported`` names, except packages that this project needs."""
     tops = {name.partition(".")[0] for name in imported} - OUR_PACKAGES - sys.stdlib_module_names
-    needs = [each for each in metadata.requires("coartic") or () if "extra ==" not in each]
-    ours = {_plain_name(re.split(r"[^\w.-]", each)[0]) for each in needs}
     names = {name for top in tops for name in _distributions().get(top, ())}
-    return sorted(f"{n} {metadata.version(n)}" for n in names if _plain_name(n) not in ours)
+    return sorted(f"{n} {_version(n)}" for n in names if _plain_name(n) not in _needed())
+
+
+@cache
+def _needed() -> set[str]:
+    """Return the names of the packages that this project itself needs."""
+    needs = [each for each in metadata.requires("coartic") or () if "extra ==" not in each]
+    return {_plain_name(re.split(r"[^\w.-]", each)[0]) for each in needs}
 
 
 def _plain_name(name: str) -> str:

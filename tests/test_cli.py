@@ -126,20 +126,8 @@ def test_no_command_is_silent_for_long(coartic, tmp_path, monkeypatch):
     monkeypatch.setattr(Display, "EVERY_S", 0.05)
     own = tmp_path / "slow.py", tmp_path / "out"
     own[0].write_text(SLOW, encoding="utf-8")
-    task = "--tasks", "ascending"
-    shown = coartic(
-        "run",
-        "quick",
-        *task,
-        "--method-file",
-        own[0],
-        "--methods",
-        "slow",
-        "--runs",
-        1,
-        "--out",
-        own[1],
-    )[2]
+    asked = ("--tasks", "ascending", "--methods", "slow", "--runs", 1, "--out", own[1])
+    shown = coartic("run", "quick", *asked, "--method-file", own[0])[2]
     assert re.search(r"Runs: 0/1 \(\d+ s so far\)\n", shown)
     assert re.search(r"Runs: 1/1  2 runs again, to see whether results repeat.*\n", shown)
     assert re.search(r"Runs: 1/1  1 run again, .*so far\)\n", shown)
@@ -544,21 +532,21 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
                 assert {f"{command} {each}" for each in option.opts} & tried, option.opts
 
 
-@pytest.mark.process
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is full")
-def test_a_full_device_behind_a_stream_ends_no_run(tmp_path):
+def test_a_full_device_behind_a_stream_ends_no_run(coartic, tmp_path, monkeypatch):
     """What is printed on it is lost; of the standard output a sentence says so."""
-    command = [sys.executable, "-m", "coartic", *map(str, SMALL), "--runs", "3", "--out"]
     for stream, code in (("stderr", 0), ("stdout", 2)):
         out = tmp_path / stream
-        with open("/dev/full", "w") as full:
-            streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, stream: full}
-            done = subprocess.run([*command, out], text=True, cwd=ROOT, **streams)
-        assert done.returncode == code, done
+        with (
+            open("/dev/full", "w") as full,
+            monkeypatch.context() as patch,
+        ):  # closed, it is written
+            patch.setattr(sys, stream, full)
+            ended, _, error = coartic(*SMALL, "--out", out)
+        assert ended == code
         assert (load(out).runs.status == "ok").all()
-        if stream == "stdout":
-            assert "Error: the standard output cannot be written: No space left" in done.stderr
-            assert "Traceback" not in done.stderr
+    assert "Error: the standard output cannot be written: No space left" in error
 
 
 def test_two_reports_of_a_folder_are_written_one_after_the_other(tmp_path, traced):

@@ -47,22 +47,22 @@ def library(tmp_path, monkeypatch):
     return folder / "mylib.py"
 
 
+COUNTS = {
+    "from coartic.baselines.cma_es import CMAES": ["cma-es/bandit"],
+    "import coartic.baselines.cma_es": ["cma-es/bandit"],
+    "import coartic as c\nlearn = c.learn": ["dual-process/EC1"],
+    "from coartic import learn": ["dual-process/EC1"],
+    "from coartic.baselines.trajectory_problem import Instance": ["cma-es/bandit"],
+    "from coartic import load_task": [],
+}
+
+
 @pytest.mark.process
-@pytest.mark.parametrize(
-    ("imports", "counts"),
-    [
-        ("from coartic.baselines.cma_es import CMAES", {"cma-es/bandit"}),
-        ("import coartic.baselines.cma_es", {"cma-es/bandit"}),
-        ("import coartic as c\nlearn = c.learn", {"dual-process/EC1"}),
-        ("from coartic import learn", {"dual-process/EC1"}),
-        ("from coartic.baselines.trajectory_problem import Instance", {"cma-es/bandit"}),
-        ("from coartic import load_task", set()),
-    ],
-)
-def test_versions_of_what_is_built_in_count(imports, counts, tmp_path):
+def test_versions_of_what_is_built_in_count(tmp_path):
     """Where a file imports a method, in whatever way; of a helper of methods, all versions do."""
-    file = written(tmp_path, imports=imports)
-    assert python("-c", RAISE, str(file)).stdout.split() == sorted(counts)
+    files = [written(tmp_path, f"{n}.py", imports) for n, imports in enumerate(COUNTS)]
+    lines = python("-c", RAISE, *map(str, files)).stdout.splitlines()
+    assert dict(zip(COUNTS, map(str.split, lines), strict=True)) == COUNTS
 
 
 RAISE = """
@@ -71,14 +71,15 @@ from pathlib import Path
 from coartic.benchmarks.own_code import code_of
 from coartic.benchmarks.registry import built_in
 
-file, infos = Path(sys.argv[1]), built_in()
+infos = built_in()
 method = infos["hill-climbing"].load()
-before = code_of(method, file)
-for name in ("cma-es/bandit", "dual-process/EC1"):
-    infos[name].load().version, kept = 9, infos[name].load().version
-    if code_of(method, file) != before:
-        print(name)
-    infos[name].load().version = kept
+for file in map(Path, sys.argv[1:]):
+    before = code_of(method, file)
+    for name in ("cma-es/bandit", "dual-process/EC1"):
+        infos[name].load().version, kept = 9, infos[name].load().version
+        print(name if code_of(method, file) != before else "", end=" ")
+        infos[name].load().version = kept
+    print()
 """
 
 
@@ -87,7 +88,7 @@ def test_a_changed_library_makes_runs_again(coartic, tmp_path, library):
     """Also of an editable install, which lies outside of the installed packages."""
     path = written(tmp_path, imports="import mylib", step="mylib.STEP")
     command = ("run", "paper", "--tasks", "ascending", "--trials", 50, "--methods", "mine",
-               "--method-file", path, "--out", tmp_path / "out")  # fmt: skip
+               "--method-file", path, "--jobs", 1, "--out", tmp_path / "out")  # fmt: skip
     assert coartic(*command, "--runs", 2)[0] == 0
     before = load(tmp_path / "out").runs
     assert load(tmp_path / "out").imports == {}  # an editable install counts as files of the user
@@ -109,7 +110,8 @@ def test_a_file_that_is_loaded_late_is_named(place, coartic, tmp_path, library):
     module = library.stem
     path = written(tmp_path, first=f"import {module} as late", step="late.STEP")
     command = ("run", "paper", "--tasks", "ascending", "--trials", 50, "--methods", "mine",
-               "--method-file", path, "--out", tmp_path / "out", "--runs", 2)  # fmt: skip
+               "--method-file", path, "--jobs", 1, "--out", tmp_path / "out",
+               "--runs", 2)  # fmt: skip
     code, text, error = coartic(*command)
     assert (code, "reused" in text) == (0, False), error
     assert error.count(f"mine: {module}.py was first loaded during a run") == 1

@@ -20,7 +20,7 @@ from tests.support.strategies import changed, metres_task
 pytestmark = pytest.mark.browser
 
 
-TRIALS = 100  # of 10,000 that the page makes, as tests see the same in fewer
+TRIALS = 60  # of 10,000 that the page makes, as tests see the same in fewer
 
 
 @pytest.fixture(scope="module")

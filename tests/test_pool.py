@@ -13,6 +13,7 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
+from coartic.benchmarks import pool
 from coartic.benchmarks.pool import Local, Workers, signal_name
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
@@ -166,7 +167,9 @@ def study(tmp_path_factory):
         cells = [cell_on(TASK, does, what=name) for name in HANDLED]
         cells += [cell_on(TASK, again), cell_on(TASK, KNOWN["corrective-alone/given"])]
         options = {"runs": 1, "time_limit_s": 0.5, "trial_budget": 3}
-        run_and_write(folder / "out", cells, executor=Local(2, timeout_s=600.0), **options)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(pool, "_SPINS_S", 0.5)
+            run_and_write(folder / "out", cells, executor=Local(2, timeout_s=600.0), **options)
 
     return load(made_once(tmp_path_factory, "pool", make) / "out")
 

@@ -26,10 +26,9 @@ def one_by_one(name, seed, trials, ends, keep="postures", idle_arm=True):
     made = [session.trials(hands, np.full((1, *explored.shape), np.nan))]
     centre = made[0].reached[0]
     while len(made) < trials:
-        rewards = [trial.rewards[0] for trial in made]
-        best = int(np.argmax(rewards))
-        if len(made) in ends and best > 0:
-            centre = (made[best].reached if keep == "postures" else made[best].targets)[0]
+        if len(made) in ends:
+            best = made[int(np.argmax([trial.rewards[0] for trial in made]))]
+            centre = (best.reached if keep == "postures" or best is made[0] else best.targets)[0]
         targets = np.full((1, *explored.shape), np.nan)
         noise = session.rng.normal(0.0, 0.05, explored.sum())
         targets[0, explored] = centre[explored] + noise
@@ -42,7 +41,7 @@ ENDS = {
     (40, 4): [10, 20, 30],
     (40, 7): [5, 11, 17, 22, 28, 34],  # 40 k / 7, rounded down
     (13, 13): range(1, 13),  # a hill climber: the centre is the best trial so far
-    (1_030, 2): [515],
+    (1_030, 2): [515],  # more than are made at once
 }
 
 
@@ -54,7 +53,7 @@ ENDS = {
             for each in itertools.product(HANDS, ["postures", "targets"], [True, False])
         ),
         *(("two-armed-1", "postures", True, *each) for each in ENDS),
-        *(("descending", "targets", True, *each) for each in ENDS),
+        *(("descending", "targets", True, *each) for each in ENDS if each[0] < 1_000),
     ],
 )
 def test_trials_in_stages_are_those_made_one_by_one(task, keep, idle_arm, trials, stages):

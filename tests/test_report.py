@@ -181,13 +181,14 @@ def test_a_report_of_one_run_without_a_learner_stays_with_its_results(traced, tm
     write_report(one, tmp_path / "report", for_paper=False)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
     """The suite of the page on own suites: heading, question, answer, all rows, and the figure."""
     page = (ROOT / "docs" / "howto" / "task.md").read_text("utf-8")
     (text,) = re.findall(r"```toml\n# noise.toml\n(.*?)```", page, re.DOTALL)
     suite, out = tmp_path / "noise.toml", tmp_path / "noise"
     suite.write_text(text.replace("runs = 10", "runs = 4").replace("5000", "200"))
-    assert coartic("run", suite, "--out", out, "--jobs", 2)[0] == 0
+    assert coartic("run", suite, "--out", out)[0] == 0
     _, printed, _ = coartic("run", suite, "--out", out)  # the runs are there
     seen = load(out)
     means = seen.runs.groupby(["noise_sd", "task"]).gap.mean().groupby("noise_sd").mean()

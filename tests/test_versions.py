@@ -137,32 +137,34 @@ ELSEWHERE = {"dual-process/EC1-uncorrected", "dual-process/EC4-uncorrected", "du
 """Methods without a shipped run; tests/test_short_runs.py has a run of each."""
 
 
-@pytest.mark.process
-def test_a_shipped_run_of_each_built_in_method_comes_back():
+@pytest.fixture(scope="module")
+def runs():
+    return check_shipped.shipped_runs()
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_a_shipped_run_of_each_built_in_method_comes_back(runs):
     """To the tick and the hand: this, not the text of the code, is what makes the numbers safe."""
-    runs = check_shipped.shipped_runs()
     assert {*runs.method} | ELSEWHERE == {*built_in()}
     rows = runs[runs.is_current & ~runs.method.isin(SLOW)].groupby("method", sort=False).head(1)
     assert len(rows) >= 0.75 * runs.method.nunique()
     assert list(check_shipped.differences(rows)) == []
 
 
-def test_a_shipped_run_that_does_not_come_back_is_named(monkeypatch):
+def test_a_shipped_run_that_does_not_come_back_is_named(runs, monkeypatch):
     def another(runs, registered):
         for run in runs:
             score = run.solution._replace(reward=run.solution.reward - 1)
             yield run, type(run)(run.job, run.outcome, run.scores | {"solution": score}, run.date)
 
     monkeypatch.setattr(check_shipped, "perform_runs_again", another)
-    runs = check_shipped.shipped_runs()
     (sentence,) = check_shipped.differences(runs[runs.method == "dual-process/EC1"].head(1))
     assert "dual-process/EC1 on" in sentence
     assert "raise the version of the method" in sentence
 
 
-def test_what_is_checked_before_a_release():
+def test_what_is_checked_before_a_release(runs):
     """A run of each cell of the comparison, and of each method on each family."""
-    runs = check_shipped.shipped_runs()
     rows, every = check_shipped.chosen(runs), check_shipped.chosen(runs, every=True)
     assert len(every) == len(runs.groupby(check_shipped.CELL))
     assert (every.suite == "comparison").sum() == (rows.suite == "comparison").sum()
@@ -174,8 +176,8 @@ def test_what_is_checked_before_a_release():
 def test_workers_round_alike_whatever_the_environment_says(coartic, tmp_path, monkeypatch):
     def made(folder):
         code, _, error = coartic(
-            "run", "comparison", "--tasks", "descending", "--trials", 100, "--runs", 2, "--out",
-            tmp_path / folder, "--methods",
+            "run", "comparison", "--tasks", "descending", "--trials", 100, "--runs", 2, "--jobs", 1,
+            "--out", tmp_path / folder, "--methods",
             "cma-es/bandit,posture-qp/current-goal,trajectory-optimisation/path-length",
         )  # fmt: skip
         assert code == 0, error
