@@ -25,7 +25,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, foreign_file
 from coartic.model import PAPER
 from coartic.motion.movement import LARGEST_ENTRY
-from coartic.robot import Array
+from coartic.robot import Array, Hand
 
 Implausible = Literal["refuse", "drop"]
 """Treatment of hits that the person cannot have made."""
@@ -737,7 +737,8 @@ def _remedy(frame: pd.DataFrame, far: NDArray[np.bool_], task: Task) -> str:
     if len({arm.stop - arm.start for arm in arms}) < len(arms):
         order = [0, 1, *column[arms[1]], *column[arms[0]]]
         tried.append(("in which the columns of the arms are swapped", q[:, order]))
-    swapped, other = "in which hands are swapped", {"left": "right", "right": "left"}
+    swapped = "in which hands are swapped"
+    other: dict[Hand, Hand] = {"left": "right", "right": "left"}
     tried += [(swapped, q)] * (len(arms) == 2)
     goals, fits = task.goal_array[frame.goal.to_numpy(np.int64) - 1], {}
     off = np.linalg.norm(_hand_places(q, hands, task) - goals, axis=1) / task.radius
