@@ -243,7 +243,8 @@ class Study:
 
     @property
     def question(self) -> tuple[str, str]:
-        """Title and description of a suite of the user's own, run on its own tasks; else empty."""
+        """Title and description of a suite of the user's own, run on its own tasks; else two empty
+        texts."""
         title, description = self.made_with.get("question", ("", ""))
         return title, description
 
@@ -516,12 +517,13 @@ class Study:
 
     @cached
     def signature_by_hands(self, name: str, task: str, method: str) -> dict[str, Array]:
-        """Return a signature of a method's runs on a task by hand sequence, in alphabetical order.
+        """Return a signature, a number for each run, of a method's runs on a task, by their hand
+        sequence in alphabetical order.
 
-        Arrays have shape ``(n,)``, of the first 500 solved runs; runs without the signature are
-        left out. Signature ``hand``, the choice of hands itself, has one entry ``""`` for all hand
-        sequences together. ``name`` is in ``coartic.analysis.SIGNATURES``; ``method`` is a label,
-        the id with its setting.
+        Arrays have shape ``(n,)``, of the first 500 solved runs on the task; runs without the
+        signature are left out. Signature ``hand``, a measure of the choice of hands itself, has one
+        entry ``""`` for all hand sequences together. ``name`` is in
+        ``coartic.analysis.SIGNATURES``; ``method`` is a label, the id with its setting.
         """
         values = self._signature_of_each(name, task, method, replay=False)
         runs = self.executed(task, method).runs

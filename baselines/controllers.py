@@ -144,9 +144,10 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Return the solution of the cascade (:func:`solve_cascade`) for A x >= b (``rows`` A,
-        ``(m, joints)``; ``least`` b, ``(m,)``) and the changes ``preferred``, ``(joints,)``; count
-        two programmes in ``solves``, and the iterations in the session. Raises MethodError if the
+        """Return the joint changes of both levels of the cascade (:func:`solve_cascade`): changes x
+        with A x >= b (``rows`` A, ``(m, joints)``; ``least`` b, ``(m,)``) as nearly as damping
+        allows, and the changes nearest to ``preferred``, ``(joints,)``, that are as good. Count two
+        programmes in ``solves``, and the iterations in the session. Raises MethodError if the
         solver fails."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2

@@ -130,10 +130,11 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of a source whose plan has runs that the joined plan lacks, and of one with a complete
-    cell of a stochastic method, not in ``asked``, if the joined plan has fewer runs of the cell
-    than the largest number in ``asked``. ``asked``: numbers of runs asked for, by digest of the
-    cell; ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
+    """Warn of a source whose plan has runs that the joined plan lacks. Warn, too, of a source with
+    a cell (method and task) of a stochastic method, all of whose runs are joined and which
+    ``asked`` lacks, if it has fewer runs than the largest number in ``asked``. ``asked``: numbers
+    of runs asked for, by digest of the cell; ``plans``: plans by name of the source; ``jobs``:
+    joined plan, by digest."""
     most = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()

@@ -133,8 +133,8 @@ class Robot:
 
     @property
     def drawn_base(self) -> tuple[float, float]:
-        """Width and height of the base in drawings, length unit: :attr:`base_size`, which is
-        multiplied by :attr:`scale` if it is the default."""
+        """Width and height of the base in drawings, length unit: :attr:`base_size`; the default
+        size is multiplied by :attr:`scale`."""
         width, height = self.base_size
         is_default = self.base_size == type(self).__dataclass_fields__["base_size"].default
         return (width * self.scale, height * self.scale) if is_default else (width, height)
