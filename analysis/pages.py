@@ -108,12 +108,12 @@ def fill_page(template: str | Path, **values: Any) -> str:
     ------
     CoarticError
         There is no such template, or ``interval`` or ``number`` gets a wrong argument, such as a
-        row without the numbers.
+        row without the numbers or, for ``number``, an unknown name.
     ValueError
         A sentence that the template expects of the results does not hold, or ``listed`` gets no
         words.
     jinja2.TemplateError
-        The template is wrong, or uses an unknown name.
+        The template is wrong, or otherwise uses an unknown name.
     """
     import jinja2
 

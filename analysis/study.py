@@ -522,7 +522,7 @@ class Study:
 
         Arrays have shape ``(n,)``, of the first 500 solved runs on the task; runs without the
         signature are left out. Signature ``hand``, a measure of the choice of hands itself, has one
-        entry ``""`` for all hand sequences together. ``name`` is in
+        entry ``""`` for all hand sequences together, or none if no run has it. ``name`` is in
         ``coartic.analysis.SIGNATURES``; ``method`` is a label, the id with its setting.
         """
         values = self._signature_of_each(name, task, method, replay=False)

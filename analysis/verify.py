@@ -187,8 +187,7 @@ def make(task: Any, q: Floats, movement: MoveRow) -> tuple[Floats, int, bool]:
 
 def _recompute(task: Any, movements: list[MoveRow]) -> tuple[int, str, int, float]:
     """Return reward, letters of hands, number of corrections, and joint travel of idle arms from
-    the start and from hit to hit, rad. Raises ValueError if a rule is broken or ticks are not as
-    stored."""
+    start and hit to hit, rad. Raises ValueError if a rule is broken or ticks are not as stored."""
     _check_rules(task, movements)
     q, reward, hands, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in range(1, len(task.goals) + 1):

@@ -67,8 +67,8 @@ def perform_in_order(
     jobs: Sequence[Job], workers: int = 1, *, verbose: bool = False
 ) -> Iterator[Run]:
     """Perform jobs, and yield the scored runs, which are not stored, as they finish. A new process
-    performs all jobs of a method in order, while it lives; at most ``workers`` processes run at
-    once. ``verbose`` shows what methods print and log."""
+    performs all jobs of a method in order, while it lives; at most ``workers`` processes (-1: one
+    a core) run at once. ``verbose`` shows what methods print and log."""
     with closing(Local(workers, verbose=verbose).perform(jobs, in_order=True)) as answers:
         for job, outcomes in answers:
             yield from score(job, outcomes)

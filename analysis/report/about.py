@@ -47,7 +47,8 @@ RUNS = 20
 
 
 def shown(text: str) -> str:
-    """Return text as one printable line with no-break spaces before per cent signs and daggers."""
+    """Return text as one printable line with no-break spaces for spaces before per cent signs and
+    daggers."""
     return one_line(text).replace(" %", f"{NO_BREAK}%").replace(" †", f"{NO_BREAK}†")
 
 
@@ -168,9 +169,9 @@ def limits(study: Study) -> dict[str, Any]:
 
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
-    """Return sentences for below a table with these columns: which best known rewards, to which
-    gaps are taken, are not proven, or known from this folder alone (:func:`limits`); none without
-    such columns."""
+    """Return sentences for below a table with these columns: which best known rewards are not
+    proven (with column ``gap`` or ``optimum``), and which are known from this folder alone (with
+    ``gap``; :func:`limits`)."""
     unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
     notes = []
     if unproven and columns & {"gap", "optimum"}:

@@ -64,7 +64,8 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     ``jacobian`` J shape ``(2, k)``, for the k joints that can move. In a random direction the
     squares of the parts have equal expectations. A difference between contexts is motor-equivalent
     if the first part exceeds the second: another posture with the same position of the hand.
-    Caveat: the radius of the goal bounds the second part, and nothing bounds the first. NaN for a
+    Caveat: for small differences the radius of the goal bounds the second part; nothing bounds
+    the first. NaN for a
     space of dimension 0. Raises ValueError for other shapes.
     Source: Mattos, Latash and colleagues, Experimental Brain Research
     (doi:10.1007/s00221-015-4327-4, 10.1007/s00221-018-5215-5).

@@ -80,7 +80,7 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
 
 def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Array]:
     """Return low and high ends, ``(budgets,)`` each, of the 95 % interval of the share of reward
-    targets reached within each budget, of a run's time in the unit of ``times``.
+    targets reached within each budget, a finite number in the unit of ``times``.
 
     The percentile interval is of the bootstrap over runs within tasks; NaN if a task has fewer than
     three runs.

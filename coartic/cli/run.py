@@ -237,7 +237,8 @@ def _list_runs(folder: Path) -> None:
 
 
 def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: description and instances of a family, by its name or file."""
+    """Yield pairs of word and text: description and instances of a family, by its name or file,
+    and a command that draws some."""
     yield "Family", f"{name}: {family.description}"
     yield "Instances", f"{name}/i000, ... (test); {name}/d000, ... (development)"
     yield "Draw some", f"coartic draw {quote(name)}/i000..i003 --out FOLDER"

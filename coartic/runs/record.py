@@ -356,7 +356,7 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
     """Execute solutions of a task under the paper's model; return for each, in order, its
     execution, or, as an object, the error of a solution that breaks the rules of the task, or is
-    too long (:func:`too_long`)."""
+    too long (:func:`too_long`). Targets and waypoints are arrays of floats."""
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
     executions = iter(execute_many(compiled_task(task, PAPER), short))
@@ -365,8 +365,8 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     """Return the error of a solution with more than 10,000 movements, :data:`_MOST_NUMBERS` numbers
-    or, if its configurations have one shape, :data:`MOST_STEPS` steps between them; None for any
-    other solution."""
+    with the start's or, if all configurations have the shape of the start, :data:`MOST_STEPS` steps
+    from the start through them; None for any other solution. Targets and waypoints are arrays."""
     if len(solution) > _MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
     corners = [task.q0]

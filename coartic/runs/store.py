@@ -464,7 +464,8 @@ class Store:
 
     def _read_cell(self, row: Mapping[str, Any]) -> Cell:
         """Return a cell from its row of table ``cells``; ``where`` of its method is empty. Raises
-        an error, such as ValueError or TaskError, if coartic cannot have written the row."""
+        an error, such as ValueError or TaskError, if the row makes no cell, or a cell with another
+        digest, setting or name of its task."""
         method = {name: row[name] for name in _OF_METHOD} | {
             "name": row["method"],
             "defaults": json.loads(row["defaults"]),

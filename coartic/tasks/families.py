@@ -399,7 +399,8 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 def load_family(name: str) -> Family:
     """Return a shipped family by its name with version, such as ``two-armed/v1``, or a family of
-    your own by the path of its file. Raises TaskError if it does not exist or cannot be used."""
+    your own by the path of its file. A file is read once per process. Raises TaskError if
+    it does not exist or cannot be used."""
     if is_file(name):
         return read_family(Path(name))
     shipped = shipped_families()

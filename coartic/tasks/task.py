@@ -287,7 +287,8 @@ class Task(FileData):
         write_output(file, task_text(self).encode(), replace=replace)
 
     def __repr__(self) -> str:
-        """Return name, number of goals, hands and initial hands of the task, in one line."""
+        """Return name, number of goals, hands and initial hands of the task, in one line, each
+        value cut to 80 characters."""
         return short_repr(
             self,
             repr(self.name),
