@@ -3,6 +3,7 @@
 import html
 import itertools
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -25,7 +26,10 @@ from tests.support.suites import KNOWN, ROOT
 
 @pytest.fixture(scope="module")
 def shipped():
-    return load("shipped")
+    """The shipped results with five runs of each method on each task, on which figures and
+    sentences name the same methods as on all runs."""
+    study = load("shipped")
+    return replace(study, stored=study.stored[study.stored.run < 5])
 
 
 def test_robots_and_goals_are_drawn_where_they_are():
