@@ -187,7 +187,8 @@ def _built_in_versions(imported: Iterable[str]) -> list[str]:
     """Return a line with id and version for each built-in method that ``imported`` names reach: the
     methods of the module of a name, or, for a module of ``coartic.baselines`` or
     ``coartic.learner`` without methods, all methods there."""
-    names = {coartic.HOME.get(name.removeprefix("coartic."), name) for name in imported}
+    ours = (name[len("coartic.") :] for name in imported if name.startswith("coartic."))
+    names = {coartic.HOME.get(name, f"coartic.{name}") for name in ours}
     modules = set[str]()
     for name in names:
         if name.startswith(("coartic.baselines", "coartic.learner")):

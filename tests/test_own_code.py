@@ -54,6 +54,7 @@ COUNTS = {
     "from coartic import learn": ["dual-process/EC1"],
     "from coartic.baselines.trajectory_problem import Instance": ["cma-es/bandit"],
     "from coartic import load_task": [],
+    "import learn": [],
 }
 
 

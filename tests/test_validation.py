@@ -126,6 +126,10 @@ FAMILIES = [
     (family("[-5, 5]", "[nan, 5]"), "region.x[0] is nan; it should be a finite number"),
     (family("[-5, 5]", "['a', 5]"), "region.x[0] is 'a'; it should be a finite number"),
     (family("[-5, 5]", "[-5, 1e306]"), "region.x[1] is 1e+306; it should be a finite number"),
+    (
+        family("[-5, 5]", "[-5, 5]\nscale = [0.5, 1.5]"),
+        "scale is [0.5, 1.5]; it should be from 0 to",
+    ),
     (f"reach = 1{400 * '0'}" + FAMILY, "it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
     ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),

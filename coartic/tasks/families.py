@@ -90,6 +90,13 @@ def _in_order(span: tuple[int, int]) -> tuple[int, int]:
     return span
 
 
+def _as_share(span: tuple[int, int]) -> tuple[int, int]:
+    """Return the span itself. Raises a validation error if it is not within 0 to 1."""
+    if not 0 <= span[0] <= span[1] <= _PARTS:
+        raise PydanticCustomError("share", "should be from 0 to 1")
+    return span
+
+
 _ordered = AfterValidator(_in_order)
 Span = Annotated[tuple[Thousandths, Thousandths], _ordered]
 """Lowest and highest value; every thousandth from one to the other is equally likely."""
@@ -105,7 +112,7 @@ class _Region(FileData):
     """From, to, length unit; at the start the base is at the origin."""
     y: Span
     """From, to, length unit."""
-    scale: Span = (_PARTS, _PARTS)
+    scale: Annotated[Span, AfterValidator(_as_share)] = (_PARTS, _PARTS)
     """Length of the sides of an instance's own box, as a share of the region's, from, to."""
 
 
