@@ -130,12 +130,12 @@ def repeats_of(run: Run) -> list[Job]:
 
 def doubts_of(run: Run, repeats: Sequence[Run]) -> Iterator[str]:
     """Yield sentences on doubts about a method, from one of its runs and the runs of
-    :func:`repeats_of` in their order: angles in degrees, hidden state, use of the seed."""
+    :func:`repeats_of` in any order: angles in degrees, hidden state, use of the seed."""
     name, task = run.cell.method.name, run.cell.task.name
     advice = f"see: coartic check {name}"
     if hint := hint_of(run.solution.movements):
         yield f"{name} on {task}: {hint}"
-    *others, again = repeats
+    again, *others = sorted(repeats, key=lambda each: each.number)
     when = AFTER_ANOTHER if others else "with the same seed"
     for change in compare_runs(run, again)[:1]:
         yield (

@@ -313,5 +313,6 @@ def test_a_long_run_is_made_again_alone(methods, wall_s, seeds):
     assert tuple(each.numbers for each in jobs) == tuple((seed,) for seed in seeds)
     repeats = [*reproduce.perform_in_order(jobs)]
     doubt = next(reproduce.doubts_of(run, repeats))
+    assert doubt == next(reproduce.doubts_of(run, repeats[::-1]))
     assert ("the same seed after another run (" in doubt) == (len(seeds) == 2)
     assert "with the same seed" in doubt
