@@ -144,8 +144,9 @@ def pages(browser):
 
 @pytest.fixture
 def visited(browser, pages):
-    """Opens a page; what it logs, throws or asks the network for fails the test."""
-    problems, opened = [], []
+    """Opens a page; what it logs, throws or asks the network for fails the test. A page that stays
+    is there for the next test, for whose link to another part of it nothing is loaded."""
+    problems, opened = [], {}
     listeners = {
         "console": lambda message: problems.append(message.text),
         "pageerror": lambda error: problems.append(str(error)),
@@ -156,7 +157,14 @@ def visited(browser, pages):
         ),
     }
 
-    def visit(link, width=1280, color_scheme="light", reduced_motion="no-preference", **options):
+    def visit(
+        link,
+        width=1280,
+        color_scheme="light",
+        reduced_motion="no-preference",
+        stays=False,
+        **options,
+    ):
         key = repr(options)
         if key not in pages:
             context = browser.new_context(**options)
@@ -168,15 +176,16 @@ def visited(browser, pages):
         page.mouse.move(0, 0)
         for event, listener in listeners.items():
             page.on(event, listener)
-        opened.append(page)
+        opened[page] = stays
         page.goto(link)
         return page
 
     yield visit
-    for page in opened:
+    for page, stays in opened.items():
         for event, listener in listeners.items():
             page.remove_listener(event, listener)
-        page.goto("about:blank")
+        if not stays:
+            page.goto("about:blank")
     assert problems == []
 
 

@@ -41,7 +41,7 @@ TASKS = {
     "receding-horizon": TWO_GOALS,
     "cma-es/bandit": FEW_TASKS,  # of both hands, as it chooses among hand sequences
     "nullspace-qp/": FEW_TASKS,
-    "posture-qp/": FEW_TASKS,
+    "posture-qp/": TWO_GOALS,
     "posture-based/": FEW_TASKS,
     "trajectory-optimisation/path-length": TWO_GOALS,
     "trajectory-optimisation/": ONE_GOAL,  # the same programme for other costs

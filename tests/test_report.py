@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from coartic import CoarticError, Movement
-from coartic.analysis.report import about, render
+from coartic.analysis.report import about, build, render
 from coartic.analysis.report.about import attempt, limits
 from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.player import methods_played, player
@@ -178,10 +178,15 @@ def test_a_report_of_one_run_without_a_learner_stays_with_its_results(traced, tm
     assert all('width="244.8pt"' in text for text in drawn)
     with pytest.raises(CoarticError, match="report holds the report of other results"):
         write_report(traced, tmp_path / "report")
-    write_report(one, tmp_path / "report", for_paper=False)
 
 
-@pytest.mark.usefixtures("in_this_process")
+@pytest.fixture
+def no_files(monkeypatch):
+    """Figures are drawn for the page alone."""
+    monkeypatch.setattr(build, "picture", lambda *_: b"")
+
+
+@pytest.mark.usefixtures("in_this_process", "no_files")
 def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
     """The suite of the page on own suites: heading, question, answer, all rows, and the figure."""
     page = (ROOT / "docs" / "howto" / "task.md").read_text("utf-8")
@@ -222,8 +227,7 @@ def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
     ]
     assert load(out).question == ("Noise", "How much exploration noise?")
     suite.write_text(text.replace("0.1]", "0.1], epsilon = [0.0, 0.5]").replace("5000", "2"))
-    assert coartic("run", suite, "--out", tmp_path / "two", "--runs", "1")[0] == 0
-    assert load(tmp_path / "two").varied == ("", {})
+    assert run_and_write(tmp_path / "two", cells_of(suite), runs=1, trials=2).varied == ("", {})
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
@@ -242,6 +246,7 @@ def test_tables_compile(tables_by_name, tmp_path):
     assert done.returncode == 0, done.stdout[-2000:]
 
 
+@pytest.mark.usefixtures("no_files")
 def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):
     cells = cells_of("paper", tasks=["ascending"], methods=["EC1"])
     run_and_write(tmp_path / "runs", cells=cells, runs=3, trials=30)

@@ -66,7 +66,8 @@ def test_tables_are_searched_sorted_and_unfolded(opened, address):
 
 
 def test_a_table_is_copied_for_a_spreadsheet(opened, traced):
-    page = opened(permissions=["clipboard-read", "clipboard-write"])
+    page = opened()
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     for row, text in enumerate(("=1", "-x", "@x", "−1.5")):
         cell = page.locator("#table-ranking tbody tr").nth(row).locator("td").first
         cell.evaluate("(cell, text) => { cell.textContent = text; }", text)
@@ -103,19 +104,17 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
     for preset, text in enumerate(options[1:], 1):
         part(page, "preset").select_option(str(preset))
         task = tasks[text.removesuffix(" †")]
-        for label in (
-            part(page, "stored").locator("option").evaluate_all("all => all.map(o => o.value)")
-        ):
-            if label:
-                part(page, "stored").select_option(label)
-                good = solved(traced.cells[task, label])
-                median = good.set_index("run_id").reward[typical_run(good)]
-                page.wait_for_function(
-                    "ticks => document.querySelector('[data-is=score]').innerText.includes(ticks)",
-                    arg=f" {-median:.0f} ticks",
-                )
-                seen += 1
-    assert seen >= 8
+        stored = part(page, "stored").locator("option:not([value=''])")
+        for label in stored.evaluate_all("all => all.map(o => o.value)")[:3]:
+            part(page, "stored").select_option(label)
+            good = solved(traced.cells[task, label])
+            median = good.set_index("run_id").reward[typical_run(good)]
+            page.wait_for_function(
+                "ticks => document.querySelector('[data-is=score]').innerText.includes(ticks)",
+                arg=f" {-median:.0f} ticks",
+            )
+            seen += 1
+    assert seen >= 6
     page.get_by_role("button", name="Goal 2").focus()
     page.keyboard.press("ArrowUp")
     expect(page.get_by_role("radio", name="A learner")).to_be_checked()
@@ -146,8 +145,9 @@ def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
     for width in (1280, 390):
         page.set_viewport_size({"width": width, "height": 900})
         assert page.evaluate("document.documentElement.scrollWidth") <= width
-    # Rows of a table are alike: three of each.
-    page.eval_on_selector_all("tbody tr:nth-child(n+4)", "all => all.forEach(row => row.remove())")
+    # Rows of a table are alike: two of each. Pictures count by their labels alone.
+    alike = "tbody tr:nth-child(n+3), svg > :not(:has(a))"
+    page.eval_on_selector_all(alike, "all => all.forEach(each => each.remove())")
     rules = {"runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], "resultTypes": ["violations"]}
     for width, scheme in ((390, "dark"), (1280, "light")):
         page.set_viewport_size({"width": width, "height": 900})
@@ -156,20 +156,20 @@ def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
         assert accessibility.violations_count == 0, accessibility.generate_report()
 
 
-@pytest.mark.parametrize(("width", "is_narrow"), [(390, True), (1280, False)])
-def test_a_phone_shows_the_ranking_in_one_column(opened, width, is_narrow):
-    page = opened()
-    page.set_viewport_size({"width": width, "height": 900})
+def test_a_phone_shows_the_ranking_in_one_column(opened, address):
+    page = opened(link=f"{address}#phone", stays=True)
     drawn = page.locator("#figure-ranking .drawn")
     expect(drawn).to_have_count(2)
-    expect(drawn.nth(0)).to_be_visible(visible=not is_narrow)
-    expect(drawn.nth(1)).to_be_visible(visible=is_narrow)
-    shown = drawn.nth(int(is_narrow)).locator("svg").bounding_box()
-    assert shown["x"] + shown["width"] <= width
+    for width, is_narrow in ((390, True), (1280, False)):
+        page.set_viewport_size({"width": width, "height": 900})
+        expect(drawn.nth(0)).to_be_visible(visible=not is_narrow)
+        expect(drawn.nth(1)).to_be_visible(visible=is_narrow)
+        shown = drawn.nth(int(is_narrow)).locator("svg").bounding_box()
+        assert shown["x"] + shown["width"] <= width
 
 
-def test_in_print_every_picture_is_there_once_and_nothing_leaves_its_box(opened):
-    page = opened(688, color_scheme="dark")  # A4 within its margins
+def test_in_print_every_picture_is_there_once_and_nothing_leaves_its_box(opened, address):
+    page = opened(688, f"{address}#print", color_scheme="dark", stays=True)  # A4 in its margins
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     page.emulate_media(media="print")
     assert page.evaluate(OVERFLOWS) == []

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from coartic import CoarticError, Movement
+from coartic.analysis import verify
 from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
 from coartic.benchmarks.provenance import made_with
@@ -500,7 +501,7 @@ def test_a_value_that_no_run_can_have(copied, tmp_path, change):
         "environments SET content = 'x'",
         *(
             f"movements SET path = path || hex(zeroblob({size})) WHERE result_id = 1 AND goal = 1"
-            for size in (3_000_000, 26_000_000)
+            for size in (3_000_000, 4_000_000)
         ),
         "results SET environment = 99",
         "suite SET name = NULL",
@@ -525,8 +526,10 @@ def test_a_value_that_no_run_can_have(copied, tmp_path, change):
         f"learning SET rewards = x'{zlib.compress(bytes(4))[:-4].hex()}'",  # cut short
     ],
 )
-def test_content_of_another_kind_is_one_sentence(copied, tmp_path, change):
+def test_content_of_another_kind_is_one_sentence(copied, tmp_path, monkeypatch, change):
     """Whatever cannot be read, the check of the folder finds as well, in words."""
+    for module in (store_module, verify):
+        monkeypatch.setattr(module, "LONGEST_VALUE", 7_000_000)
     sql(f"UPDATE {change}")(copied)
     with pytest.raises(CoarticError) as caught:
         read_all(tmp_path)

@@ -122,7 +122,7 @@ EDITS = {  # what is said: of which run, and what was edited
     "path has no such points": movement(TINY, "kind = 'path'"),
     "planned has no such points": movement(PATH, "kind = 'planned'"),
     "solution is too long": movement(PATH, "path = path || hex(zeroblob(5000000))"),
-    "too big": movement(PATH, "path = path || hex(zeroblob(26000000))"),
+    "too big": movement(PATH, "path = path || hex(zeroblob(6500000))"),
     "model were changed": (PATH, "UPDATE cells SET method = 'other' WHERE task = 'ascending'"),
     "its task is not": (PATH, "UPDATE cells SET task = 'descending' WHERE task = 'ascending'"),
     "that its id says": result(FAILED, "run = 60"),
@@ -165,7 +165,8 @@ EDITS = {  # what is said: of which run, and what was edited
 
 
 @pytest.mark.parametrize("words", EDITS)
-def test_an_edit_is_found(true_folder, tmp_path, words):
+def test_an_edit_is_found(true_folder, tmp_path, monkeypatch, words):
+    monkeypatch.setattr(checker, "LONGEST_VALUE", 12_000_000)
     run, statement = EDITS[words]
     with closing(sqlite3.connect(true_folder / RUNS_FILE)) as db:
         query = "SELECT max(run_id) FROM results WHERE id = ?"

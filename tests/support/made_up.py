@@ -28,7 +28,8 @@ class MadeUp(Study):
     return as well, ``MadeUp(study, executed=made(...))``."""
 
     def __init__(self, study, **parts):
-        super().__init__(study.folder, study.plan, study.made_with, study.runs)
+        runs = vars(study).get("runs", study.stored)  # with what a test has changed
+        super().__init__(study.folder, study.plan, study.made_with, runs)
         for name in parts:
             assert isinstance(getattr(Study, name, None), cached_property) or hasattr(study, name)
         vars(self).update(parts)

@@ -1,5 +1,7 @@
 """One rule for all models: agreement lies beyond the bound and exceeds random search."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -60,11 +62,15 @@ def test_the_control_of_two_arms_has_the_hands_of_each_run(monkeypatch):
     assert HUMAN.of_control(runs, "learner EC3", repeats)["a"] == 7
 
 
-def test_the_suite_runs_each_model_and_each_control():
-    """Cells leave out parameters at their defaults, such as a moving idle arm."""
+def test_the_suite_runs_each_model_and_each_control(tmp_path):
+    """Cells leave out parameters at their defaults, such as a moving idle arm. Of each block's
+    tasks the first few."""
+    text = (HUMAN.HERE / "suite.toml").read_text("utf-8")
+    text = re.sub(r'(tasks = \[\n.*)(\n    ".*)+', r"\1", text)
+    (tmp_path / "human.toml").write_text(re.sub(r"000\.\.2026-\d+", "000..2026-005", text))
     found = {
         name
-        for cell in (job.cell for job in plan_suite(HUMAN.HERE / "suite.toml"))
+        for cell in (job.cell for job in plan_suite(tmp_path / "human.toml"))
         for name in HUMAN.models_of(
             cell.task, cell.method.name, cell.method.defaults | cell.parameters
         )

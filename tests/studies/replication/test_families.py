@@ -18,7 +18,7 @@ claims, reader = map(importlib.import_module, ("claims", "reader"))
 
 @pytest.fixture(autouse=True)
 def _fewer_resamples(monkeypatch):
-    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
+    monkeypatch.setattr(judging, "RESAMPLES_OF_CLAIMS", 999)
 
 
 def with_signatures(study, of_random_search=0.5):

@@ -69,6 +69,8 @@ def test_the_page_begins_with_its_answer_and_with_failures(tmp_path):
     """Of the stored tables; it names no internal id, and its links stay below its folder."""
     for table in FOLDER.glob("*.csv"):
         (tmp_path / table.name).write_bytes(table.read_bytes())
+    solutions = pd.read_csv(FOLDER / "solutions.csv", index_col=0)
+    solutions[solutions.task == "ascending"].to_csv(tmp_path / "solutions.csv")  # panels of each
     STUDY.write(tmp_path)
     page = (tmp_path / "page.html").read_text("utf-8")
     claims = pd.read_csv(FOLDER / "claims.csv", index_col=0)

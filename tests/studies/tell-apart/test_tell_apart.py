@@ -14,7 +14,7 @@ study, changes, steps = programs("tell-apart", "study", "changes", "steps")
 
 
 def test_tables_and_figure_of_some_of_the_tasks(monkeypatch, tmp_path):
-    monkeypatch.setattr(study, "EXPERIMENTS", 50)
+    monkeypatch.setattr(study, "EXPERIMENTS", 25)
     raw = {
         name: pd.read_csv(ROOT / "studies" / "tell-apart" / f"{name}.csv")
         for name in ("changes", "starts", "steps")
