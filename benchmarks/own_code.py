@@ -148,18 +148,11 @@ _version = cache(metadata.version)
 def _is_installed(path: str) -> bool:
     """Return True for a path in a folder of the standard library or of installed packages, False
     for any other path, as in a package installed in editable mode."""
-    if not {"site-packages", "dist-packages"}.isdisjoint(path.split(os.sep)):
+    if {"site-packages", "dist-packages"} & {*Path(path).parts}:
         return True
-    return path.startswith(_installed_folders())
-
-
-@cache
-def _installed_folders() -> tuple[str, ...]:
-    """Return the folders of the standard library and of installed packages, each with a separator
-    at its end."""
     standard = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
     folders = [*standard, *site.getsitepackages(), site.getusersitepackages()]
-    return tuple(f"{folder}{os.sep}" for folder in folders)
+    return any(path.startswith(f"{folder}{os.sep}") for folder in folders)
 
 
 @cache
