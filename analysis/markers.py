@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import chain, combinations, pairwise, permutations
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain, combinations, pairwise, permutations, product
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -28,7 +30,7 @@ from coartic.analysis.hits import (
 )
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import counted
-from coartic.robot import HANDS, Array
+from coartic.robot import HANDS, Array, Hand
 
 _LONGEST_GAP = 0.05
 """Longest gap in the place of a marker that is bridged, s."""
@@ -96,306 +98,541 @@ def hits_from_markers(
     """
     if not 0 < ticks_per_unit < np.inf:
         raise CoarticError(f"ticks_per_unit is {ticks_per_unit}; needed is a number above 0")
-    if isinstance(recording, pd.DataFrame):
-        frame, source, names = recording.reset_index(drop=True), "the frame", row_names(recording)
-    else:
-        source = str(recording)
-        frame, names = read_table(recording, "places of markers are")
     hands = [hand for hand in HANDS if side in (hand, "both") and hand in task.hands]
     if not hands:
         raise CoarticError(f"side is {side!r}, but task {task.name!r} has the {task.hands[0]} hand")
-    markers = {hand: [*range(1, len(task.robot.arm(hand).links) + 1), "tip"] for hand in hands}
-    columns = {hand: [f"{hand}_{marker}_{axis}" for marker in markers[hand] for axis in "xy"]
-               for hand in hands}  # fmt: skip
-    needed = ["subject", "trial", "time", *chain(*columns.values())]
-    if missing := [name for name in needed if name not in frame]:
-        raise CoarticError(f"{source} has no column {missing[0]}{also(missing)}; found are "
-                           f"{', '.join(map(str, frame.columns))}")  # fmt: skip
-    if not len(frame):
-        raise CoarticError(f"{source} has no sample: needed is a row for each")
+    samples = _samples_of(recording, task, hands)
+    _check_clock(samples)
+    marks = _bridge_gaps(samples)
+    marks["jumping_link"] = _find_jumps_of_links(samples)
+    q, marks["is_torn"] = _postures(samples)
+    trials = [_trial_of(samples, q, part) for part in samples.parts]
+    marks["is_used"] = False
+    for trial in trials:
+        marks.loc[trial.part.start : trial.end - 1, "is_used"] = True
+    finished = [trial for trial in trials if trial.is_finished]
+    remedy = _finished_by([trial.tips for trial in trials if not trial.is_finished], task)
+    _refuse_places(samples, marks, trials, remedy)
+    _check_ends(samples, trials, remedy)
+    _check_starts(samples, q, finished)
+    _warn_of_places(samples, q, marks)
+    _warn_of_movement(samples, finished)
+    rows = []
+    for trial in finished:
+        before = samples.time[trial.part.start]
+        for goal, hit in enumerate(trial.hits, 1):
+            ticks = round(max((hit.time - before) * ticks_per_unit, 1.0), 6)
+            number = samples.trial[trial.part.start]
+            rows.append([samples.subject, number, goal, hands[hit.hand], ticks, *hit.posture])
+            before = hit.time
+    table = pd.DataFrame(rows, columns=["subject", "trial", "goal", "hand", "ticks",
+                                        *task.robot.joint_names])  # fmt: skip
+    calls = [f"trial {row[1]:g}, goal {row[2]}" for row in rows]
+    hits = checked_hits(table, task, samples.source, calls, implausible)
+    hits.attrs["unfinished"] = len(trials) - len(finished)
+    return hits
 
-    def refuse(wrong: NDArray[np.bool_], words: str) -> None:
+
+@dataclass(frozen=True)
+class _Samples:
+    """Samples of a person's trials, n in all, by trial and time.
+
+    ``source`` and ``names`` of rows are for messages, ``markers`` are names such as ``right_1``,
+    ``trial`` and ``time``, s, are ``(n,)``, ``places`` ``(n, markers, 2)``, length unit.
+    """
+
+    task: Task
+    source: str
+    names: Sequence[str]
+    subject: str
+    markers: dict[Hand, list[str]]
+    trial: Array
+    time: Array
+    places: dict[Hand, Array]
+
+    @cached_property
+    def begins(self) -> NDArray[np.bool_]:
+        """Mask, ``(n,)``, of the first samples of trials."""
+        return np.append(True, np.diff(self.trial) != 0)
+
+    @cached_property
+    def parts(self) -> list[slice]:
+        """Samples of each trial."""
+        begin = np.flatnonzero(self.begins).tolist()
+        return [slice(*ends) for ends in pairwise([*begin, len(self.trial)])]
+
+    @cached_property
+    def steps(self) -> Array:
+        """Time since the sample before, ``(n,)``, s; 0 at the first."""
+        return np.append(0.0, np.diff(self.time))
+
+    @cached_property
+    def is_even(self) -> NDArray[np.bool_]:
+        """Mask, ``(n,)``, of samples whose time since the sample before is without a gap."""
+        steps = np.where(self.begins, np.nan, self.steps)
+        usual = self.by_trial(steps[:, None], "median")[np.cumsum(self.begins) - 1, 0]
+        even: NDArray[np.bool_] = ~self.begins & (self.steps <= 2.5 * usual)
+        return even
+
+    @cached_property
+    def step(self) -> float:
+        """Mean time between samples without a gap, s; NaN without such samples."""
+        return float(self.steps[self.is_even].mean()) if self.is_even.any() else np.nan
+
+    @cached_property
+    def origins(self) -> Array:
+        """Places of the hands at the task's start, ``(hands, 2)``, length unit."""
+        q0, robot = self.task.q0, self.task.robot
+        return np.stack([robot.forward_kinematics(q0, hand) for hand in self.places])
+
+    @cached_property
+    def leaps(self) -> NDArray[np.bool_]:
+        """Mask, ``(n,)``, of samples before which others are missing; clocks may be rounded."""
+        return ~self.begins & (self.steps > 1.9 * self.step)
+
+    def by_trial(self, values: Array, statistic: str) -> Array:
+        """Return a statistic of values of samples, ``(n, k)``, in each trial, ``(trials, k)``."""
+        return pd.DataFrame(values).groupby(np.cumsum(self.begins)).agg(statistic).to_numpy()
+
+    def refuse(self, wrong: NDArray[np.bool_], words: str) -> None:
+        """Raise CoarticError with the first samples that are ``wrong``, ``(n,)``, if one is."""
         if rows := np.flatnonzero(wrong).tolist():
-            others = also([names[row] for row in rows])
-            raise CoarticError(f"{source}, {names[rows[0]]}: {words}{others}")
+            raise CoarticError(self.sentence(rows, words))
 
-    culprit = np.full(len(frame), "", dtype=object)  # the marker to be named at a sample
+    def sentence(self, rows: Sequence[int], words: str) -> str:
+        """Return words that begin with the name of the first row, and end with other names."""
+        return f"{self.source}, {self.names[rows[0]]}: {words}{also([self.names[k] for k in rows])}"
 
-    people = as_names(frame.subject)
-    others = people != people.iloc[0]
-    refuse((people == "").to_numpy(), "subject is empty; needed is a name")
-    refuse(others.to_numpy(), "another subject; needed is a file for each person")
-    trial, time = as_numbers(frame.trial), as_numbers(frame.time)
-    for name, none in (("trial", ~np.isfinite(trial)), ("time", ~np.isfinite(time))):
-        value = frame[name][int(none.argmax())]
-        refuse(none, f"{name} is {value!r}; {why_no_number(value)}")
-    refuse((trial % 1 != 0) | (trial < 1), "trial is no whole number from 1")
-    begins = np.append(True, np.diff(trial) != 0)
-    again = pd.Series(np.where(begins, trial, np.nan)).duplicated().to_numpy() & begins
-    refuse(again, "a trial of this number ended above; number trials through from session to "
-           "session, sort samples by time, and give people of one name a file each")  # fmt: skip
-    steps = np.append(0.0, np.diff(time))
-    refuse(~begins & (steps <= 0), "time does not increase; needed is each sample once, in order, "
-           "with a time that is not rounded, and a trial for each start of the clock")  # fmt: skip
-    begin, number = np.flatnonzero(begins), np.cumsum(begins) - 1
-    paces = pd.Series(np.where(begins, np.nan, steps)).groupby(number).transform("median")
-    even = ~begins & (steps <= 2.5 * paces.to_numpy())  # without gaps; clocks may be rounded
-    step = float(steps[even].mean()) if even.any() else np.nan
-    if not 0.0005 <= step <= 0.0401:  # else hands pass goals between samples
-        raise CoarticError(
-            f"{source}: the time between samples is {step:g} s; needed are 25 to 2000 "
-            "samples in a second. Is time in s, and not in ms or frames, and are all samples there?"
-        )
-    parts = [slice(*ends) for ends in zip(begin, [*begin[1:], len(frame)], strict=True)]
-    many = np.bincount(number, even) >= MANY
-
-    def medians(values: Array) -> Array:
-        return pd.DataFrame(values).groupby(number).median().to_numpy()
-
-    def agree(name: str, each: Array, share: float, most: float, doubt: float, words: str) -> None:
-        """Refuse a quantity, ``each`` by trial, that differs between trials of over 20 samples
-        by over ``most``, and warn if by over ``doubt``; a share ``share`` at either end does not
-        count."""
-        long = np.flatnonzero(many & np.isfinite(each))
+    def compare_trials(
+        self, name: str, each: Array, share: float, most: float, doubt: float, words: str
+    ) -> None:
+        """Raise CoarticError if a quantity, ``each`` by trial, differs between trials of over 20
+        samples by over ``most``, and warn if by over ``doubt``; a share ``share`` of trials at
+        either end does not count."""
+        samples = np.array([self.is_even[part].sum() for part in self.parts])
+        long = np.flatnonzero((samples >= MANY) & np.isfinite(each))
         ordered, out = np.sort(each[long]), int(share * len(long))
         if not len(long) or (change := ordered[-1 - out] - ordered[out]) <= min(most, doubt):
             return
         high = each[long] > ordered[out] + change / 2
         one, other = sorted((long[high.argmin()], long[high.argmax()]))
-        now, before = (f"{each[n]:.3g} in trial {trial[begin[n]]:g}" for n in (other, one))
-        text = f"{source}, {names[begin[other]]}: {name} is {now}, but {before}; {words}"
+        begins = [self.parts[n].start for n in (one, other)]
+        before, now = (f"{each[n]:.3g} in trial {self.trial[begin]:g}"
+                       for n, begin in zip((one, other), begins, strict=True))  # fmt: skip
+        text = self.sentence(begins[1:], f"{name} is {now}, but {before}; {words}")
         warn(text, refuse=change > most)
 
-    paces = pd.Series(np.where(even, steps, np.nan)).groupby(number).mean()
-    agree("the time between samples", np.array(paces), 0, _TOLERANCE * step, np.inf,
-          "correct the clock, or sample all trials at one rate")  # fmt: skip
-    held = np.zeros(len(frame), dtype=bool)
-    coarse, rounded = 0.0, ""
-    places, missing_for = {}, np.zeros(len(frame))  # s, at the first sample of a gap
-    for hand in hands:
-        values = np.stack([as_numbers(frame[name]) for name in columns[hand]], axis=1)
-        for name, column in zip(columns[hand], values.T, strict=True):
+
+class _Hit(NamedTuple):
+    """Hit: index of its sample in the trial and of its hand, and time, s, and posture, ``(dof,)``,
+    where the tip enters the goal."""
+
+    sample: int
+    hand: int
+    time: float
+    posture: Array
+
+
+class _Trial(NamedTuple):
+    """Trial of n samples: their numbers in the recording, ``end`` after the last that counts (the
+    last hit if all goals are hit), places of hands, ``(hands, n, 2)``, the hits up to the first
+    goal that is missed, and ways from the start, ``(hands, n)``, in radii, where the hands are in
+    running medians of 50 ms; ``second``: the sample of a second start, from which all goals are
+    hit, or None."""
+
+    part: slice
+    end: int
+    is_finished: bool
+    tips: Array
+    hits: list[_Hit]
+    ways: Array
+    second: int | None
+
+
+def _samples_of(
+    recording: pd.DataFrame | str | Path, task: Task, hands: Sequence[Hand]
+) -> _Samples:
+    """Return the samples of a recording as of :func:`hits_from_markers`, NaN for a missing place.
+    Raises CoarticError for a missing column, no sample, several people, a number that is none, and
+    trials or times that are in no order."""
+    if isinstance(recording, pd.DataFrame):
+        frame, source, names = recording.reset_index(drop=True), "the frame", row_names(recording)
+    else:
+        source = str(recording)
+        frame, names = read_table(recording, "places of markers are")
+    markers = {hand: [*(f"{hand}_{k + 1}" for k in range(len(task.robot.arm(hand).links))),
+                      f"{hand}_tip"] for hand in hands}  # fmt: skip
+    columns = [f"{marker}_{axis}" for marker in chain(*markers.values()) for axis in "xy"]
+    if missing := [name for name in ["subject", "trial", "time", *columns] if name not in frame]:
+        raise CoarticError(f"{source} has no column {missing[0]}{also(missing)}; found are "
+                           f"{', '.join(map(str, frame.columns))}")  # fmt: skip
+    if not len(frame):
+        raise CoarticError(f"{source} has no sample: needed is a row for each")
+    people = as_names(frame.subject)
+    numbers = {name: as_numbers(frame[name]) for name in ["trial", "time", *columns]}
+    places = {hand: np.stack([numbers[f"{marker}_{axis}"] for marker in markers[hand]
+                              for axis in "xy"], axis=1).reshape(len(frame), -1, 2)
+              for hand in hands}  # fmt: skip
+    trial, time, person = numbers["trial"], numbers["time"], people.iloc[0]
+    samples = _Samples(task, source, names, person, markers, trial, time, places)
+    samples.refuse((people == "").to_numpy(), "subject is empty; needed is a name")
+    others = (people != person).to_numpy()
+    samples.refuse(others, "another subject; needed is a file for each person")
+    for name in ("trial", "time"):
+        none = ~np.isfinite(numbers[name])
+        value = frame[name][int(none.argmax())]
+        samples.refuse(none, f"{name} is {value!r}; {why_no_number(value)}")
+    for name in columns:  # an empty place is a gap
+        for row in np.flatnonzero(np.isnan(numbers[name]) & frame[name].notna()).tolist():
+            if "leave out" not in (why := why_no_number(value := frame[name][row])):
+                samples.refuse(np.arange(len(frame)) == row, f"{name} is {value!r}; {why}")
+    begins = samples.begins
+    samples.refuse((trial % 1 != 0) | (trial < 1), "trial is no whole number from 1")
+    again = pd.Series(np.where(begins, trial, np.nan)).duplicated().to_numpy() & begins
+    samples.refuse(
+        again,
+        "a trial of this number ended above; number trials through from session to session, sort "
+        "samples by time, and give people of one name a file each",
+    )
+    samples.refuse(
+        ~begins & (samples.steps <= 0),
+        "time does not increase; needed is each sample once, in order, with a time that is not "
+        "rounded, and a trial for each start of the clock",
+    )
+    return samples
+
+
+def _check_clock(samples: _Samples) -> None:
+    """Raise CoarticError if samples are not 25 to 2000 in a second, or of another rate in some
+    trials."""
+    if not 0.0005 <= samples.step <= 0.0401:  # else hands pass goals between samples
+        raise CoarticError(
+            f"{samples.source}: the time between samples is {samples.step:g} s; needed are 25 to "
+            "2000 samples in a second. Is time in s, and not in ms or frames, and are all samples "
+            "there?"
+        )
+    steps = np.where(samples.is_even, samples.steps, np.nan)
+    each = samples.by_trial(steps[:, None], "mean")[:, 0]
+    samples.compare_trials("the time between samples", each, 0, _TOLERANCE * samples.step, np.inf,
+                           "correct the clock, or sample all trials at one rate")  # fmt: skip
+
+
+def _bridge_gaps(samples: _Samples) -> pd.DataFrame:
+    """Fill gaps in the places of markers by straight lines, and warn if places are rounded.
+
+    Returns a row for each sample: ``gap``, duration of the longest gap that begins there, s, or 0,
+    and its ``marker``, empty if all are missing; ``is_held``, whether a marker keeps its place from
+    there for over 50 ms, unlike elsewhere. ``attrs["grid"]`` is the step to which places are
+    rounded, length unit.
+    """
+    task, step, n = samples.task, samples.step, len(samples.time)
+    longest, of_marker = np.zeros(n), np.full(n, "", dtype=object)
+    held, coarse, rounded = np.zeros(n, dtype=bool), 0.0, ""
+    for hand, at in samples.places.items():
+        for (k, marker), (axis, letter) in product(
+            enumerate(samples.markers[hand]), enumerate("xy")
+        ):
+            column = at[:, k, axis]
             grid = np.unique(np.round(column[np.isfinite(column)] / task.radius, 6))
             if len(grid) >= MANY and (least := np.diff(grid).min()) > coarse:
-                coarse, rounded = least, name
-            for row in np.flatnonzero(np.isnan(column) & frame[name].notna()).tolist():
-                if (why := why_no_number(frame[name][row])) and "leave out" not in why:
-                    refuse(np.arange(len(frame)) == row, f"{name} is {frame[name][row]!r}; {why}")
-        at = places[hand] = values.reshape(len(frame), -1, 2)
+                coarse, rounded = least, f"{marker}_{letter}"
         at[~np.isfinite(at).all(axis=2)] = np.nan
-        middle = pd.DataFrame(at.reshape(len(frame), -1)).median().to_numpy().reshape(-1, 2)
+        middle = pd.DataFrame(at.reshape(n, -1)).median().to_numpy().reshape(-1, 2)
         far = np.linalg.norm(middle, axis=1) > 0.1 * task.robot.reach(hand)[1]
         at[(at == 0).all(axis=2) & far] = np.nan  # near the origin a marker may be there
-        for marker, name in enumerate(markers[hand]):
-            still = ~begins & (np.diff(at[:, marker], axis=0, prepend=np.nan) == 0).all(axis=1)
-            if 0 < still.mean() < 0.05:  # else markers are often still
-                kept = np.where(still[:, None], np.nan, at[:, marker])
-                held |= _bridge(kept, time, parts, step) > _LONGEST_GAP
-            durations = _bridge(at[:, marker], time, parts, step)
-            culprit[durations > missing_for] = f"{hand}_{name}: "
-            missing_for = np.maximum(missing_for, durations)
+        for k, marker in enumerate(samples.markers[hand]):
+            same = (np.diff(at[:, k], axis=0, prepend=np.nan) == 0).all(axis=1) & ~samples.begins
+            if 0 < same.mean() < 0.05:  # else markers are often still
+                kept = np.where(same[:, None], np.nan, at[:, k])
+                held |= _bridge(kept, samples) > _LONGEST_GAP
+            durations = _bridge(at[:, k], samples)
+            of_marker[durations > longest] = f"{marker}: "
+            longest = np.maximum(longest, durations)
     if coarse > 0.2:  # radii
-        warn(f"{source}: {rounded} is rounded to {coarse * task.radius:.2g}, the radius of goals "
-             f"is {task.radius:g}: are there more digits?")  # fmt: skip
-    leap = ~begins & (steps > 1.9 * step)  # clocks may be rounded
-    missing_for[leap] = np.maximum(missing_for[leap], steps[leap] - step)
-    lengths = {hand: np.linalg.norm(np.diff(places[hand], axis=1), axis=2) for hand in hands}
-    swaps = np.zeros(len(frame), dtype=bool)
-    for hand in hands:
-        links, each = task.robot.arm(hand).links, medians(lengths[hand])
-        off = np.abs(each / links - 1)
-        words = (f"{{}} the links of the {hand} arm are {{}} long in the median sample, those of "
-                 f"task {task.name!r} {_listed(links)}{{}}")  # fmt: skip
-        if wrong := np.flatnonzero((off > _TOLERANCE).any(axis=1)).tolist():
-            where = f"{source}, {names[begin[wrong[0]]]}: in trial {trial[begin[wrong[0]]]:g}"
-            swapped = _swapped(places[hand][parts[wrong[0]]], links, markers[hand])
-            cause = (f"{also([f'trial {trial[begin[n]]:g}' for n in wrong])}. {swapped}Is this "
-                     "another arm, another unit, or are markers misplaced?")  # fmt: skip
-            raise CoarticError(words.format(where, _listed(each[wrong[0]]), cause))
-        usual = pd.DataFrame(lengths[hand]).median().to_numpy()
+        warn(f"{samples.source}: {rounded} is rounded to {coarse * task.radius:.2g}, the radius of "
+             f"goals is {task.radius:g}: are there more digits?")  # fmt: skip
+    leaps = samples.leaps
+    longest[leaps] = np.maximum(longest[leaps], samples.steps[leaps] - step)
+    marks = pd.DataFrame({"gap": longest, "marker": of_marker, "is_held": held})
+    marks.attrs["grid"] = coarse * task.radius
+    return marks
+
+
+def _find_jumps_of_links(samples: _Samples) -> NDArray[np.object_]:
+    """Return the marker before which the length of a link jumps by over 10 %, ``(n,)``, empty
+    where none does. Raises CoarticError if the median length of a link in a trial differs by over
+    10 % from the task's; warns if over all trials by over 2 %, or between trials by over 2.5 %."""
+    task, jumps = samples.task, np.full(len(samples.time), "", dtype=object)
+    for hand, places in samples.places.items():
+        links, lengths = task.robot.arm(hand).links, _lengths(places)
+        each = samples.by_trial(lengths, "median")
+        words = (f"the links of the {hand} arm are {{}} long in the median sample, those of "
+                 f"task {task.name!r} {_listed(links)}")  # fmt: skip
+        if wrong := np.flatnonzero((np.abs(each / links - 1) > _TOLERANCE).any(axis=1)).tolist():
+            part = samples.parts[wrong[0]]
+            trials = [f"trial {samples.trial[samples.parts[n].start]:g}" for n in wrong]
+            swapped = _swapped(places[part], links, samples.markers[hand])
+            raise CoarticError(
+                f"{samples.source}, {samples.names[part.start]}: in {trials[0]} "
+                f"{words.format(_listed(each[wrong[0]]))}{also(trials)}. {swapped}Is this another "
+                "arm, another unit, or are markers misplaced?"
+            )
+        usual = pd.DataFrame(lengths).median().to_numpy()
         if (np.abs(usual / links - 1) > _TOLERANCE / 5).any():
-            more = ": a task with the lengths of this person fits better"
-            warn(words.format(f"{source}:", _listed(usual), more))
-        jumps = np.abs(np.diff(lengths[hand], axis=0, prepend=np.nan))
-        noise = 9 * pd.DataFrame(jumps).median().to_numpy()
-        jumped = (jumps > np.maximum(_TOLERANCE * links, noise)) & ~begins[:, None]
-        swaps |= jumped.any(axis=1)
-        for link in range(len(links)):
-            culprit[jumped[:, link] & (missing_for == 0)] = f"{hand}_{link + 1}: "
-            agree(f"the length of {hand} link {link + 1}", each[:, link], 0.1, np.inf,
-                  _TOLERANCE / 4 * links[link], "did a marker move, or the scale?")  # fmt: skip
-    shoulders = {hand: np.array(task.robot.arm(hand)[2:]) for hand in hands}
-    bases = [places[hand][:, 0] - shoulders[hand] for hand in hands]
+            warn(f"{samples.source}: {words.format(_listed(usual))}: a task with the lengths of "
+                 "this person fits better")  # fmt: skip
+        changes = np.abs(np.diff(lengths, axis=0, prepend=np.nan))
+        noise = 9 * pd.DataFrame(changes).median().to_numpy()
+        jumped = (changes > np.maximum(_TOLERANCE * links, noise)) & ~samples.begins[:, None]
+        for link, marker in enumerate(samples.markers[hand][:-1]):
+            jumps[jumped[:, link]] = f"{marker}: "
+            samples.compare_trials(
+                f"the length of {hand} link {link + 1}", each[:, link], 0.1, np.inf,
+                _TOLERANCE / 4 * links[link], "did a marker move, or the scale?",
+            )  # fmt: skip
+    return jumps
+
+
+def _postures(samples: _Samples) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the postures of samples, ``(n, dof)``, unwrapped from the task's start on in each
+    trial, and a mask of samples in which two shoulders are of no one base. Raises CoarticError, or
+    warns, if a locked base is elsewhere in some trials."""
+    task, robot = samples.task, samples.task.robot
+    shoulders = {hand: np.array(robot.arm(hand)[2:]) for hand in samples.places}
+    bases = [places[:, 0] - shoulders[hand] for hand, places in samples.places.items()]
     apart = np.linalg.norm(np.ptp(bases, axis=0), axis=1)
     width = float(np.linalg.norm(np.ptp([*shoulders.values()], axis=0)))
-    torn = apart > _TOLERANCE * (width or min(task.robot.reach(hand)[1] for hand in hands))
-
-    q = np.tile(task.q0, (len(frame), 1))
+    torn = apart > _TOLERANCE * (width or min(robot.reach(hand)[1] for hand in shoulders))
+    q = np.tile(task.q0, (len(apart), 1))
     q[:, :2] = np.mean(bases, axis=0)
     for k in ("xy".index(axis) for axis in task.locked_base):
-        agree(f"base_{'xy'[k]}", medians(q[:, k])[:, 0], 0.1, 2 * task.radius, task.radius,
-              f"task {task.name!r} locks it: did the person or the camera move?")  # fmt: skip
-    for hand in hands:
-        way = np.diff(places[hand], axis=1)
-        q[:, task.robot.joints(hand)] = np.diff(np.arctan2(way[..., 1], way[..., 0]), prepend=0.0)
-    rows, used, unfinished, starts, begun = [], np.zeros(len(frame), dtype=bool), [], [], []
-    counted_in: dict[str, list[int]] = {
-        f"the hand rests for more than {1000 * _LONGEST_REST:.0f} ms on the way": [],
-        "the hand is back at the start before it hits a goal": [],
-        "the hand is in the next goal already where it hits one": [],
-    }
-    pauses, returns, at_once = counted_in.values()
-    broken_off: list[Array] = []  # places of hands in unfinished trials
-    away, rests, twice = np.zeros((3, len(frame)), dtype=bool)
-    window = max(3, 2 * round(_LONGEST_GAP / step / 2) + 1)  # single samples are noise
-    largest = 0.25 * max(task.robot.reach(hand)[1] for hand in hands)
-    origins = np.stack([task.robot.forward_kinematics(task.q0, hand) for hand in hands])
-    for part in parts:
-        first, clock = part.start, time[part]
+        each = samples.by_trial(q[:, [k]], "median")[:, 0]
+        samples.compare_trials(
+            f"base_{'xy'[k]}", each, 0.1, 2 * task.radius, task.radius,
+            f"task {task.name!r} locks it: did the person or the camera move?",
+        )  # fmt: skip
+    for hand, places in samples.places.items():
+        way = np.diff(places, axis=1)
+        q[:, robot.joints(hand)] = np.diff(np.arctan2(way[..., 1], way[..., 0]), prepend=0.0)
+    for part in samples.parts:
         q[part, 2:] = np.unwrap(np.vstack([task.q0[2:], q[part, 2:]]), axis=0)[1:]
-        tips = np.stack([places[hand][part, -1] for hand in hands])
-        found = _hits(tips, task, clock, q[part])
-        # A second start: from where the hands are back, all goals are reached again.
-        smooth = np.stack([
-            pd.DataFrame(tip).rolling(window, center=True, min_periods=1).median().to_numpy()
-            for tip in tips
-        ])  # fmt: skip
-        radii = np.linalg.norm(smooth - smooth[:, :1], axis=2) / task.radius
-        to_goal = np.linalg.norm(tips[:, 0] - task.goal_array[0], axis=1).min() / task.radius
-        close = min(3.0, to_goal - 2)
-        left = np.logical_or.accumulate((radii > close + 0.5).any(axis=0))
-        back = left & (radii < close).all(axis=0)
-        back[: found[0][0] if found else None] = False
-        if back.any():
-            second = int(back.argmax())
-            rest = _hits(tips[:, second:], task, clock[second:], q[part][second:])
-            twice[first + second] = len(rest) == len(task.goals)
-        if (done := len(found)) < len(task.goals):
-            used[part] = True
-            after = tips[:, found[-1][0] + 1 if found else 0 :] - task.goal_array[done]
-            nearest = np.linalg.norm(after, axis=2).min(initial=np.inf) - task.radius
-            unfinished.append(f"goal {done + 1} in trial {trial[first]:g} by {nearest:.2g}")
-            broken_off.append(tips)
-            continue
-        used[first : first + found[-1][0] + 1] = True
-        away[first] = (np.linalg.norm(tips[:, 0] - origins, axis=1) > largest).any()
-        to_hit = slice(first, first + found[0][0] + 1)
-        by_arm = [np.linalg.norm(places[hand][to_hit] - places[hand][first], axis=2).max(axis=1)
-                  for hand in hands]  # fmt: skip
-        moved = np.max(by_arm, axis=0) / task.radius
-        moves = [time[to_hit][way > task.radius / 4].min(initial=np.inf) for way in by_arm]
-        begun.append(moves - clock[0])
+    return q, torn
+
+
+def _trial_of(samples: _Samples, q: Array, part: slice) -> _Trial:
+    """Return the trial of the samples ``part``; ``q``: postures of all samples, ``(n, dof)``."""
+    task, clock = samples.task, samples.time[part]
+    tips = np.stack([places[part, -1] for places in samples.places.values()])
+    hits = _hits(tips, task, clock, q[part])
+    window = max(3, 2 * round(_LONGEST_GAP / samples.step / 2) + 1)  # single samples are noise
+    smooth = np.stack([
+        pd.DataFrame(tip).rolling(window, center=True, min_periods=1).median().to_numpy()
+        for tip in tips
+    ])  # fmt: skip
+    ways = np.linalg.norm(smooth - smooth[:, :1], axis=2) / task.radius
+    to_goal = np.linalg.norm(tips[:, 0] - task.goal_array[0], axis=1).min() / task.radius
+    close, second = min(3.0, to_goal - 2), None
+    for back in _returns(ways, close + 0.5, close, hits[0].sample if hits else 0)[:1]:
+        rest = _hits(tips[:, back:], task, clock[back:], q[part][back:])
+        second = back if len(rest) == len(task.goals) else None
+    is_finished = len(hits) == len(task.goals)
+    end = part.start + hits[-1].sample + 1 if is_finished else part.stop
+    return _Trial(part, end, is_finished, tips, hits, ways, second)
+
+
+def _returns(ways: Array, left: float, back: float, first: int) -> list[int]:
+    """Return the samples from ``first`` on in which all hands are within ``back`` radii of the
+    start, after one was farther than ``left``; ``ways``, ``(hands, n)``, as of a trial."""
+    has_left = np.logical_or.accumulate((ways > left).any(axis=0))
+    there = np.flatnonzero(has_left & (ways < back).all(axis=0)).tolist()
+    return [sample for sample in there if sample >= first]
+
+
+def _refuse_places(
+    samples: _Samples, marks: pd.DataFrame, trials: Sequence[_Trial], remedy: str
+) -> None:
+    """Raise CoarticError for a used sample at which a gap of over 50 ms begins, the length of a
+    link jumps, a marker goes much farther than elsewhere, or shoulders are of no one base (not with
+    a ``remedy``), or for a trial with a second start."""
+    used = marks.is_used.to_numpy()
+
+    def refuse(column: str, wrong: NDArray[np.bool_], words: str) -> None:
+        wrong = used & wrong
+        samples.refuse(wrong, f"{marks[column][wrong.argmax()]}{words}")
+
+    lost, longest = (marks.gap > _LONGEST_GAP + 1e-9).to_numpy(), f"{1000 * _LONGEST_GAP:.0f} ms"
+    samples.refuse(
+        used & lost & samples.leaps,
+        f"time jumps by more than {longest}: are samples missing, or was the clock set? Fill the "
+        "gap, or leave the trial out",
+    )
+    words = f"a marker is missing for more than {longest}; fill the gap, or leave the trial out"
+    refuse("marker", lost, words)
+    words = (f"the length of a link jumps by more than {100 * _TOLERANCE:.0f} %: markers swap, or "
+             "a flag stands for a gap")  # fmt: skip
+    refuse("jumping_link", (marks.jumping_link != "").to_numpy(), words)
+    samples.refuse(
+        used & marks.is_torn.to_numpy() & (not remedy),
+        "the places of the two shoulders do not belong to one base: they differ from the task's by "
+        f"more than {100 * _TOLERANCE:.0f} %",
+    )
+    starts = [trial.part.start + trial.second for trial in trials if trial.second is not None]
+    samples.refuse(
+        marks.index.isin(starts),
+        "the hand is back at the start of the trial and reaches all goals again; needed is a "
+        "number for each trial",
+    )
+    marks["leaping"] = ""
+    for hand, places in samples.places.items():
+        ways = np.linalg.norm(np.diff(places, axis=0, prepend=np.nan), axis=2)
+        ways[samples.begins | ~used] = np.nan
+        ways /= np.maximum(samples.steps / samples.step, 1)[:, None]
+        most = np.maximum(6 * pd.DataFrame(ways).quantile(0.95).to_numpy(), samples.task.radius)
+        for k, marker in enumerate(samples.markers[hand]):
+            marks.loc[ways[:, k] > most[k], "leaping"] = f"{marker}: "
+    words = "a marker goes much farther than in other samples: are samples missing, or did a marker"
+    refuse("leaping", (marks.leaping != "").to_numpy(), f"{words} jump?")
+
+
+def _check_ends(samples: _Samples, trials: Sequence[_Trial], remedy: str) -> None:
+    """Warn of trials that are unfinished; raise CoarticError if most are, with the ``remedy``."""
+    task, missed = samples.task, []
+    for trial in trials:
+        if not trial.is_finished:
+            done, after = len(trial.hits), trial.hits[-1].sample + 1 if trial.hits else 0
+            ways = np.linalg.norm(trial.tips[:, after:] - task.goal_array[done], axis=2)
+            number, nearest = (
+                samples.trial[trial.part.start],
+                ways.min(initial=np.inf) - task.radius,
+            )
+            missed.append(f"goal {done + 1} in trial {number:g} by {nearest:.2g}")
+    if not missed:
+        return
+    words = (f"{samples.source}: {len(missed)} of {counted(len(trials), 'trial')} are unfinished "
+             f"and have no hits: the tip misses {missed[0]}{also(missed)}{remedy}")  # fmt: skip
+    if 2 * len(missed) > len(trials):
+        middles = np.nanmedian([trial.tips[:, 0] for trial in trials], axis=0)
+        raise CoarticError(
+            f"{words}. It begins at {_points(middles)} in the median trial, at "
+            f"{_points(samples.origins)} in the task. Are places in the unit of the task, with its "
+            "origin and directions (y upwards), not filtered, cut at the start, and goals in its "
+            "order? Else leave out trials that were broken off"
+        )
+    warn(words)
+
+
+def _check_starts(samples: _Samples, q: Array, trials: Sequence[_Trial]) -> None:
+    """Raise CoarticError for finished trials that begin far from the task's start, or with a rest;
+    warn if most begin a little away, or if one arm starts later than the other in all. ``q``:
+    postures of samples, ``(n, dof)``."""
+    task, robot, hands = samples.task, samples.task.robot, [*samples.places]
+    largest = 0.25 * max(robot.reach(hand)[1] for hand in hands)
+    away, rests = np.zeros((2, len(q)), dtype=bool)
+    begun = []
+    for trial in trials:
+        first, clock = trial.part.start, samples.time[trial.part]
+        away[first] = (np.linalg.norm(trial.tips[:, 0] - samples.origins, axis=1) > largest).any()
+        to_hit = slice(first, first + trial.hits[0].sample + 1)
+        by_arm = [np.linalg.norm(places[to_hit] - places[first], axis=2).max(axis=1) / task.radius
+                  for places in samples.places.values()]  # fmt: skip
+        begun.append([clock[: len(way)][way > 0.25].min(initial=np.inf) - clock[0]
+                      for way in by_arm])  # fmt: skip
+        moved = np.max(by_arm, axis=0)
         moved[-1] = np.inf
         # A smooth movement has gone 8 times as far after twice the time: the rest is before it.
         leaves, is_far = (clock[np.argmax(moved > far)] for far in (0.5, 4))
         rests[first] = 2 * leaves - is_far - clock[0] > _LONGEST_REST
-        starts.append(q[first] - task.q0)
-        to_last = slice(first, first + found[-1][0] + 1)
-        ways = np.hstack([places[hand][to_last] for hand in hands])
-        pauses += [int(first) + sample for sample in _rests(ways, time[to_last], task.radius)]
-        left = np.logical_or.accumulate((radii > 1.5).any(axis=0))
-        again = np.flatnonzero((left & (radii < 0.5).all(axis=0))[: found[0][0]])
-        returns += (first + again[:1]).tolist()
-        at_once += [int(first) + one[0] for one, other in pairwise(found) if other[0] - one[0] == 1]
-        before = clock[0]
-        for goal, (_, arm, when, posture) in enumerate(found, 1):
-            ticks = max((when - before) * ticks_per_unit, 1.0)
-            rows.append([people[0], trial[first], goal, hands[arm], round(ticks, 6), *posture])
-            before = when
-    lost = used & (missing_for > _LONGEST_GAP + 1e-9)
-    refuse(lost & leap, f"time jumps by more than {1000 * _LONGEST_GAP:.0f} ms: are samples "
-           "missing, or was the clock set? Fill the gap, or leave the trial out")  # fmt: skip
-    refuse(lost, f"{culprit[lost.argmax()]}a marker is missing for more than "
-           f"{1000 * _LONGEST_GAP:.0f} ms; fill the gap, or leave the trial out")  # fmt: skip
-    swaps &= used
-    refuse(swaps, f"{culprit[swaps.argmax()]}the length of a link jumps by more than "
-           f"{100 * _TOLERANCE:.0f} %: markers swap, or a flag stands for a gap")  # fmt: skip
-    remedy = _finished_by(broken_off, task)
-    torn &= used & (not remedy)
-    refuse(torn, "the places of the two shoulders do not belong to one base: they differ "
-           f"from the task's by more than {100 * _TOLERANCE:.0f} %")  # fmt: skip
-    refuse(twice, "the hand is back at the start of the trial and reaches all goals again; needed "
-           "is a number for each trial")  # fmt: skip
-    sprung = np.zeros(len(frame), dtype=bool)
-    for hand in hands:
-        ways = np.linalg.norm(np.diff(places[hand], axis=0, prepend=np.nan), axis=2)
-        ways[begins | ~used] = np.nan
-        ways /= np.maximum(steps / step, 1)[:, None]
-        most = np.maximum(6 * pd.DataFrame(ways).quantile(0.95).to_numpy(), task.radius)
-        for marker, name in enumerate(markers[hand]):
-            far = ways[:, marker] > most[marker]
-            culprit[far & (missing_for == 0)] = f"{hand}_{name}: "
-            sprung |= far
-    refuse(sprung, f"{culprit[sprung.argmax()]}a marker goes much farther than in other samples: "
-           "are samples missing, or did a marker jump?")  # fmt: skip
-    missed = f"the tip misses {' '.join(unfinished[:1])}{also(unfinished)}"
-    missed = (f"{source}: {len(unfinished)} of {counted(len(parts), 'trial')} are unfinished and "
-              f"have no hits: {missed}{remedy}")  # fmt: skip
-    if 2 * len(unfinished) > len(parts):
-        middles = [np.nanmedian(places[hand][begin, -1], axis=0) for hand in hands]
-        raise CoarticError(
-            f"{missed}. It begins at {_points(middles)} in the median trial, at {_points(origins)} "
-            "in the task. Are places in the unit of the task, with its origin and directions (y "
-            "upwards), not filtered, cut at the start, and goals in its order? Else leave out "
-            "trials that were broken off"
-        )
-    refuse(away, f"the hand is not within {largest:.2g} of {_points(origins)}, where task "
-           f"{task.name!r} starts; needed are trials cut at the start, or the start of people in "
-           "the task")  # fmt: skip
-    refuse(rests, f"the trial begins with a rest of more than {1000 * _LONGEST_REST:.0f} ms, which "
-           "would count as movement; cut trials where the movement begins")  # fmt: skip
-    if frozen := [names[row] for row in np.flatnonzero(used & held & (missing_for == 0))]:
-        warn(f"{source}, {frozen[0]}: a marker keeps its place to the last digit for more than "
-             f"50 ms, unlike elsewhere. Does its last place fill a gap?{also(frozen)}")  # fmt: skip
-    if bridged := np.flatnonzero(used & (missing_for > 0)).tolist():
-        row, longest = bridged[0], 1000 * missing_for[bridged].max()
-        words = f"a gap is bridged by a straight line; the longest takes {longest:.0f} ms"
-        warn(f"{source}, {names[row]}: {culprit[row]}{words}{also([names[n] for n in bridged])}")
-    if unfinished:
-        warn(missed)
-    every = np.hstack([places[hand].reshape(len(frame), -1) for hand in hands])
-    ways = np.diff(every, axis=0, prepend=np.nan)
-    ways[begins | leap] = np.nan
-    rates = step / np.where(begins, step, steps)[:, None]
-    least = 5 * coarse * task.radius  # shorter paths may be doubled by rounding
-    if (words := _odd_steps(ways, least)) and _odd_steps(ways * rates, least):
-        warn(f"{source}: {words}")
-    stretched = [
-        f"{hand} {words}"
-        for hand in hands
-        for words in _stretches(lengths[hand][used], q[used, task.robot.joints(hand)])
-    ]
-    if stretched:
-        warn(f"{source}: the length of {stretched[0]}: does a marker slide over a joint, "
-             f"or is it late?{also(stretched)}")  # fmt: skip
-    if absent := [hand for hand in task.hands if hand not in hands]:
-        warn(f"{source}: the {absent[0]} arm has no markers and keeps its start")
-    for words, samples in counted_in.items():
-        if samples:
-            warn(f"{source}, {names[samples[0]]}: {words}, {counted(len(samples), 'time')}, which "
-                 f"counts as movement{also([names[row] for row in samples])}")  # fmt: skip
+    samples.refuse(
+        away,
+        f"the hand is not within {largest:.2g} of {_points(samples.origins)}, where task "
+        f"{task.name!r} starts; needed are trials cut at the start, or the start of people in the "
+        "task",
+    )
+    samples.refuse(
+        rests,
+        f"the trial begins with a rest of more than {1000 * _LONGEST_REST:.0f} ms, which would "
+        "count as movement; cut trials where the movement begins",
+    )
     earliest, moving = np.min(begun, axis=0), np.isfinite(begun).sum(axis=0)
     if moving.min() >= 10 and (lag := np.ptp(earliest)) > 0.08:
-        warn(f"{source}: the {hands[int(earliest.argmax())]} arm rests for at least "
+        warn(f"{samples.source}: the {hands[int(earliest.argmax())]} arm rests for at least "
              f"{1000 * lag:.0f} ms more than the other at the start of all trials: does its system "
              "lag behind, or is the clock another?")  # fmt: skip
+    starts = q[[trial.part.start for trial in trials]] - task.q0
     start = np.median(starts, axis=0)
     same = np.mean(np.sign(starts) == np.sign(start), axis=0) >= 0.9
     distance = float(np.median(np.linalg.norm(starts, axis=1)))
-    far_joints = [f"{task.robot.joint_names[k]} {start[k]:+.2f}" for k in range(2, len(start))
+    far_joints = [f"{robot.joint_names[k]} {start[k]:+.2f}" for k in range(2, len(start))
                   if same[k] and abs(start[k]) > 0.05]  # fmt: skip
+    words = ""
     if far_joints:
-        warn(f"{source}: the median trial begins at {', '.join(far_joints)} rad from the start of "
-             f"task {task.name!r}: are trials cut late, or is its start another?")  # fmt: skip
+        words = (f"at {', '.join(far_joints)} rad from the start of task {task.name!r}: are trials "
+                 "cut late, or is its start another?")  # fmt: skip
     elif distance > 0.3:
-        warn(f"{source}: the median trial begins {distance:.2g} (length unit, rad) from the start "
-             f"of task {task.name!r}, in varied directions: is there one start?")  # fmt: skip
-    table = pd.DataFrame(rows, columns=["subject", "trial", "goal", "hand", "ticks",
-                                        *task.robot.joint_names])  # fmt: skip
-    calls = [f"trial {row[1]:g}, goal {row[2]}" for row in rows]
-    hits = checked_hits(table, task, source, calls, implausible)
-    hits.attrs["unfinished"] = len(unfinished)
-    return hits
+        words = (f"{distance:.2g} (length unit, rad) from the start of task {task.name!r}, in "
+                 "varied directions: is there one start?")  # fmt: skip
+    if words:
+        warn(f"{samples.source}: the median trial begins {words}")
+
+
+def _warn_of_places(samples: _Samples, q: Array, marks: pd.DataFrame) -> None:
+    """Warn of used samples in which a marker keeps its place, gaps are bridged, samples repeat or
+    frames seem lost, and of links whose length follows a joint; ``q``: postures, ``(n, dof)``."""
+    used, gap = marks.is_used.to_numpy(), marks.gap.to_numpy()
+    if frozen := np.flatnonzero(used & marks.is_held & (gap == 0)).tolist():
+        words = ("a marker keeps its place to the last digit for more than 50 ms, unlike "
+                 "elsewhere. Does its last place fill a gap?")  # fmt: skip
+        warn(samples.sentence(frozen, words))
+    if bridged := np.flatnonzero(used & (gap > 0)).tolist():
+        words = (f"{marks.marker[bridged[0]]}a gap is bridged by a straight line; the longest "
+                 f"takes {1000 * gap[bridged].max():.0f} ms")  # fmt: skip
+        warn(samples.sentence(bridged, words))
+    every = np.hstack([places.reshape(len(q), -1) for places in samples.places.values()])
+    ways = np.diff(every, axis=0, prepend=np.nan)
+    ways[samples.begins | samples.leaps] = np.nan
+    rates = samples.step / np.where(samples.begins, samples.step, samples.steps)[:, None]
+    least = 5 * marks.attrs["grid"]  # shorter paths may be doubled by rounding
+    if (words := _odd_steps(ways, least)) and _odd_steps(ways * rates, least):
+        warn(f"{samples.source}: {words}")
+    stretched = [
+        f"{hand} {words}"
+        for hand, places in samples.places.items()
+        for words in _stretches(_lengths(places)[used], q[used, samples.task.robot.joints(hand)])
+    ]
+    if stretched:
+        warn(f"{samples.source}: the length of {stretched[0]}: does a marker slide over a joint, "
+             f"or is it late?{also(stretched)}")  # fmt: skip
+    if absent := [hand for hand in samples.task.hands if hand not in samples.places]:
+        warn(f"{samples.source}: the {absent[0]} arm has no markers and keeps its start")
+
+
+def _warn_of_movement(samples: _Samples, trials: Sequence[_Trial]) -> None:
+    """Warn of what counts as movement in finished trials: rests on the way, returns to the start,
+    and hits of two goals in successive samples."""
+    found: dict[str, list[int]] = {
+        f"the hand rests for more than {1000 * _LONGEST_REST:.0f} ms on the way": [],
+        "the hand is back at the start before it hits a goal": [],
+        "the hand is in the next goal already where it hits one": [],
+    }
+    pauses, returns, at_once = found.values()
+    for trial in trials:
+        first, radius = trial.part.start, samples.task.radius
+        ways = np.hstack([places[first : trial.end] for places in samples.places.values()])
+        pauses += [first + k for k in _rests(ways, samples.time[first : trial.end], radius)]
+        to_hit = trial.ways[:, : trial.hits[0].sample]
+        returns += [first + k for k in _returns(to_hit, 1.5, 0.5, 0)[:1]]
+        at_once += [first + one.sample for one, other in pairwise(trial.hits)
+                    if other.sample - one.sample == 1]  # fmt: skip
+    for words, rows in found.items():
+        if rows:
+            times = counted(len(rows), "time")
+            warn(samples.sentence(rows, f"{words}, {times}, which counts as movement"))
+
+
+def _lengths(places: Array) -> Array:
+    """Return the lengths of the links of an arm, ``(n, links)``, from its markers' places."""
+    lengths: Array = np.linalg.norm(np.diff(places, axis=1), axis=2)
+    return lengths
 
 
 def _odd_steps(ways: Array, least: float) -> str:
@@ -477,7 +714,7 @@ def _rests(places: Array, time: Array, radius: float) -> list[int]:
     return begins
 
 
-def _swapped(places: Array, links: Array, markers: Sequence[object]) -> str:
+def _swapped(places: Array, links: Array, markers: Sequence[str]) -> str:
     """Return in words the first two markers of an arm (``places``, ``(n, markers, 2)``) whose
     exchange brings the median length of each link within 10 % of ``links``; empty if no exchange
     does."""
@@ -511,15 +748,15 @@ def _finished_by(trials: Sequence[Array], task: Task) -> str:
     return ""
 
 
-def _bridge(place: Array, time: Array, parts: Sequence[slice], step: float) -> Array:
+def _bridge(place: Array, samples: _Samples) -> Array:
     """Fill the gaps (NaN) of a marker, ``(n, 2)``, in place by straight lines in time, trial by
     trial (at ends by the nearest place; not in trials without a place). Return, at the first sample
-    of each gap, its duration in s, and 0 elsewhere; ``step``: time between samples, s."""
-    gap, durations = np.isnan(place[:, 0]), np.zeros(len(place))
-    for part in parts if gap.any() else ():
+    of each gap, its duration in s, and 0 elsewhere."""
+    gap, durations, step = np.isnan(place[:, 0]), np.zeros(len(place)), samples.step
+    for part in samples.parts if gap.any() else ():
         if not gap[part].any():
             continue
-        there, clock = ~gap[part], time[part]
+        there, clock = ~gap[part], samples.time[part]
         edges = np.flatnonzero(np.diff(np.concatenate([[True], there, [True]]).astype(int)))
         around = np.concatenate([[clock[0] - step], clock, [clock[-1] + step]])
         durations[part.start + edges[::2]] = around[edges[1::2] + 1] - around[edges[::2]] - step
@@ -529,15 +766,14 @@ def _bridge(place: Array, time: Array, parts: Sequence[slice], step: float) -> A
     return durations
 
 
-def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int, float, Array]]:
-    """Return the hits of a trial, up to the first goal that is missed, each with the index of the
-    sample and of the hand in ``tips``, ``(hands, n, 2)``, and time, s, and posture where the tip
-    enters the goal, from times ``(n,)`` and postures ``q``, ``(n, dof)``, of the samples."""
-    found: list[tuple[int, int, float, Array]] = []
+def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[_Hit]:
+    """Return the hits of a trial, up to the first goal that is missed, from places of the tips,
+    ``(hands, n, 2)``, times ``(n,)`` and postures ``q``, ``(n, dof)``, of its samples."""
+    found: list[_Hit] = []
     at, goals = tips @ [1, 1j], task.goal_array @ [1, 1j]
     ways = np.diff(at, axis=1, prepend=at[:, :1])  # to each sample from the one before
     for goal in goals:
-        first = found[-1][0] + 1 if found else 0
+        first = found[-1].sample + 1 if found else 0
         way, start = ways[:, first:], (at - ways)[:, first:] - goal
         square = np.maximum(way.real**2 + way.imag**2, 1e-18)
         slope = (start * way.conj()).real
@@ -552,8 +788,6 @@ def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[tuple[int, int
         share = (-slope[hand, place] - np.sqrt(max(root, 0.0))) / square[hand, place]
         share = np.clip(share, 0, 1) if sample else 1.0
         before = max(sample - 1, 0)
-        found.append((
-            sample, hand, float(time[before] + share * (time[sample] - time[before])),
-            q[before] + share * (q[sample] - q[before]),
-        ))  # fmt: skip
+        when = float(time[before] + share * (time[sample] - time[before]))
+        found.append(_Hit(sample, hand, when, q[before] + share * (q[sample] - q[before])))
     return found

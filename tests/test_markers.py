@@ -162,7 +162,9 @@ WRONG = {
     "row 0: right_2: a marker is missing": lose(8, first=0),
     "row 46: time jumps by more than 50 ms": lambda t: t.drop(index=range(40, 46)),
     "row 50: right_.: the length of a link jumps.*swap": swap(50, 60),
-    "row 0: in trial 1 the links.*0.09. Markers 2 and 3 may be swapped": swap(0, 10**4 // 40),
+    "row 0: in trial 1 the links.*0.09. Markers right_2 and right_3 may be swapped": swap(
+        0, 10**4 // 40
+    ),
     "row 50: .*the length of a link .*flag": lose(1, first=50, value=9999.0),
     r"are 330, 270, 90 long .*'metres' 0.33, 0.27, 0.09.*another unit": scaled(1000),
     "another arm": scaled(0.85),
