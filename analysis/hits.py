@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
-import sys
-import unicodedata
-import warnings
 from collections.abc import Callable, Sequence
 from itertools import permutations, product
 from pathlib import Path
@@ -16,13 +11,22 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from pandas.api.types import infer_dtype
 
 from coartic import CoarticError, Task
+from coartic.analysis.recorded_tables import (
+    NAMED,
+    also,
+    as_names,
+    as_numbers,
+    read_table,
+    row_names,
+    warn,
+    why_no_number,
+)
 from coartic.analysis.solutions import initial_solution
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value
-from coartic.internal.text import counted, foreign_file
+from coartic.internal.text import counted
 from coartic.model import PAPER
 from coartic.motion.movement import LARGEST_ENTRY
 from coartic.robot import Array, Hand
@@ -37,9 +41,6 @@ MANY = 20
 """Fewest hits, or samples, that most comparisons need."""
 _OUTSIDE = 1.25
 """Distance from the centre of a goal, radii, beyond which a hit is not at its edge."""
-_NAMED = 5  # of a kind
-_INNER = ("coartic", "pydantic")  # packages whose lines no warning names
-_MONTH = "(jan|feb|m[aä]r|apr|ma[iy]|jun|jul|aug|sep|o[ck]t|nov|de[cz])[a-z]*"
 _ANGLES = {"": 1.0, "degrees are made rad": np.pi / 180, "gradians are made rad": np.pi / 200,
            "turns are made rad": 2 * np.pi}  # fmt: skip
 AXES = {
@@ -49,8 +50,6 @@ AXES = {
     "x and y are swapped": (-1, 1), "x and y are swapped, with the other sign": (-1, 3),
 }  # fmt: skip
 """Changes of axes: sign of angles, and right angles of a turn afterwards."""
-_DATE = re.compile(rf"\d+\W+{_MONTH}\W*\d*|{_MONTH}\W+\d+|\d+([-./])\d+\3\d{{2,4}}", re.IGNORECASE)
-_HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
 
 
 @checked_arguments
@@ -124,190 +123,11 @@ def read_hits(
     return checked_hits(frame, task, str(path), names, implausible, ticks_per_unit or 1.0)
 
 
-def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return a CSV file as a frame of texts and numbers, and a name, such as ``line 2``, for each
-    row. Raises CoarticError for a file that cannot be read, is not in UTF-8, has rows that do not
-    fit its headings, or repeats one or all of these; ``kind``, such as ``recorded hits are``, is
-    for a message."""
-    if words := foreign_file(str(path), f"{kind} a CSV file, see docs/howto/people.md"):
-        raise CoarticError(words)
-    try:
-        content = Path(path).read_bytes()
-        text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise CoarticError(f"{path} cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        text = "\0"
-    if "\0" in text:
-        wide = content[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\0" in content[:200]
-        kind = "in UTF-16, as Excel and Notepad write 'Unicode'" if wide else "not in UTF-8"
-        kind = f"damaged from byte {content.find(0)} on" if len(text) > 1 and not wide else kind
-        raise CoarticError(f"{path} is {kind}: save it as CSV in UTF-8")
-    frame, lines = _plain_table(text) or _odd_table(path, text)
-    again = np.flatnonzero(frame.iloc[:, :1] == frame.columns[:1]).tolist()
-    if again:
-        others = also([lines[row] for row in again])
-        raise CoarticError(f"{path}, {lines[again[0]]}: the headings are there again{others}")
-    return frame, lines
-
-
-def _plain_table(text: str) -> tuple[pd.DataFrame, list[str]] | None:
-    """Return frame and names of rows as :func:`read_table` does, by a fast parser; None for a text
-    without rows, or with quotes, ``#``, blank lines, rows that differ in length, odd line ends, or
-    empty, equal or single headings."""
-    head, _, body = text.replace("\r\n", "\n").removesuffix("\n").partition("\n")
-    headings, rows = [*map(_written, head.split(","))], body.count("\n") + 1
-    if (
-        any(odd in text for odd in '"#')
-        or "\r" in body
-        or not all(headings)
-        or not 1 < len({*headings}) == len(headings)
-        or body.count(",") != rows * (len(headings) - 1)
-        or body.partition("\n")[0].count(",") != len(headings) - 1  # else pandas shifts columns
-    ):
-        return None
-    try:
-        frame = pd.read_csv(
-            io.StringIO(body), names=headings, dtype={"subject": str, "hand": str}, na_values=[""],
-            keep_default_na=False, skipinitialspace=True, low_memory=False,
-        )  # fmt: skip
-    except ValueError:  # of rows with more values
-        return None
-    if len(frame) != rows or frame.isna().all(axis=1).any():
-        return None
-    return frame, [f"line {row}" for row in range(2, rows + 2)]
-
-
-def _odd_table(path: str | Path, text: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return frame and names of rows as :func:`read_table` does, line by line. Raises CoarticError
-    for another separator, a row with another number of values than the headings, an open quote, and
-    a repeated heading. Warns of rows with as many values as headings that are left out because they
-    begin with #."""
-    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
-    headings: list[str] = []
-    rows, lines, wrong, hidden = [], [], [], []
-    try:
-        for fields in reader:
-            while fields and (not headings or len(fields) > len(headings)):
-                if fields[-1].strip():
-                    break
-                fields.pop()
-            first = fields[0].strip() if fields else ""
-            if first.startswith("#"):
-                hidden += [f"line {reader.line_num}"] * (len(fields) == len(headings))
-                continue
-            if not any(map(str.strip, fields)):
-                continue
-            if not headings and first.startswith("sep=") and not any(fields[1:]):
-                continue
-            if not headings:
-                headings = [*map(_written, fields)]
-                for separator in [odd for odd in ";\t|" if len(fields) == 1 and odd in fields[0]]:
-                    raise CoarticError(
-                        f"{path}: the separator is {separator!r}; needed are values separated by "
-                        f"commas, and numbers with a decimal point: found are {headings[0]}"
-                    )
-            elif len(fields) != len(headings):
-                wrong.append((reader.line_num, len(fields)))
-            else:
-                rows.append(fields)
-                lines.append(f"line {reader.line_num}")
-    except csv.Error as error:
-        quote = "; is a quotation mark open?" * ("unexpected end" in str(error))
-        raise CoarticError(f"{path}, line {reader.line_num}: {error}{quote}") from None
-    if wrong:
-        raise CoarticError(
-            f"{path}, line {wrong[0][0]}: it has {counted(wrong[0][1], 'value')}, "
-            f"the headings are {len(headings)}: {', '.join(headings)}"
-            f"{'; is there a decimal comma?' * (wrong[0][1] > len(headings))}"
-            f"{also([f'line {line}' for line, _ in wrong])}"
-        )
-    if twice := [name for n, name in enumerate(headings) if name in headings[:n]]:
-        raise CoarticError(f"{path} has two columns {twice[0]!r}")
-    if hidden:
-        warn(f"{path}, {hidden[0]}: it begins with # and is left out{also(hidden)}")
-    return pd.DataFrame(rows, columns=headings, dtype=object), lines
-
-
 def turned(places: Array, axes: str) -> Array:
     """Return places ``(..., 2)``, x and y, after a change of axes, a key of :data:`AXES`."""
     sign, quarters = AXES[axes]
     at = (places[..., 0] + sign * 1j * places[..., 1]) * 1j**quarters
     return np.stack([at.real, at.imag], axis=-1)
-
-
-def also(names: Sequence[str]) -> str:
-    """Return `` (also B, C, D, E, 2 more)`` for names A to G: the second to the fifth name and the
-    number of others; empty for a single name or none."""
-    named = [*names[1:_NAMED], *[f"{len(names) - _NAMED} more"] * (len(names) > _NAMED)]
-    return f" (also {', '.join(named)})" if named else ""
-
-
-def warn(text: str, refuse: bool = False) -> None:
-    """Warn with this text, at the line outside of this package that called it; with ``refuse``
-    raise CoarticError with this text in place of a warning."""
-    if refuse:
-        raise CoarticError(text)
-    frame, level = sys._getframe(), 1
-    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in _INNER:
-        frame, level = frame.f_back, level + 1
-    warnings.warn(text, stacklevel=level)
-
-
-def _written(text: str) -> str:
-    """Return text in Unicode's composed form (NFC), with single spaces for blanks of any kind
-    between words, a hyphen for dashes and minus signs, and without format characters (Cf)."""
-    shown = "".join(c for c in text.translate(_HYPHENS) if unicodedata.category(c) != "Cf")
-    return " ".join(unicodedata.normalize("NFC", shown).split())
-
-
-def row_names(frame: pd.DataFrame) -> list[str]:
-    """Return a name for each row of a frame, such as ``row 2``, by its index."""
-    return [f"row {brief_value(row)}" for row in frame.index.tolist()]
-
-
-def as_names(values: pd.Series) -> pd.Series:
-    """Return names as texts, with single spaces and plain hyphens (:func:`_written`); whole numbers
-    are without ``.0``, and a missing name is an empty text."""
-    known = {}
-    for value in values.dropna().unique():
-        whole = isinstance(value, float | np.floating) and value.is_integer()
-        known[value] = _written(f"{value:.0f}" if whole else str(value))
-    return values.map(known).astype(object).where(values.notna(), "")
-
-
-def as_numbers(values: pd.Series) -> NDArray[np.float64]:
-    """Return values as numbers, shape ``(n,)``, also texts with typographic minus signs; NaN for a
-    value that pandas reads as no real number. Infinity is a number, True and False are not."""
-    values = values.astype(object) if isinstance(values.dtype, pd.CategoricalDtype) else values
-    if infer_dtype(values, skipna=True) in ("boolean", "complex", "mixed", "mixed-integer"):
-        values = values.astype(object).where(
-            ~values.map(lambda value: isinstance(value, bool | np.bool_ | complex))
-        )
-    elif values.dtype.kind not in "iufO":  # durations of pandas would be nanoseconds
-        values = values.astype(str)
-    numbers = pd.to_numeric(values, errors="coerce")
-    array = np.array(numbers.to_numpy(np.float64, na_value=np.nan))
-    for row in np.flatnonzero(np.isnan(array)):
-        if isinstance(text := values.iloc[row], str) and text:
-            array[row] = pd.to_numeric(_written(text), errors="coerce")
-    return array
-
-
-def why_no_number(value: object) -> str:
-    """Return in words why a value is no number: it looks like a date, or a character spoils it; for
-    other values that a number is needed."""
-    text = _written(str(value))
-    if _DATE.fullmatch(text):
-        return "it looks like a date that a spreadsheet made of a number: import numbers as text"
-    begin = re.match(r"[+-]?\d*\.?\d*(e[+-]?\d+)?", text, re.IGNORECASE | re.ASCII)
-    spoils = text[begin.end() :][:1] if begin else ""
-    if not (spoils and re.search(r"\d", text)):
-        return "needed is a number; leave out the row of a hit that is missing"
-    point = {",": ": write a decimal point, and nothing between thousands",
-             ":": ": write seconds, not the time of day"}.get(spoils, "")  # fmt: skip
-    kind = unicodedata.name(spoils, "without a name").lower()
-    return f"{spoils!r} ({kind}) makes it no number{point}"
 
 
 def checked_hits(
@@ -322,9 +142,41 @@ def checked_hits(
     with ``subject``, ``trial``, ``goal``, ``hand``, ``ticks`` and all joints. ``source`` and
     ``names`` of rows are for messages; ``ticks_per_unit``: None for hits from no file, whose
     ``ticks`` may be fractions."""
+    names = names or row_names(frame)
+    is_timed = ticks_per_unit is not None and "duration" in frame
+    frame = _with_columns(frame, task, source, is_timed)
+    frame = _with_values(frame, task, source, names, ticks_per_unit, is_timed)
+    trials = [frame.subject, frame.trial]
+    steps = np.sign(frame.groupby(trials).goal.diff()).groupby(trials)
+    back = (steps.transform("min") * steps.transform("max") < 0).to_numpy()
+    begins = ~frame.duplicated(["subject", "trial"]).to_numpy()
+    disordered = [names[row] for row in np.flatnonzero(back & begins).tolist()]
+    order = np.lexsort([frame.goal.array, frame.trial.array, pd.factorize(frame.subject)[0]])
+    frame, names = frame.iloc[order].reset_index(drop=True), [names[row] for row in order]
+    for subject, hand in product(frame.subject.unique().tolist(), task.hands):
+        hits = frame[(frame.subject == subject) & (frame.hand == hand)]
+        angles = [*task.robot.joint_names[task.robot.joints(hand)]]
+        _warn_of_values(hits, angles, f"{source}, {subject}")
+    frame, names = _without_implausible(
+        frame, task, source, names, implausible, ticks_per_unit or 1.0
+    )
+    for words in _odd_groups(frame, task) + _cut_trials(frame, len(task.goals)) + _copies(frame):
+        warn(f"{source}: {words}")
+    if disordered:
+        words = ("rows of the trial are in no order of goals, up or down; times are taken as from "
+                 "the goal with the number before")  # fmt: skip
+        warn(f"{source}, {disordered[0]}: {words}{also(disordered)}")
+    _unwrap(frame, task, source, names)
+    return frame
+
+
+def _with_columns(frame: pd.DataFrame, task: Task, source: str, is_timed: bool) -> pd.DataFrame:
+    """Return recorded hits with the columns of :func:`read_hits` alone, angles of joints that the
+    task does not use, and a locked base that is not there, as at the start; ``is_timed``: ticks are
+    in ``duration``. Warns of columns that are left out, and raises CoarticError for a column that
+    is missing or there twice, and for no hits."""
     if twice := [name for n, name in enumerate(frame.columns) if name in frame.columns[:n]]:
         raise CoarticError(f"{source} has two columns {twice[0]!r}")
-    called = names or row_names(frame)
     joints = [*task.robot.joint_names]
     used = {"base_x", "base_y"}
     used |= {name for hand in task.hands for name in joints[task.robot.joints(hand)]}
@@ -343,8 +195,7 @@ def checked_hits(
     if {"ticks", "duration"} <= {*frame.columns}:
         raise CoarticError(f"{source} has columns ticks and duration: leave one of them out")
     there = ", ".join(map(str, frame.columns)) or "none"
-    is_file, timed = ticks_per_unit is not None, "duration" in frame
-    if is_file and timed:
+    if is_timed:
         frame = frame.rename(columns={"duration": "ticks"})
     frame = frame.assign(**starts)
     needed = ["subject", "trial", "goal", "hand", "ticks", *joints]
@@ -356,17 +207,31 @@ def checked_hits(
         )
     if not len(frame):
         raise CoarticError(f"{source} has no hit: needed is a row for each")
-    frame = frame[needed].copy()
+    return frame[needed]
+
+
+def _with_values(
+    frame: pd.DataFrame,
+    task: Task,
+    source: str,
+    names: Sequence[str],
+    ticks_per_unit: float | None,
+    is_timed: bool,
+) -> pd.DataFrame:
+    """Return a new frame of recorded hits whose subjects and hands are texts and other values
+    numbers. Warns of a subject that is spelt in several ways, and raises CoarticError for a value
+    that cannot be, or a hit that is there twice."""
 
     def refuse(wrong: ArrayLike, column: str, wanted: str | Callable[[object], str]) -> None:
         if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():
             value = frame[column].tolist()[rows[0]]
             needs = wanted if isinstance(wanted, str) else wanted(value)
             shown = "empty" if value == "" or pd.isna(value) else brief_value(value)
-            key = "duration" if column == "ticks" and is_file and timed else column
-            others = also([called[row] for row in rows])
-            raise CoarticError(f"{source}, {called[rows[0]]}: {key} is {shown}; {needs}{others}")
+            key = "duration" if column == "ticks" and is_timed else column
+            others = also([names[row] for row in rows])
+            raise CoarticError(f"{source}, {names[rows[0]]}: {key} is {shown}; {needs}{others}")
 
+    frame, joints = frame.copy(), [*task.robot.joint_names]
     for name in ["trial", "goal", "ticks", *joints]:
         numbers = as_numbers(frame[name])
         refuse(~np.isfinite(numbers), name, why_no_number)
@@ -386,7 +251,7 @@ def checked_hits(
     refuse(~is_whole, "trial", "needed is a whole number from 1 to 100000")
     last = len(task.goals)
     refuse(~frame.goal.isin(range(1, last + 1)), "goal", f"needed is a number from 1 to {last}")
-    if is_file and not timed:
+    if ticks_per_unit is not None and not is_timed:
         seconds = "needed is a whole number; seconds belong into a column duration"
         refuse(frame.ticks % 1 != 0, "ticks", seconds)
     unit = ticks_per_unit or 1.0
@@ -399,19 +264,22 @@ def checked_hits(
     for name in joints[:2]:
         far = "needed is a place in the length unit of the task"
         refuse(frame[name].abs() > LARGEST_ENTRY, name, far)
-    trials = [frame.subject, frame.trial]
-    steps = np.sign(frame.groupby(trials).goal.diff()).groupby(trials)
-    back = (steps.transform("min") * steps.transform("max") < 0).to_numpy()
-    begins = ~frame.duplicated(["subject", "trial"]).to_numpy()
-    mixed = [called[row] for row in np.flatnonzero(back & begins).tolist()]
-    keys = frame.trial * (last + 1) + frame.goal
-    order = np.lexsort([keys.to_numpy(), pd.factorize(frame.subject)[0]])
-    frame, called = frame.iloc[order].reset_index(drop=True), [called[n] for n in order]
-    for subject, hand in product(people, task.hands):
-        hits = frame[(frame.subject == subject) & (frame.hand == hand)]
-        _warn_of_values(hits, joints[task.robot.joints(hand)], f"{source}, {subject}")
+    return frame
+
+
+def _without_implausible(
+    frame: pd.DataFrame,
+    task: Task,
+    source: str,
+    names: Sequence[str],
+    implausible: Implausible,
+    unit: float,
+) -> tuple[pd.DataFrame, Sequence[str]]:
+    """Return sorted hits, and names of their rows, without implausible ones, with a warning that
+    counts them. Raises CoarticError, with advice, if there are some and ``implausible`` is
+    "refuse", or if most of a subject's are; ``unit``: ticks in a unit of the recording."""
     initial, counts = initial_solution(task), frame.subject.value_counts()
-    slowest = max(initial.ticks_by_goal() if initial else [np.pi / PAPER.step * len(joints)])
+    slowest = max(initial.ticks_by_goal() if initial else [np.pi / PAPER.step * task.robot.dof])
     reasons: list[str] = []
     whose: list[str] = []
     while True:  # without implausible hits others may stand out
@@ -420,7 +288,7 @@ def checked_hits(
             hits = frame.iloc[rows].reset_index(drop=True)
             why[rows] = _implausible(hits, task, f"{source}, {subject}", unit, slowest)
         wrong = why != ""
-        reasons += [f"{called[row]}: {why[row]}" for row in np.flatnonzero(wrong).tolist()]
+        reasons += [f"{names[row]}: {why[row]}" for row in np.flatnonzero(wrong).tolist()]
         whose += frame.subject[wrong].tolist()
         most = [name for name in counts.index if 2 * whose.count(name) > counts[name]]
         if not wrong.any():
@@ -444,17 +312,11 @@ def checked_hits(
                 advice = " ".join([*_odd_groups(frame, task), *_copies(frame), advice])
             raise CoarticError(f"{source}, {reasons[0]}{also(reasons)}. {advice}")
         frame = frame[~wrong].reset_index(drop=True)
-        called = [name for name, words in zip(called, why, strict=True) if not words]
+        names = [name for name, words in zip(names, why, strict=True) if not words]
     if reasons:
         warn(f"{source}: {len(reasons)} of {counted(counts.sum(), 'hit')} are left out as "
              f"implausible, {reasons[0]}{also(reasons)}")  # fmt: skip
-    for words in _odd_groups(frame, task) + _cut_trials(frame, last) + _copies(frame):
-        warn(f"{source}: {words}")
-    if mixed:
-        warn(f"{source}, {mixed[0]}: rows of the trial are in no order of goals, up or down; times "
-             f"are taken as from the goal with the number before{also(mixed)}")  # fmt: skip
-    _unwrap(frame, task, source, called)
-    return frame
+    return frame, names
 
 
 def _unwrap(frame: pd.DataFrame, task: Task, source: str, names: Sequence[str]) -> None:
@@ -664,7 +526,7 @@ def _clocks(hits: pd.DataFrame, paces: pd.Series, rises: Array, source: str) -> 
     usual = np.log(paces[~later].median())
     errors = [np.bincount(trial, np.abs(each - usual)) for each in (of_ticks, of_rises)]
     clocks = [f"trial {number}" for number in np.flatnonzero(errors[1] < errors[0] / 2)]
-    if found := _NAMED <= len(clocks) < 0.8 * len(np.unique(trial)):
+    if found := NAMED <= len(clocks) < 0.8 * len(np.unique(trial)):
         warn(f"{source}, {clocks[0]}: times rise from goal to goal, {needed}{also(clocks)}")
     return found
 

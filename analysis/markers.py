@@ -14,17 +14,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from coartic import CoarticError, Task
-from coartic.analysis.hits import (
-    AXES,
-    MANY,
-    Implausible,
+from coartic.analysis.hits import AXES, MANY, Implausible, checked_hits, turned
+from coartic.analysis.recorded_tables import (
     also,
     as_names,
     as_numbers,
-    checked_hits,
     read_table,
     row_names,
-    turned,
     warn,
     why_no_number,
 )
@@ -113,9 +109,11 @@ def hits_from_markers(
     finished = [trial for trial in trials if trial.is_finished]
     remedy = _finished_by([trial.tips for trial in trials if not trial.is_finished], task)
     _refuse_places(samples, marks, trials, remedy)
-    _check_ends(samples, trials, remedy)
+    unfinished = _unfinished(samples, trials, remedy)
     _check_starts(samples, q, finished)
     _warn_of_places(samples, q, marks)
+    if unfinished:
+        warn(unfinished)
     _warn_of_movement(samples, finished)
     rows = []
     for trial in finished:
@@ -494,8 +492,9 @@ def _refuse_places(
     refuse("leaping", (marks.leaping != "").to_numpy(), f"{words} jump?")
 
 
-def _check_ends(samples: _Samples, trials: Sequence[_Trial], remedy: str) -> None:
-    """Warn of trials that are unfinished; raise CoarticError if most are, with the ``remedy``."""
+def _unfinished(samples: _Samples, trials: Sequence[_Trial], remedy: str) -> str:
+    """Return in words which trials are unfinished, with the ``remedy``; empty if none is. Raises
+    CoarticError if most are."""
     task, missed = samples.task, []
     for trial in trials:
         if not trial.is_finished:
@@ -507,7 +506,7 @@ def _check_ends(samples: _Samples, trials: Sequence[_Trial], remedy: str) -> Non
             )
             missed.append(f"goal {done + 1} in trial {number:g} by {nearest:.2g}")
     if not missed:
-        return
+        return ""
     words = (f"{samples.source}: {len(missed)} of {counted(len(trials), 'trial')} are unfinished "
              f"and have no hits: the tip misses {missed[0]}{also(missed)}{remedy}")  # fmt: skip
     if 2 * len(missed) > len(trials):
@@ -518,7 +517,7 @@ def _check_ends(samples: _Samples, trials: Sequence[_Trial], remedy: str) -> Non
             "origin and directions (y upwards), not filtered, cut at the start, and goals in its "
             "order? Else leave out trials that were broken off"
         )
-    warn(words)
+    return words
 
 
 def _check_starts(samples: _Samples, q: Array, trials: Sequence[_Trial]) -> None:
