@@ -431,63 +431,92 @@ def _odd_times(
     coarse, or impossible; warn of signs of this, of reaction times, and of times that do not follow
     paths. ``straight``: ticks of straight movements, ``(n,)``, NaN where unknown; others as of
     :func:`_implausible`."""
-    ticks, goal, trial = (hits[name].to_numpy(np.float64) for name in ("ticks", "goal", "trial"))
     known = np.isfinite(straight)
-    logs = pd.DataFrame({"paths": straight, "here": ticks, "above": np.roll(ticks, 1),
-                         "below": np.roll(ticks, -1)}).clip(lower=1e-9)  # fmt: skip
-    logs = logs.assign(paths=logs.paths.clip(lower=1.0)).transform(np.log)[known]
-    paces, goals = (logs.here - logs.paths).transform(np.exp), goal[known]
-    usual, path = float(np.median(ticks[known])), float(np.median(straight[known]))
-    clocks = _clocks(hits[known], paces, np.diff(ticks, prepend=0.0)[known], source)
+    times = hits[["ticks", "goal", "trial"]].assign(straight=straight, fast=False)
+    times["fast"] = known & ((straight - times.ticks) * PAPER.step > 0.1)
+    above, below = (np.roll(times.ticks, rows) for rows in (1, -1))
+    paths = times.straight.clip(lower=1.0)
+    logs = pd.DataFrame({"paths": paths, "here": times.ticks, "above": above, "below": below})
+    logs = logs.clip(lower=1e-9).transform(np.log)[known]
+    times["pace"] = (logs.here - logs.paths).transform(np.exp)
+    rises = np.diff(hits.ticks, prepend=0.0)[known]
+    clocks = _clocks(hits[known], times.pace[known], rises, source)
+    if known.sum() >= MANY:
+        _refuse_two_units(times[known], source, unit)
+    _check_steps_of_times(hits, source, float(times.ticks[known].median()))
+    _check_unit(times[known], source, unit, slowest)
+    _warn_of_paces(times, logs, source, clocks)
 
-    def likely(pace: float) -> str:
-        return min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * pace)))
 
-    if len(paces) >= MANY:
-        ordered, tenth = np.sort(paces), len(paces) // 10 + 1
-        leaps = (ordered[1:] / ordered[:-1])[tenth - 1 : len(paces) - tenth]
-        is_slow = paces > ordered[tenth - 1 + leaps.argmax()]
-        less, more = paces[~is_slow], paces[is_slow]
-        units = [likely(float(each.median())) for each in (less, more)]
-        if leaps.max() > 5 and units[0] != units[1] and len({*goals[is_slow]}) > 1:
-            one, other = (f"goal {goal[row]:g} in trial {trial[row]:g}"
-                          for row in (less.index[0], more.index[0]))  # fmt: skip
-            factor = more.median() / less.median()
-            point = ", or was a point between thousands read as a decimal point"
-            raise CoarticError(
-                f"{source}: {len(more)} of {len(paces)} hits, first {other}, take {factor:.0f} "
-                f"times as long for their paths as others, first {one}. Do units differ, "
-                f"{units[1]} there and {units[0]} elsewhere{point * bool(500 < factor < 2000)}?"
-            )
-    times = np.unique(ticks)
-    least = float(np.diff(times, prepend=0.0).min())
-    postures = hits.drop(columns=["subject", "trial", "goal", "hand", "ticks"])
-    is_coarse = least > max(2.0, 0.1 * usual) and len(times) < len(postures.drop_duplicates())
-    if len(ticks) >= MANY and is_coarse and np.allclose(times % least, 0.0, atol=1e-3):
+def _likely_unit(pace: float, unit: float) -> str:
+    """Return the unit, a key of :data:`_UNITS`, in which times are if hits take ``pace`` ticks for
+    each of a straight movement, with ``unit`` ticks per unit."""
+    return min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * pace)))
+
+
+def _refuse_two_units(times: pd.DataFrame, source: str, unit: float) -> None:
+    """Raise CoarticError if some hits are over five times as slow as all others, without hits in
+    between, as if in another unit."""
+    ordered, tenth = np.sort(times.pace), len(times) // 10 + 1
+    leaps = (ordered[1:] / ordered[:-1])[tenth - 1 : len(times) - tenth]
+    is_slow = times.pace > ordered[tenth - 1 + leaps.argmax()]
+    less, more = times[~is_slow], times[is_slow]
+    units = [_likely_unit(float(each.pace.median()), unit) for each in (less, more)]
+    if leaps.max() > 5 and units[0] != units[1] and len({*more.goal}) > 1:
+        one, other = (f"goal {each.goal.iloc[0]:g} in trial {each.trial.iloc[0]:g}"
+                      for each in (less, more))  # fmt: skip
+        factor = more.pace.median() / less.pace.median()
+        point = ", or was a point between thousands read as a decimal point"
+        raise CoarticError(
+            f"{source}: {len(more)} of {len(times)} hits, first {other}, take {factor:.0f} times "
+            f"as long for their paths as others, first {one}. Do units differ, {units[1]} there "
+            f"and {units[0]} elsewhere{point * bool(500 < factor < 2000)}?"
+        )
+
+
+def _check_steps_of_times(hits: pd.DataFrame, source: str, usual: float) -> None:
+    """Raise CoarticError, or warn, if all times are multiples of a time that is large for the
+    median hit, of ``usual`` ticks, although postures differ."""
+    ticks = hits.ticks.to_numpy(np.float64)
+    least = float(np.diff(np.unique(ticks), prepend=0.0).min())
+    postures = hits.drop(columns=["subject", "trial", "goal", "hand", "ticks"]).drop_duplicates()
+    is_coarse = least > max(2.0, 0.1 * usual) and len(np.unique(ticks)) < len(postures)
+    if len(ticks) >= MANY and is_coarse and np.allclose(ticks % least, 0.0, atol=1e-3):
         words = (f"{source}: all times are multiples of {least:g} ticks, the median hit takes "
                  f"{usual:g}: they are rounded or constant; needed are times to a tenth of a hit "
                  "or better")  # fmt: skip
         warn(words, refuse=least > max(10, 0.2 * usual))
+
+
+def _check_unit(times: pd.DataFrame, source: str, unit: float, slowest: float) -> None:
+    """Raise CoarticError, or warn, if the median hit takes times that are those of another unit."""
+    usual, path = float(times.ticks.median()), float(times.straight.median())
     ratio, too_long = usual / max(path, 1.0), usual > _SLOWEST * slowest
     if too_long or not 0.1 < ratio < 8:
-        name = likely(ratio)
+        name = _likely_unit(ratio, unit)
         words = (
             f"{source}: the median hit takes {usual:g} ticks with {unit:g} ticks per unit; a "
             f"straight movement takes {path:.0f}, the corrective process at most {slowest:.0f}. "
             f"Are times in {name} (ticks_per_unit={_UNITS[name]:g})?"
         )
         warn(words, refuse=too_long or ratio <= 0.1)
+
+
+def _warn_of_paces(times: pd.DataFrame, logs: pd.DataFrame, source: str, clocks: bool) -> None:
+    """Warn of times that hardly follow paths (unless ``clocks`` run on), of a goal with a reaction
+    time, and of many hits that are faster than the task's arm. ``logs``: logarithms of ticks of
+    hits, of the rows above and below, and of straight movements."""
+    paces, goals = times.pace[logs.index], times.goal[logs.index]
     follows, slow = [1.0], []
-    if len(paces) >= MANY:
+    if len(logs) >= MANY:
         rates = paces.groupby(goals).median()
         slow = rates.index[rates > 1.6 * rates.sort_values().iloc[-2:].min()].tolist()
-        even = logs[~np.isin(goals, slow)]
-        of_goal = even - even.groupby(goal[even.index]).transform("mean")
+        even = logs[~goals.isin(slow)]
+        of_goal = even - even.groupby(goals[even.index]).transform("mean")
         rows = logs.corr().paths
         better = rows[["above", "below"]].max()
         follows += [rows.here] * bool(rows.here < 0.3 and better > 0.6)
         follows += [each.corr().here.paths for each in (even, of_goal) if each.paths.std() > 0.2]
-    fast = known & ((straight - ticks) * PAPER.step > 0.1)
     if is_odd := min(follows) < 0.5 and not clocks:
         shifted = f", {better:.2f} with the row above or below" * bool(better > 0.6)
         warn(f"{source}: times hardly follow the paths of hits (correlation {min(follows):.2f}"
@@ -497,9 +526,9 @@ def _odd_times(
         warn(f"{source}: goal {slow[0]:g} takes {rates[slow[0]]:.2g} ticks for each of a straight "
              f"path, others at most {rates.drop(slow).max():.2g}: is a reaction time in it?"
         )  # fmt: skip
-    if fast.mean() >= 0.25 and not is_odd:
-        shares = pd.Series(fast[known]).groupby(goals).mean().sort_values()
-        part, where = _changed(fast, trial)
+    if times.fast.mean() >= 0.25 and not is_odd:
+        shares = times.fast[logs.index].groupby(goals).mean().sort_values()
+        part, where = _changed(times.fast.to_numpy(), times.trial.to_numpy())
         question = "Are there more ticks in a unit?"
         if shares.iloc[-1] > 0.8 and shares.iloc[:-1].max() < 0.2:
             question = f"Most are hits of goal {shares.index[-1]:g}: does a counter overflow?"
