@@ -358,17 +358,26 @@ def _implausible(
     frame: pd.DataFrame, task: Task, source: str, unit: float, slowest: float
 ) -> NDArray[np.object_]:
     """Return why sorted hits of a subject are implausible, a text for each, empty for a plausible
-    hit; warn of odd places, and, unless places make most hits implausible, check times
-    (:func:`_odd_times`). ``source`` begins messages; ``unit``: ticks in a unit of the recording;
+    hit; warn of odd places and times. Times are not checked where places make most hits
+    implausible. ``source`` begins messages; ``unit``: ticks in a unit of the recording;
     ``slowest``: ticks of the longest subtask of the corrective process."""
+    why = _implausible_places(frame, task, source)
+    if 2 * (why == "").sum() >= len(why):
+        _mark_implausible_times(why, frame, task, source, unit, slowest)
+    return why
+
+
+def _mark(why: NDArray[np.object_], wrong: NDArray[np.bool_], words: str, *values: Array) -> None:
+    """Write why hits in a mask are implausible, unless it is known: ``words`` with their values."""
+    for row in np.flatnonzero(wrong & (why == "")).tolist():
+        why[row] = words.format(*(each[row] for each in values))
+
+
+def _implausible_places(frame: pd.DataFrame, task: Task, source: str) -> NDArray[np.object_]:
+    """Return why places and postures of a subject's sorted hits are implausible, as of
+    :func:`_implausible`; warn if most hits are near the centres of goals."""
     q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
-    goal, ticks = frame.goal.to_numpy(np.int64), frame.ticks.to_numpy(np.float64)
-    why = np.full(len(frame), "", dtype=object)
-
-    def mark(wrong: NDArray[np.bool_], words: str, *values: Array) -> None:
-        for row in np.flatnonzero(wrong & (why == "")).tolist():
-            why[row] = words.format(*(each[row] for each in values))
-
+    goal, why = frame.goal.to_numpy(np.int64), np.full(len(frame), "", dtype=object)
     spots = {"the start: is it of the next trial":
              _hand_places(np.tile(task.q0, (len(q), 1)), frame.hand, task)}  # fmt: skip
     spots |= {f"goal {k}": place for k, place in enumerate(task.goal_array, 1)}
@@ -378,35 +387,46 @@ def _implausible(
     is_near = ways.min(axis=1) <= 2 * radius
     nearest = np.array([*spots], dtype=object)[ways.argmin(axis=1)]
     for name, values in zip(task.robot.joint_names[2:], q.T[2:], strict=True):
-        mark(np.abs(values) > 20, name + " is {:g}, no angle in rad", values)
+        _mark(why, np.abs(values) > 20, name + " is {:g}, no angle in rad", values)
     # Motor noise puts hits outside of their goals; gaps and flags are few, and far.
     most, outer = 2 * radius, float(np.quantile(off, 0.75))
     if outer <= most:
         most = max(most, 8 * outer - 6 * radius)
     for k in (k for k, axis in enumerate("xy") if axis in task.locked_base):
         words = f"base_{'xy'[k]} is {{:g}}, but task {task.name!r} locks it at {task.q0[k]:g}"
-        mark(np.abs(q[:, k] - task.q0[k]) > most, words, q[:, k])
-    trial = frame.groupby("trial", sort=False).ngroup().to_numpy()
+        _mark(why, np.abs(q[:, k] - task.q0[k]) > most, words, q[:, k])
     for hand in task.hands:
         arm, start = q[:, task.robot.joints(hand)], task.q0[task.robot.joints(hand)]
-        left = pd.Series((arm != start).any(axis=1)).groupby(trial).cummax().to_numpy()
+        left = pd.Series((arm != start).any(axis=1)).groupby(frame.trial).cummax().to_numpy()
         one = (arm == arm[:, :1]).all(axis=1) & left & (len(start) > 1)
         words = f"all angles of the {hand} arm are {{:g}}{', as at the start' * (not start.any())}"
-        mark(one, words, arm[:, 0])
+        _mark(why, one, words, arm[:, 0])
         filled = _between(arm, goal) & (frame.hand == hand).to_numpy()
-        mark(filled, "the angles of the arm are means of the hits around it, as if filled in")
+        _mark(why, filled, "the angles of the arm are means of the hits around it, as if filled in")
     far, words = off > most, "the hand is {:.3g} radii from its goal"
     if far.any() and is_near[far].mean() > 0.5:
-        mark(far & is_near, words + ", at {}", off / radius, nearest)
-    mark(far, words, off / radius)
+        _mark(why, far & is_near, words + ", at {}", off / radius, nearest)
+    _mark(why, far, words, off / radius)
     if len(off) >= MANY and outer < 0.6 * radius and not why.any():
         warn(
             f"{source}: three of four hits are within {outer / radius:.2g} radii of the centres of "
             "goals: is the radius a diameter, or are postures those of rests after hits?"
         )
-    whole = why == ""
-    if 2 * whole.sum() < len(whole):
-        return why
+    return why
+
+
+def _mark_implausible_times(
+    why: NDArray[np.object_],
+    frame: pd.DataFrame,
+    task: Task,
+    source: str,
+    unit: float,
+    slowest: float,
+) -> None:
+    """Write into ``why`` which plausible places have times that are too short or too long, and
+    check times together (:func:`_odd_times`); parameters as of :func:`_implausible`."""
+    q, whole = frame[[*task.robot.joint_names]].to_numpy(np.float64), why == ""
+    trial, goal, ticks = (frame[name].to_numpy(np.float64) for name in ("trial", "goal", "ticks"))
     begins, follows = goal == 1, np.zeros(len(frame), dtype=bool)
     follows[1:] = (trial[1:] == trial[:-1]) & (goal[1:] == goal[:-1] + 1) & whole[:-1]
     way = np.where(begins[:, None], q - task.q0, q - np.roll(q, 1, axis=0))
@@ -418,10 +438,9 @@ def _implausible(
     early = np.where(known, straight - ticks, -1.0) * PAPER.step
     allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
     words = "it takes {:g} ticks, a straight movement {:.0f}"
-    mark((early > allowed) | (ticks < 1), words, ticks, straight)
+    _mark(why, (early > allowed) | (ticks < 1), words, ticks, straight)
     words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
-    mark(ticks > _SLOWEST * slowest, words, ticks)
-    return why
+    _mark(why, ticks > _SLOWEST * slowest, words, ticks)
 
 
 def _odd_times(
