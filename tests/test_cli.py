@@ -391,6 +391,15 @@ def test_draw(coartic, tmp_path, monkeypatch):
     assert coartic("draw", tmp_path / "mine.toml", "--out", tmp_path / "own.svg")[0] == 0
 
 
+def test_a_place_that_is_taken_is_said_before_anything_is_drawn(coartic, tmp_path, monkeypatch):
+    monkeypatch.setattr("coartic.analysis.sections.tasks.picture_of_tasks", None)
+    monkeypatch.setattr("coartic.play.page.play_page", None)
+    for command, name in (("draw", "tasks.svg"), ("play", "page.html")):
+        (tmp_path / name).touch()
+        status, _, said = coartic(command, "ascending", "--out", tmp_path / name)
+        assert (status, "is there already; add --replace" in said) == (2, True)
+
+
 def test_play(coartic, tmp_path, monkeypatch):
     shown = []
     monkeypatch.setattr("webbrowser.open", lambda address: not shown.append(address))

@@ -53,7 +53,7 @@ def draw(
     if initial or width is not None:
         raise CoarticError("--initial or --width has no effect without --run, which names a run")
     from coartic import builtin_tasks, load_task
-    from coartic.internal.files import check_ending, publish, write_output
+    from coartic.internal.files import check_ending, check_output, publish, write_output
     from coartic.runs.plan import tasks_by_name
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
@@ -67,9 +67,11 @@ def draw(
     from coartic.analysis.figures.plot import FORMATS, picture  # slow imports, after the checks
     from coartic.analysis.sections.tasks import picture_of_tasks
 
-    drawing = picture_of_tasks(chosen[:_PICTURED])
     if out.suffix:
         check_ending(out, FORMATS)
+        check_output(out, replace=replace)
+    drawing = picture_of_tasks(chosen[:_PICTURED])
+    if out.suffix:
         write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
     else:
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
@@ -120,13 +122,14 @@ def play(
     import webbrowser
 
     from coartic import load_task
-    from coartic.internal.files import check_ending, write_output
+    from coartic.internal.files import check_ending, check_output, write_output
     from coartic.play.page import play_page
 
     if replace and out is None:
         raise CoarticError("--replace has no effect without --out")
     if out is not None:
         check_ending(out, [".html"])
+        check_output(out, replace=replace)
     chosen = [] if task is None else given.tasks_meant([task])
     page = play_page(*map(load_task, chosen)).encode()
     out = out or Path(tempfile.mkdtemp(prefix="coartic-"), "play.html")
