@@ -25,10 +25,9 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, name_in_figure, spoken
 from coartic.analysis.method_frame import WITHOUT_REWARD, headline_methods
 from coartic.analysis.methods import KNOWN_METHODS, LEARNERS, RANDOM_SEARCH
-from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import SAME, TwoContexts, context_pairs
-from coartic.analysis.statistics.hypotheses import exchange_test, holm
+from coartic.analysis.statistics.hypotheses import exchange_test, holm, smallest_p
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
 from coartic.analysis.words import marked, number
