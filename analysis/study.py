@@ -319,10 +319,9 @@ class Study:
             }
             for name, method, text in dict.fromkeys(cells)
         }
-        place = {cell: number for number, cell in enumerate(rows)}
-        more = pd.DataFrame([*rows.values()]).iloc[[place[cell] for cell in cells]]
-        more.index = runs.index
-        runs = runs.join(more[[name for name in more if name not in runs]])
+        more = pd.DataFrame([*rows.values()], pd.MultiIndex.from_tuples(rows))
+        more = more[[name for name in more if name not in runs]]
+        runs = runs.join(more, on=["task", "method", "parameters"])
         runs["label"] = [*map(label_of, runs.method, runs.setting)]
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task
         best = {name: each.reward for name, each in self.optima.items()}
