@@ -39,8 +39,9 @@ def on_instances(study: Study) -> pd.DataFrame:
              for method, runs in compared(study).items()}  # fmt: skip
     every = together(study, parts)
     names = [*itertools.chain.from_iterable(_instances(study).values())]
-    every = every.assign(place=pd.Categorical(every.task, names)).dropna(subset="place")
-    return every.sort_values("place", kind="stable")
+    every = every[every.task.isin(names)]
+    place = pd.Categorical(every.task, names)
+    return every.assign(place=place).sort_values("place", kind="stable")
 
 
 def _by_family(study: Study, runs: pd.DataFrame) -> Scores:

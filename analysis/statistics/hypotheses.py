@@ -120,9 +120,7 @@ def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool =
     return max(alike / ways, 1 / (1 + resamples))
 
 
-def stratified_test(
-    strata: Sequence[tuple[Array | float, Array | float]], resamples: int = RESAMPLES
-) -> float:
+def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> float:
     """Return the p-value, two-sided, of a difference of means that is itself a mean over strata,
     such as tasks. A stratum is a pair of samples, shapes ``(n,)`` and ``(m,)``; an exact number can
     stand for a sample.
@@ -142,7 +140,7 @@ def stratified_test(
     samples = [each for pair in strata for each in pair if not isinstance(each, float)]
     if not samples or min(map(len, samples)) < FEWEST:
         return math.nan
-    return _p_of(strata, "two-sided", resamples)
+    return _p_of(strata, "two-sided", RESAMPLES)
 
 
 def _p_of(
