@@ -75,7 +75,11 @@ def test_the_commonest_reasons_and_few_runs_are_said(traced):
 
 def test_p_is_small_below_a_thousandth():
     frame = pd.DataFrame({"p_holm": [0.0009, 0.001, 0.0099]})
-    assert render.texts_of(TABLES["contexts"], frame, "p_holm") == ["< 0.001", "0.001", "0.010"]
+    assert render.shown_columns(TABLES["contexts"], frame)["p_holm"].texts == [
+        "< 0.001",
+        "0.001",
+        "0.010",
+    ]
 
 
 HOSTILE = '<script>alert("&")</script> \\input{x} 5 % of $x_1^2$ #~'
