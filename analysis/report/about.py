@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import traceback
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from itertools import chain
 from pathlib import Path
@@ -86,7 +86,7 @@ def finding(study: Study, section: Section) -> list[str]:
         for each in (table(study) for table in section.tables)
     )
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": number, "counts": _counts}
+    environment.filters |= {"number": number, "commonest": commonest, "listed": listed}
     standings = without_settings(board(study))
     is_unequal = standings.index.map(trials_of(study)) != equal_trials(study)
     rows = rows[~rows.method.isin(standings.index[~standings.ranked.astype(bool)])]
@@ -102,11 +102,6 @@ def finding(study: Study, section: Section) -> list[str]:
     }  # fmt: skip
     text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
     return [shown(line.strip()) for line in text.split("\n") if line.strip()]
-
-
-def _counts(values: pd.Series) -> str:
-    """Write how often each value occurs, the commonest first: ``14 × a and 6 × b``."""
-    return listed(f"{count} × {value}" for value, count in Counter(values).most_common())
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:

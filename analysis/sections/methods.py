@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 
 from coartic.analysis.sections.costs import solve_times
 from coartic.analysis.study import Study, one_by_one, solved, typical_run
@@ -30,7 +29,7 @@ def list_methods(study: Study) -> Rows:
             continue
         good = solved(runs)
         row = row_of_cell(study, runs) | {
-            "hands": tally(Counter(good.hands)) if len(good) > 1 else "".join(good.hands),
+            "hands": tally(good.hands) if len(good) > 1 else "".join(good.hands),
             "trials": runs.trials.astype(float).median(),
             "forward_kinematics": runs.forward_kinematics.astype(float).median(),
             "solve_s": solve_times(good).astype(float).median(),
