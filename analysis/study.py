@@ -7,7 +7,6 @@ study; :func:`cached` keeps the results of a function for each study.
 from __future__ import annotations
 
 import html
-import json
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -306,24 +305,22 @@ class Study:
         known reward; and a column for each parameter of methods, unless its name is taken:
         ``trials`` is the number of trials made, ``hands`` the hands of the solution.
         """
-        runs, tasks = self.stored, self.tasks
-        cells = [*zip(runs.task, runs.method, runs.parameters, strict=True)]
-        rows = {
-            (name, method, text): {
-                **self.declared[method].defaults,
-                **json.loads(text),
-                "family": tasks[name].family,
-                "split": tasks[name].split,
-                "goals": len(tasks[name].goals),
-                "arms": len(tasks[name].hands),
+        labels = [*map(label_of, self.stored.method, self.stored.setting)]
+        runs, cells = self.stored.assign(label=labels), [job.cell for job in self.plan]
+        rows = [
+            {
+                **cell.method.defaults,
+                **cell.parameters,
+                "family": cell.task.family,
+                "split": cell.task.split,
+                "goals": len(cell.task.goals),
+                "arms": len(cell.task.hands),
             }
-            for name, method, text in dict.fromkeys(cells)
-        }
-        place = {cell: number for number, cell in enumerate(rows)}
-        more = pd.DataFrame([*rows.values()]).iloc[[place[cell] for cell in cells]]
-        more.index = runs.index
-        runs = runs.join(more[[name for name in more if name not in runs]])
-        runs["label"] = [*map(label_of, runs.method, runs.setting)]
+            for cell in cells
+        ]
+        keys = pd.MultiIndex.from_tuples([(cell.task.name, cell.label) for cell in cells])
+        more = pd.DataFrame(rows, keys)
+        runs = runs.join(more[[name for name in more if name not in runs]], on=["task", "label"])
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task
         best = {name: each.reward for name, each in self.optima.items()}
         runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")

@@ -6,7 +6,7 @@ import math
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
@@ -158,15 +158,17 @@ def marked(task: Task) -> str:
     return f"{task.label} †" if task.reconstructed else task.label
 
 
-def tally(counts: Mapping[Any, int]) -> str:
-    """Write counts by name, ``LRLR 17, RRLR 3``, the largest first, then by name; – for none."""
-    ordered = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
-    return ", ".join(f"{name} {count}" for name, count in ordered) or NONE
+def tally(names: Iterable[str]) -> str:
+    """Write how often each name occurs, ``LRLR 17, RRLR 3``, the commonest first, then by name; –
+    for none."""
+    counts = Counter(sorted(names)).most_common()
+    return ", ".join(f"{name} {count}" for name, count in counts) or NONE
 
 
-def commonest(reasons: Iterable[str]) -> list[str]:
-    """Return the three commonest reasons at most, each with its number, ``12 × no hit``."""
-    return [f"{count} × {reason}" for reason, count in Counter(reasons).most_common(3)]
+def commonest(texts: Iterable[str], most: int | None = 3) -> list[str]:
+    """Return the commonest texts, ``most`` at most (None: all), each with its number, ``12 × no
+    hit``."""
+    return [f"{count} × {text}" for text, count in Counter(texts).most_common(most)]
 
 
 def listed(words: Iterable[str]) -> str:

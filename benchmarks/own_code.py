@@ -141,7 +141,7 @@ def _our_folders() -> tuple[str, ...]:
     return tuple(f"{folder}{os.sep}" for folder in ours)
 
 
-_version = cache(metadata.version)
+_version, _distributions = cache(metadata.version), cache(metadata.packages_distributions)
 
 
 @cache
@@ -153,13 +153,6 @@ def _is_installed(path: str) -> bool:
     standard = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
     folders = [*standard, *site.getsitepackages(), site.getusersitepackages()]
     return any(path.startswith(f"{folder}{os.sep}") for folder in folders)
-
-
-@cache
-def _distributions() -> dict[str, list[str]]:
-    """Return, for each name that installed packages have for import, such as ``yaml``, the names of
-    these packages, such as ``["PyYAML"]``."""
-    return dict(metadata.packages_distributions())
 
 
 def _imports(path: str) -> Iterator[str]:

@@ -8,7 +8,7 @@ unless they have left its group. If the common folder is removed or full, answer
 suite ends.
 
 The system counts the CPU time of a process in all its threads, and ends the process when a job has
-used up its limit (not on Windows). The CPU time of processes that a method starts is not counted.
+used up its limit. The CPU time of processes that a method starts is not counted.
 A job that waits forever is ended later, by wall time, and repeated once, because the machine may
 have slept; a job that waits twice has timed out.
 """
@@ -21,6 +21,7 @@ import logging
 import math
 import multiprocessing
 import os
+import resource
 import shutil
 import signal
 import sys
@@ -32,7 +33,7 @@ from collections import defaultdict, deque
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
-from multiprocessing import connection
+from multiprocessing import connection, resource_tracker
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -410,23 +411,16 @@ def _answer_to(job: Job) -> bytes:
 
 
 def _limit_cpu_time(limit_s: float) -> None:
-    """Let the system end this process by SIGPROF after ``limit_s`` more seconds of CPU time (not on
-    Windows); 0 lifts the limit."""
-    if hasattr(signal, "setitimer"):
-        signal.signal(signal.SIGPROF, signal.SIG_DFL)  # an earlier method may have changed it
-        signal.setitimer(signal.ITIMER_PROF, limit_s)
+    """Let the system end this process by SIGPROF after ``limit_s`` more seconds of CPU time; 0
+    lifts the limit."""
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)  # an earlier method may have changed it
+    signal.setitimer(signal.ITIMER_PROF, limit_s)
 
 
 def _bound_resources(workers: int) -> None:
     """Limit the memory of this process, one of ``workers`` that share 80 % of the machine's memory
-    (at least 1 GiB each), and the size of each of its files to 256 MiB, where the system has such
-    limits."""
-    try:
-        import resource
-
-        total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (ImportError, ValueError, OSError):
-        return
+    (at least 1 GiB each), and the size of each of its files to 256 MiB."""
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     share = max(total * 8 // (10 * workers), _LEAST_MEMORY)
     for what, most in ((resource.RLIMIT_DATA, share), (resource.RLIMIT_FSIZE, _LARGEST_FILE)):
         soft, _ = resource.getrlimit(what)
@@ -435,10 +429,9 @@ def _bound_resources(workers: int) -> None:
             resource.setrlimit(what, (lower, most))
 
 
-# Processes are forked from a server that has imported their modules, if the system has such servers
-# and the path of its socket is short: the system takes 103 characters, and Python adds some.
-_HAS_SERVER = "forkserver" in multiprocessing.get_all_start_methods()
-_START = "forkserver" if _HAS_SERVER and len(tempfile.gettempdir()) <= 70 else "spawn"
+# Processes are forked from a server that has imported their modules, if the path of its socket is
+# short: the system takes 103 characters, and Python adds some.
+_START = "forkserver" if len(tempfile.gettempdir()) <= 70 else "spawn"
 CONTEXT: Any = multiprocessing.get_context(_START)
 
 
@@ -453,18 +446,12 @@ def start_process(process: Any) -> None:
         raise FileNotFoundError(errno.ENOENT, text) from None
     # Without PYTHONSAFEPATH Python imports from the working folder first, whoever wrote it.
     safe = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    with contextlib.suppress(ImportError):
-        import resource
-
-        if 0 <= resource.getrlimit(resource.RLIMIT_NOFILE)[0] < _LEAST_FILES:  # -1: no limit
-            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+    if 0 <= resource.getrlimit(resource.RLIMIT_NOFILE)[0] < _LEAST_FILES:  # -1: no limit
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
     main = sys.modules["__main__"]
     with environment(worker_variables() | safe):
-        if _START == "forkserver":
-            from multiprocessing import resource_tracker
-
-            multiprocessing.set_forkserver_preload([__name__, "coartic.benchmarks.preload"])
-            resource_tracker.ensure_running()  # before signals are blocked: it unblocks them
+        multiprocessing.set_forkserver_preload([__name__, "coartic.benchmarks.preload"])
+        resource_tracker.ensure_running()  # before signals are blocked: it unblocks them
         sys.modules["__main__"] = ModuleType("__main__")
         try:
             with blocked_signals():  # Ctrl-C reaches every process of a terminal

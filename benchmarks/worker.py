@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import resource
 import sys
 import time
 import traceback
@@ -47,12 +48,8 @@ _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError
 """Errors of malformed data."""
 
 
-def process_peak_mb() -> float | None:
-    """Return the most memory of this process so far, MiB; None if the system does not count it."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
+def process_peak_mb() -> float:
+    """Return the most memory of this process so far, MiB."""
     unit = 2**20 if sys.platform == "darwin" else 2**10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 

@@ -4,16 +4,13 @@ import ast
 import graphlib
 import importlib
 import importlib.util
-import os
-import pkgutil
 import re
-import signal
 import sys
 from functools import cache
 
 import pytest
 
-from tests.support.processes import ROOT, apart, forget, python
+from tests.support.processes import ROOT, python
 
 PACKAGES = ("coartic", "baselines", "benchmarks", "analysis")
 ALLOWED = {
@@ -371,51 +368,3 @@ def test_a_module_that_moved_answers_by_its_former_name(old):
     with pytest.warns(DeprecationWarning, match=f"{old} is {new} now"):
         found = importlib.import_module(old)
     assert found is importlib.import_module(new)
-
-
-def everything():
-    left_out = {"coartic.__main__", *MOVED}
-    if not importlib.util.find_spec("stable_baselines3"):
-        left_out.add("coartic.gym.stable_baselines")
-    package = importlib.import_module("coartic")
-    for module in pkgutil.walk_packages(package.__path__, "coartic."):
-        gymnasium = not module.name.startswith("coartic.gym") or importlib.util.find_spec(
-            "gymnasium"
-        )
-        if module.name not in left_out and gymnasium:
-            importlib.import_module(module.name)
-
-
-def without_posix(out):
-    """Modules are imported, a suite is planned, performed and read; in a process of its own,
-    which imports all libraries or has them from this one."""
-    everything()  # with all the libraries, which know by themselves where they are
-    forget("coartic", "tests")
-    for name in ("fcntl", "grp", "pwd", "resource", "termios"):
-        sys.modules[name] = None
-    for module, names in (
-        (os, "fork getuid geteuid killpg setsid uname fchmod sched_getaffinity O_DIRECTORY"),
-        (signal, "SIGKILL SIGHUP SIGSTOP SIGALRM"),
-    ):
-        for name in names.split():
-            if hasattr(module, name):
-                delattr(module, name)
-    everything()
-
-    from coartic.analysis.study import load
-    from coartic.benchmarks.runner import perform, plan_suite
-    from coartic.runs.plan import size_of
-    from tests.support.suites import InProcess
-
-    methods = ["EC1", "hill-climbing", "posture-qp/goals-ahead"]
-    plan = plan_suite("quick", runs=2, trials=5, tasks=["ascending"], methods=methods)
-    assert perform(plan, out, executor=InProcess()).failed == 0
-    runs = load(out).runs
-    assert len(runs) == size_of(plan)
-    assert runs.process_peak_mb.isna().all()
-
-
-@pytest.mark.process
-def test_nothing_needs_what_posix_alone_has(tmp_path):
-    """As on Windows."""
-    apart(without_posix, tmp_path / "out")

@@ -6,7 +6,7 @@ from coartic import load_task
 from coartic.analysis.control import with_control
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.report import about
-from coartic.analysis.report.render import columns_of, texts_of
+from coartic.analysis.report.render import shown_columns
 from coartic.analysis.sections import FIGURES, SECTIONS, TABLES
 from coartic.analysis.table import is_setting
 from tests.support.made_up import runs_of, study_of, study_of_trials
@@ -96,8 +96,9 @@ def test_names_of_tasks_may_end_as_columns_of_intervals_do():
     study = study_of(rows, tasks, optima={name: BestKnown(-465, -465) for name in names})
     table = TABLES["ranking"]
     frame = table(study)
-    assert {f"on {name}" for name in names} <= columns_of(table, frame).keys()
-    assert texts_of(table, frame, "on reach") == ["3.2", "1.1"]
+    columns = shown_columns(table, frame)
+    assert {f"on {name}" for name in names} <= columns.keys()
+    assert columns["on reach"].texts == ["3.2", "1.1"]
 
 
 def test_a_learner_over_all_tasks_has_the_gap_of_its_own_conditions():

@@ -17,7 +17,7 @@ from coartic.analysis.method_frame import (
 )
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.report import about, render
-from coartic.analysis.report.render import columns_of
+from coartic.analysis.report.render import shown_columns
 from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, costs
 from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.hypotheses import holm, stratified_test
@@ -151,7 +151,8 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     gaps = {"mine": [3.5 / 293, 15 / 480], "dual-process (EC1, EC4)": [8.5 / 293, 1.5 / 480]}
     for method, of_method in gaps.items():
         assert ranked.gap[method] == pytest.approx(sum(of_method) / 2)
-    headings = columns_of(TABLES["ranking"], ranked)
+    columns = shown_columns(TABLES["ranking"], ranked)
+    headings = {name: column.header for name, column in columns.items()}
     assert headings["gap"].startswith("gap to the best of this folder (%)")
     for words in (*said(unknown, "ranking"), FIGURES["ranking"](unknown).alt, *headings.values()):
         assert not re.search("optimum|known", words)
@@ -309,7 +310,7 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert rows.difference.tolist() == pytest.approx(differences)
     assert math.isnan(rows.difference_low.iloc[0])  # of two runs there is no interval
     assert (rows.tasks == 1).all()
-    texts = render.texts_of(table, rows, "difference")
+    texts = render.shown_columns(table, rows)["difference"].texts
     assert texts[0] == number(100 * rows.difference.iloc[0], 1)  # per cent, as the gaps
     assert "positive: this method is better" in table.caption
     better = TABLES["differences"](study(TEN | strangers(("mine", 2), runs=10)))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import traceback
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
@@ -87,14 +86,12 @@ def finding(study: Study, section: Section) -> list[str]:
         for each in (table(study) for table in section.tables)
     )
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": number, "counts": _counts}
-    standings, asked = without_settings(board(study)), trials_of(study)
-    below = standings.index[~standings.ranked.astype(bool)]
-    is_unequal = [asked[label] != equal_trials(study) for label in standings.index]
-    unequal = standings[np.array(is_unequal, dtype=bool)]
-    rows = rows[~rows.method.isin(below)]
+    environment.filters |= {"number": number, "commonest": commonest, "listed": listed}
+    standings = without_settings(board(study))
+    is_unequal = standings.index.map(trials_of(study)) != equal_trials(study)
+    rows = rows[~rows.method.isin(standings.index[~standings.ranked.astype(bool)])]
     environment.globals |= {
-        "not_ranked": not_ranked(study), "unequal": {*unequal.information},
+        "not_ranked": not_ranked(study), "unequal": {*standings.information[is_unequal]},
         "interval": interval, "number": number, "p_value": p_value, "leading": leading,
         "infinite": math.inf,
         "uses": GROUPS, "first": next(iter(standings.index), ""), "titles": frame.attrs["titles"],
@@ -105,11 +102,6 @@ def finding(study: Study, section: Section) -> list[str]:
     }  # fmt: skip
     text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
     return [shown(line.strip()) for line in text.split("\n") if line.strip()]
-
-
-def _counts(values: pd.Series) -> str:
-    """Write how often each value occurs, the commonest first: ``14 × a and 6 × b``."""
-    return listed(f"{count} × {value}" for value, count in Counter(values).most_common())
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
@@ -133,8 +125,12 @@ def limits(study: Study) -> dict[str, Any]:
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
     trials = {int(n) for n in runs[runs.label.map(algorithm) == "learner"].trials.dropna()}
     fewest = min((len(of) for (_, label), of in study.cells.items() if papers[label]), default=RUNS)
-    tasks = list(one_by_one(study).values())
-    optima = [(task, study.optima.get(task.name)) for task in tasks]
+    tasks, optima = list(one_by_one(study).values()), defaultdict[str, list[str]](list)
+    for task in tasks:
+        best = study.optima.get(task.name)
+        unproven = "" if best is None or best.proven else "unproven"
+        kind = "unknown" if best is None else "own" if best.only_here else unproven
+        optima[kind].append(marked(task))
     reasons = failed.reason.fillna("")
     others = len(failed) - sum(reasons.value_counts()[:3])
     return {
@@ -145,11 +141,7 @@ def limits(study: Study) -> dict[str, Any]:
         "trials": sorted(trials - {TRIALS}),
         "few": fewest if fewest < RUNS else 0,
         "seed": study.plan[0].seed,
-        "unproven": [
-            marked(task) for task, best in optima if best and not (best.proven or best.only_here)
-        ],
-        "own": [marked(task) for task, best in optima if best and best.only_here],
-        "unknown": [marked(task) for task, best in optima if best is None],
+        **{kind: optima[kind] for kind in ("unproven", "own", "unknown")},
         "side_by_side": bool(runs.together.max() > 1),
         "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
         "processor": made_with["processor"],

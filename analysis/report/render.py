@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Sequence
 from fnmatch import fnmatch
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -56,32 +56,54 @@ def _guarded(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
-def columns_of(table: Table, frame: pd.DataFrame) -> dict[str, str]:
-    """Return the headings of the columns that the page can show, by name of the column: columns
-    with a heading and a value in some row, without ends of intervals and SDs of other columns.
+class ShownColumn(NamedTuple):
+    """A column of a table as people see it."""
+
+    header: str
+    texts: list[str]
+    """Values as text, with their SDs and intervals, row by row."""
+    is_number: bool
+    """True if the column has numbers, True and False alone, or no value at all."""
+
+
+def shown_columns(table: Table, frame: pd.DataFrame) -> dict[str, ShownColumn]:
+    """Return the columns that the page can show, by name: columns with a heading and a value in
+    some row, without ends of intervals and SDs of other columns.
 
     A task in a heading goes by its title, with † where it is reconstructed.
     """
-    headers, titles = {}, frame.attrs.get("titles", {})
-    names = [name for name in frame.columns if not _is_end(table, frame, name)]
-    for name in names:
+    shown, titles = {}, frame.attrs.get("titles", {})
+    to = frame.attrs.get("reference", "optimum")
+    for name in frame.columns:
+        values = frame[name]
+        if _is_end(table, frame, name) or not (values.notna() & (values != "")).any():
+            continue
         column = table.column(name)
-        if not column.header or not (frame[name].notna() & (frame[name] != "")).any():
+        if not column.header:
             continue
         what = name.removeprefix(column.name)
         header = column.header.replace("{}", titles.get(what, what))
-        to = frame.attrs.get("reference", "optimum")
         if header == "gap (%)" and to != "optimum":
             header = f"gap to the {to} (%)"
         if header == "best known" and to == "best of this folder":
             header = to
-        if _is_end(table, frame, f"{name}_sd"):
-            header += " ± SD"
-        low = f"{name}_low"
-        has_interval = _is_end(table, frame, low) and frame[low].notna().any()
-        interval = f" [95{NARROW_SPACE}%]" if has_interval and "[" not in header else ""
-        headers[name] = f"{header}{interval}"
-    return headers
+        low, high, sd = (
+            end if _is_end(table, frame, end) else ""
+            for end in (f"{name}_low", f"{name}_high", f"{name}_sd")
+        )
+        header += " ± SD" * bool(sd)
+        has_interval = low and frame[low].notna().any() and "[" not in header
+        header += f" [95{NARROW_SPACE}%]" * bool(has_interval)
+        if not pd.api.types.is_numeric_dtype(values.infer_objects()) and values.notna().any():
+            words = {each: titles.get(each) or one_line(str(each)) for each in values.unique()}
+            texts = [NONE if pd.isna(each) else words[each] or NONE for each in values]
+            shown[name] = ShownColumn(header, texts, is_number=False)
+            continue
+        numbers = frame.reindex(columns=[name, low, high, sd]).apply(pd.to_numeric)
+        rows = numbers.to_numpy(float, na_value=math.nan) * (100.0 if "(%)" in header else 1.0)
+        texts = [_number_text(column.digits, *row) for row in rows.tolist()]
+        shown[name] = ShownColumn(header, texts, is_number=True)
+    return shown
 
 
 def _is_end(table: Table, frame: pd.DataFrame, name: str) -> bool:
@@ -92,32 +114,14 @@ def _is_end(table: Table, frame: pd.DataFrame, name: str) -> bool:
     return both and table.column(start).ending in ("[]", "±", "[*]")
 
 
-def _is_number(values: pd.Series) -> bool:
-    """Return True if a column has numbers, True and False alone, or no value at all."""
-    return bool(pd.api.types.is_numeric_dtype(values.infer_objects())) or not values.notna().any()
-
-
-def texts_of(table: Table, frame: pd.DataFrame, name: str) -> list[str]:
-    """Return the values of column ``name`` as text, with their SDs and intervals, row by row."""
-    if not _is_number(frame[name]):
-        titles = frame.attrs.get("titles", {})
-        shown = {each: titles.get(each) or one_line(str(each)) for each in frame[name].unique()}
-        return [NONE if pd.isna(each) else shown[each] or NONE for each in frame[name]]
-    _, _, header, digits = table.column(name)
+def _number_text(digits: str, value: float, low: float, high: float, sd: float) -> str:
+    """Return a number with its SD and interval, where they are not NaN, as text; ``digits`` as in
+    :class:`.Column`."""
     decimals, is_p = int(digits) if digits.isdigit() else None, digits == "p"
-    columns = [name] + [
-        f"{name}{end}" if _is_end(table, frame, f"{name}{end}") else ""
-        for end in ("_low", "_high", "_sd")
-    ]
-    values = frame.reindex(columns=columns).apply(pd.to_numeric).to_numpy(float, na_value=math.nan)
-    texts = []
-    for value, low, high, sd in ((100.0 if "(%)" in header else 1.0) * values).tolist():
-        spread = "" if math.isnan(sd) else f" ± {number(sd, decimals)}"
-        interval = in_brackets(low, high, decimals)
-        text = number(value, 3 if is_p else decimals)
-        text = "< 0.001" if is_p and value < 0.001 else text
-        texts.append(f"{text}{spread} {interval}".strip())
-    return texts
+    spread = "" if math.isnan(sd) else f" ± {number(sd, decimals)}"
+    text = number(value, 3 if is_p else decimals)
+    text = "< 0.001" if is_p and value < 0.001 else text
+    return f"{text}{spread} {in_brackets(low, high, decimals)}".strip()
 
 
 def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
@@ -130,20 +134,19 @@ def html_table(table: Table, frame: pd.DataFrame, caption: str) -> str:
     slug = slugs(map(str, frame.index))
     cells: list[list[str]] = []
     heads: list[str] = []
-    for column, header in columns_of(table, frame).items():
+    for column, (header, shown, is_number) in shown_columns(table, frame).items():
         texts = [
-            html.escape(text).replace(" †", "&nbsp;†") if text != NONE else ""
-            for text in texts_of(table, frame, column)
+            html.escape(text).replace(" †", "&nbsp;†") if text != NONE else "" for text in shown
         ]
         head = f'<span data-column="{html.escape(column)}">{html.escape(header)}</span>'
-        if cells and len(texts) > 2 and len(set(texts)) == 1 and not _is_number(frame[column]):
+        if cells and len(texts) > 2 and len(set(texts)) == 1 and not is_number:
             caption += f" ({header}: {html.unescape(texts[0])})"
             continue
         if column == "method" and table.id == "methods":  # ids stand in one table
             ids = [html.escape(one_line(str(label))) for label in frame[column]]
             pairs = zip(texts, ids, strict=True)
             texts = [text + f"<small>{id_}</small>" * (text != id_) for text, id_ in pairs]
-        if not _is_number(frame[column]):
+        if not is_number:
             head = f'<span class="text">{head}</span>'
             texts = [f'<span class="text">{text}</span>' for text in texts]
         if not cells:
@@ -187,17 +190,16 @@ def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence
     ``notes``, sentences, are below the table, with the meaning of a dagger in table or notes.
     """
     frame = frame if table.id in ("contexts", "methods") else frame[~is_setting(frame)]
-    columns = columns_of(table, frame)
-    chosen = [c for want in IN_LATEX[table.id].split(", ") for c in columns if fnmatch(c, want)]
-    cells = [[latex(text) for text in texts_of(table, frame, column)] for column in chosen]
+    wanted = IN_LATEX[table.id].split(", ")
+    columns = shown_columns(table, frame)
+    chosen = [columns[name] for want in wanted for name in columns if fnmatch(name, want)]
     # Two columns may have one header.
-    shown = pd.DataFrame(dict(enumerate(cells))).set_axis(
-        [latex(columns[column]) for column in chosen], axis="columns"
-    )
-    body = shown.style.hide(axis="index").to_latex(
+    cells = pd.DataFrame({place: map(latex, each.texts) for place, each in enumerate(chosen)})
+    cells = cells.set_axis([latex(each.header) for each in chosen], axis="columns")
+    body = cells.style.hide(axis="index").to_latex(
         environment="longtable",
         hrules=True,
-        column_format="".join("r" if _is_number(frame[column]) else "l" for column in chosen),
+        column_format="".join("r" if each.is_number else "l" for each in chosen),
         caption=latex(caption),
         label=f"tab:coartic-{table.id}",
     )

@@ -128,7 +128,7 @@ posture difference {{ row.distance | number(2) }} (length units and rad; {{ row.
 {{ "; random search: %s" % number(row.control, 2) if row.control >= 0 }}\
 {{ " (%s)" % p_value(row.p_random_search) if row.p_random_search >= 0 }}.
 {% endfor %}
-Methods at shared goals by verdict: {{ every.verdict | counts }}.""",
+Methods at shared goals by verdict: {{ every.verdict | commonest(none) | listed }}.""",
         note="Postures are compared in length units and rad. Ticks are compared with those of the "
         "corrective process with the same hands. A first movement that gets slower while the whole "
         "task gets faster is sacrificed for it. Idle hand nearer: share of the path to its next "

@@ -25,10 +25,9 @@ from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, name_in_figure, spoken
 from coartic.analysis.method_frame import WITHOUT_REWARD, headline_methods
 from coartic.analysis.methods import KNOWN_METHODS, LEARNERS, RANDOM_SEARCH
-from coartic.analysis.signatures.context_tests import smallest_p
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.signatures.two_contexts import SAME, TwoContexts, context_pairs
-from coartic.analysis.statistics.hypotheses import exchange_test, holm
+from coartic.analysis.statistics.hypotheses import exchange_test, holm, smallest_p
 from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, row_of_cell, run_ids, table
 from coartic.analysis.words import marked, number
@@ -98,12 +97,14 @@ def list_contexts(study: Study) -> Rows:
                 "distance": shared.posture_difference,
                 "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
-                **(control := _of_random_search(study, shared)),
-                "verdict": verdict_of(study, shared, control, adjusted),
                 "equivalent": shared.parts[0],
                 "other": shared.parts[1],
                 **run_ids(*(study.cells[task.name, label] for task in shared.tasks)),
             }
+            if (control := contexts_of_control(study, shared)) is not None:
+                row["control"], row["control_runs"] = control.posture_difference, control.n
+                row["p_random_search"] = shared.p_beyond(control)
+            row["verdict"] = _verdict_of(study, shared, row)
             yield f"{first.name} {second.name} {label} goal {shared.goal} {shared.hand}", row
 
 
@@ -158,24 +159,21 @@ def list_signatures(study: Study) -> Rows:
             yield key, of_cell | row | {"hands": hands}
 
 
-def verdict_of(
-    study: Study, shared: TwoContexts, control: Row | None = None, p: float = math.nan
-) -> str:
+def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
     """Return a verdict on whether the posture at a shared goal depends on later goals, such as
     ``different postures``, ``the same posture`` or ``too few runs``.
 
     Of stochastic methods, the permutation test distinguishes postures, and the bootstrap test that
     the difference is below :data:`.SAME` shows that postures are the same; of others the difference
     itself does both. Methods that select their solution from trials are compared with random
-    search, too. ``control`` is the result of :func:`_of_random_search` for ``shared``; None:
-    computed here. ``p`` is corrected for all shared goals of the method; NaN: ``shared.p``.
+    search, too. ``row``: other columns of :func:`list_contexts`.
     """
     method: Any = study.methods.loc[shared.method]
-    can_tell = smallest_p(*map(len, shared.configurations)) < LEVEL and shared.p >= 0
-    if method.stochastic and not can_tell:
-        return "too few runs"
     if method.stochastic:
-        differs = (shared.p if math.isnan(p) else p) < LEVEL
+        few = smallest_p(*map(len, shared.configurations)) >= LEVEL
+        if few or math.isnan(shared.p):
+            return "too few runs"
+        differs = (shared.p if math.isnan(row["p_holm"]) else row["p_holm"]) < LEVEL
         is_same = shared.p_same < LEVEL
     else:
         differs = shared.posture_difference > ROUNDING
@@ -186,26 +184,12 @@ def verdict_of(
         return "no significant difference"
     if not selects(study, shared.method):
         return "different postures"
-    control = _of_random_search(study, shared) if control is None else control
-    beyond = control.get("p_random_search", math.nan)
-    if math.isnan(beyond):
-        few = "too few runs of random search" if control else "no random search of as many trials"
-        return f"undecided: {few}"
-    return "different postures" if beyond < LEVEL else "no more than random search"
-
-
-def _of_random_search(study: Study, shared: TwoContexts) -> Row:
-    """Return a dictionary: ``control``, the posture difference of random search in the same two
-    contexts; ``control_runs``, the number of its runs; ``p_random_search``, the p-value of the
-    permutation test that the method's posture difference is larger; empty without such runs."""
-    control = contexts_of_control(study, shared)
-    if control is None:
-        return {}
-    return {
-        "control": control.posture_difference,
-        "control_runs": control.n,
-        "p_random_search": shared.p_beyond(control),
-    }
+    if "control" not in row:
+        return "undecided: no random search of as many trials"
+    if math.isnan(row["p_random_search"]):
+        return "undecided: too few runs of random search"
+    is_beyond = row["p_random_search"] < LEVEL
+    return "different postures" if is_beyond else "no more than random search"
 
 
 @table(

@@ -241,14 +241,15 @@ def draw_runtimes(study: Study) -> Parts | None:
     use the reward of each trial, of methods from files, and, of all methods that do not use the
     reward of each trial, of the method that reaches most targets.
     """
-    tabled = list_runtimes(study)
+    if not len(tabled := list_runtimes(study)):
+        return None
     rows = study.methods.loc[[*tabled.index]]
     rows = rows.loc[headline_methods(rows)]
     rows = rows[rows.algorithm != "corrective process alone"]
     plans = rows.index[rows.information != BY_TRIAL]
     best = tabled.reached[plans].idxmax() if len(plans) else None
     curves = rows.index[(rows.information == BY_TRIAL) | ~rows.built_in | (rows.index == best)]
-    data = runtimes(study) if len(tabled) else pd.DataFrame(columns=["method", "spend", "budget"])
+    data = runtimes(study)
     shown = data.method.isin(curves) & (data.budget > 0) & (data.budget < math.inf)
     data = data[shown & data.spend.isin(PANELS)]
     if data.empty:

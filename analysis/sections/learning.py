@@ -36,17 +36,16 @@ def list_learning(study: Study) -> Rows:
     all its runs there have a solution and made 100 trials or more: the best reward, negative ticks,
     after each number of trials in :data:`BUDGETS` that all runs made, a mean over runs."""
     learned = improvements(study)
-    for (task, label), every in study.cells.items():
-        runs = [learned[run] for run in every.run_id if run in learned]
-        if task not in one_by_one(study) or study.methods.is_search[label]:
+    for (task, label), runs in study.cells.items():
+        is_shown = task in one_by_one(study) and not study.methods.is_search[label]
+        is_solved = len(solved(runs)) == len(runs) and learned.keys() >= {*runs.run_id}
+        fewest = runs.trials.min()
+        if not (is_shown and is_solved and fewest >= BUDGETS[0]):  # a try or two, no learning
             continue
-        if not len(every) == len(runs) == len(solved(every)):
-            continue
-        if every.trials.min() < BUDGETS[0]:  # a try or two, no learning
-            continue
-        row = row_of_cell(study, every) | {"corrective_best": study.corrective_best[task]}
-        for budget in (each for each in BUDGETS if each <= every.trials.min()):
-            row[f"after_{budget}"] = np.mean([best_after(run, budget) for run in runs])
+        row = row_of_cell(study, runs) | {"corrective_best": study.corrective_best[task]}
+        for budget in (each for each in BUDGETS if each <= fewest):
+            best = [best_after(learned[run_id], budget) for run_id in runs.run_id]
+            row[f"after_{budget}"] = np.mean(best)
         yield f"{task} {label}", row
 
 
@@ -116,12 +115,12 @@ def learning_curves(study: Study) -> pd.DataFrame:
     run), ``best`` (mean over runs, NaN until all have a solution), quartiles ``best_low`` and
     ``best_high``; no columns without a curve.
     """
-    learned, cells, curves = improvements(study), {}, [pd.DataFrame()]
-    for (task, label), every in study.cells.items():
-        runs = solved(every)
-        runs = runs[runs.run_id.isin(learned)]
-        if task in one_by_one(study) and len(runs):
-            cells[task, label] = runs
+    learned, curves = improvements(study), [pd.DataFrame()]
+    cells = {
+        (task, label): runs
+        for (task, label), every in study.cells.items()
+        if task in one_by_one(study) and len(runs := solved(every[every.run_id.isin(learned)]))
+    }
     rows = study.methods[study.methods.index.isin([label for _, label in cells])]
     drawn = headline_methods(rows[rows.base.isin(CURVES) | ~rows.built_in])
     for task, label in itertools.product(one_by_one(study), drawn):
@@ -129,8 +128,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
         if (task, label) not in cells or (two_armed and label == EC1):
             continue
         runs = cells[task, label]
-        length = int(runs.trials.min())
-        at = np.unique(np.round(np.geomspace(1, length, 120)).astype(np.int64))
+        at = np.unique(np.round(np.geomspace(1, int(runs.trials.min()), 120)).astype(np.int64))
         # Until every run has a solution (NaN before) there is no mean of them.
         best = np.array([best_after(learned[run_id], at) for run_id in runs.run_id])
         if np.isnan(best).any(axis=0).all():

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 
 from coartic.analysis.sections.costs import solve_times
 from coartic.analysis.study import Study, one_by_one, solved, typical_run
-from coartic.analysis.table import SHORT_ID, Row, Rows, row_of_cell, run_ids, table
-from coartic.analysis.words import commonest, marked, tally
+from coartic.analysis.table import SHORT_ID, Rows, row_of_cell, run_ids, table
+from coartic.analysis.words import commonest, tally
 
 
 @table(
@@ -30,7 +29,7 @@ def list_methods(study: Study) -> Rows:
             continue
         good = solved(runs)
         row = row_of_cell(study, runs) | {
-            "hands": tally(Counter(good.hands)) if len(good) > 1 else "".join(good.hands),
+            "hands": tally(good.hands) if len(good) > 1 else "".join(good.hands),
             "trials": runs.trials.astype(float).median(),
             "forward_kinematics": runs.forward_kinematics.astype(float).median(),
             "solve_s": solve_times(good).astype(float).median(),
@@ -46,12 +45,8 @@ def list_methods(study: Study) -> Rows:
 def list_failed(study: Study) -> Rows:
     """Yield a row for each method on each task on which runs failed: their number and three
     commonest reasons."""
-    failures = study.runs[study.runs.status != "ok"]
-    by_cell = dict([*failures.groupby(["task", "label"], sort=False)])
     for (task, label), runs in study.cells.items():
-        if (task, label) in by_cell:
-            failed = by_cell[task, label]
-            row: Row = {"task": marked(study.tasks[task]), "method": label}
-            row |= {"failed": len(failed), "runs": len(runs), **run_ids(failed)}
-            row["reasons"] = "; ".join(commonest(failed.reason.fillna("")))
-            yield f"{task} {label}", row
+        if len(failed := runs[runs.status != "ok"]):
+            reasons = "; ".join(commonest(failed.reason.fillna("")))
+            row = row_of_cell(study, runs) | {"failed": len(failed), "reasons": reasons}
+            yield f"{task} {label}", row | run_ids(failed)

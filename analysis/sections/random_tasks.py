@@ -33,14 +33,15 @@ def _instances(study: Study) -> dict[str, list[str]]:
 def on_instances(study: Study) -> pd.DataFrame:
     """Return the runs of compared methods on instances of families that have a best known reward
     and on which the method solved every run, with the label of the row of the method in column
-    ``method`` (a run stands again in the row of a joined learner), sorted by column ``place``, the
-    number of the instance, from 0 through all families. Do not change the frame: it is kept."""
+    ``method`` (a run stands again in the row of a joined learner), sorted by instance, through all
+    families. Do not change the frame: it is kept."""
     parts = {method: runs[runs.task.isin(solved_tasks(study, method))]
              for method, runs in compared(study).items()}  # fmt: skip
     every = together(study, parts)
-    names = itertools.chain.from_iterable(_instances(study).values())
-    place = every.task.map({name: number for number, name in enumerate(names)})
-    return every[place.notna()].assign(place=place).sort_values("place", kind="stable")
+    names = [*itertools.chain.from_iterable(_instances(study).values())]
+    every = every[every.task.isin(names)]
+    place = pd.Categorical(every.task, names)
+    return every.assign(place=place).sort_values("place", kind="stable")
 
 
 def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
@@ -48,9 +49,11 @@ def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
     shape ``(n,)``. ``runs`` are the method's rows of :func:`on_instances`; families that lack an
     instance there are left out."""
     return {
-        str(family): [part.gap.to_numpy(np.float64) for _, part in of_family.groupby("place")]
+        str(family): [
+            part.gap.to_numpy(np.float64) for _, part in of_family.groupby("task", sort=False)
+        ]
         for family, of_family in runs.groupby("family", sort=False)
-        if of_family.place.nunique() == len(_instances(study)[str(family)])
+        if of_family.task.nunique() == len(_instances(study)[str(family)])
     }
 
 
@@ -72,7 +75,7 @@ def list_family_gaps(study: Study) -> Rows:
     for method, of_method in compared(study).items():
         runs, ran = every[every.method == method], {*of_method.family.dropna()}
         scores, over = _by_family(study, runs), two_armed if two_armed & ran else ran
-        solved = runs[runs.family.isin(over)].place.nunique()
+        solved = runs[runs.family.isin(over)].task.nunique()
         missing = sum(len(families[family]) for family in over) - solved
         row: Row = {"method": method, "instances": solved, "missing": missing, "gap": math.nan}
         if two_armed and two_armed <= scores.keys():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -142,15 +142,12 @@ def _ranked(study: Study) -> list[str]:
     that method is in the list."""
     single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
     names = [*dict.fromkeys((*board(study).index, *single))]
-    under = study.methods.under
 
-    def with_settings(first: str) -> Iterator[str]:
-        yield first
-        for method in names:
-            if under[method] == first:
-                yield from with_settings(method)
+    def places(method: str) -> list[int]:  # of the methods above it, and its own
+        above = study.methods.under[method]
+        return [*(places(above) if above in names else ()), names.index(method)]
 
-    return [m for first in names if under[first] not in names for m in with_settings(first)]
+    return sorted(names, key=places)
 
 
 @table(

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import combinations
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from coartic.analysis.statistics.hypotheses import drawn_rows
+from coartic.analysis.statistics.hypotheses import drawn_rows, places
 from coartic.estimates import RESAMPLES, Resamples, centred, slices
 from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.robot import Array
@@ -106,30 +107,15 @@ def permutation_p(
     first, second = _groups(first, second)
     if min(len(first), len(second)) < 2:
         return math.nan
-    runs = len(first) + len(second)
-    exact = math.comb(runs, len(first)) <= resamples
-    every = np.array(list(combinations(range(runs), len(first))), np.intp) if exact else None
-    pool = centred(np.concatenate([first, second]))
-    null = []
-    for rows in slices(resamples if every is None else len(every), IN_MEMORY):
-        size = rows.stop - rows.start
-        chosen = drawn_rows(runs, len(first), size, rng) if every is None else every[rows]
-        # Weights that give the first group's mean less the second's.
-        weights = np.full((size, runs), -1 / len(second))
-        np.put_along_axis(weights, chosen, 1 / len(first), axis=1)
-        null.append(np.linalg.norm(weights @ pool, axis=1))
-    observed = np.repeat([1 / len(first), -1 / len(second)], [len(first), len(second)]) @ pool
-    reached = float((np.concatenate(null) >= np.linalg.norm(observed) * (1 - 1e-9)).sum())
+    n, m, pool = len(first), len(second), centred(np.concatenate([first, second]))
+    ways = math.comb(n + m, n)
+    exact = ways <= resamples
+    every = places(n + m, n, ways if exact else resamples, exact, rng)
+    null = [_distances(*_means_of(pool, rows)) for _, rows in every]
+    (observed,) = _distances(*_means_of(pool, np.arange(n)[None]))
+    reached = int((np.concatenate(null) >= observed * (1 - 1e-9)).sum())
     # Where divisions are drawn, the observed one counts as one more (Davison & Hinkley 1997).
-    return reached / len(every) if every is not None else (1 + reached) / (1 + resamples)
-
-
-def smallest_p(first: int, second: int, resamples: Resamples = RESAMPLES) -> float:
-    """Return the smallest p that the permutation test of runs (:func:`permutation_p`) can give, for
-    the numbers of runs in two contexts, two or more each."""
-    divisions = math.comb(first + second, first)
-    alike = 2 if first == second else 1  # the exchange of both groups is as far apart
-    return alike / divisions if divisions <= resamples else 1 / (1 + resamples)
+    return reached / ways if exact else (1 + reached) / (1 + resamples)
 
 
 @checked_arguments
@@ -177,22 +163,28 @@ def beyond_p(
     if min(map(len, groups)) < 2:
         return math.nan
     pools = [np.concatenate(runs) for runs in zip(groups[:2], groups[2:], strict=True)]
+    sizes = [*map(len, groups[:2])]
 
-    def distance(means: Sequence[Array]) -> Array:
-        first, second = means
-        return np.asarray(np.linalg.norm(first - second, axis=-1))
+    def excess(rows: Sequence[NDArray[np.int32]]) -> Array:
+        of_method, of_other = zip(*map(_means_of, pools, rows), strict=True)
+        return _distances(*of_method) - _distances(*of_other)
 
     null = np.empty(resamples)
-    for rows in slices(resamples, IN_MEMORY):
-        of_method, of_other = [], []
-        for pool, runs in zip(pools, groups[:2], strict=True):
-            ours = len(runs)
-            chosen = drawn_rows(len(pool), ours, rows.stop - rows.start, rng)
-            total = pool[chosen].sum(axis=1)
-            of_method.append(total / ours)
-            of_other.append((pool.sum(axis=0) - total) / (len(pool) - ours))
-        null[rows] = distance(of_method) - distance(of_other)
-    observed, theirs = (
-        distance([q.mean(axis=0) for q in runs]) for runs in (groups[:2], groups[2:])
-    )
-    return min(1.0, 2 * float(1 + (null >= observed - theirs - 1e-12).sum()) / (1 + resamples))
+    for part in slices(resamples, IN_MEMORY):
+        count = part.stop - part.start
+        null[part] = excess([drawn_rows(len(pool), size, count, rng)
+                             for pool, size in zip(pools, sizes, strict=True)])  # fmt: skip
+    (observed,) = excess([np.arange(size, dtype=np.int32)[None] for size in sizes])
+    return min(1.0, 2 * float(1 + (null >= observed - 1e-12).sum()) / (1 + resamples))
+
+
+def _means_of(pool: Array, rows: NDArray[Any]) -> tuple[Array, Array]:
+    """Return, for each of ``rows`` of indices in ``pool``, the mean of the configurations that the
+    row names, and the mean of the others, shapes ``(rows, dof)``."""
+    total, chosen = pool[rows].sum(axis=1), rows.shape[1]
+    return total / chosen, (pool.sum(axis=0) - total) / (len(pool) - chosen)
+
+
+def _distances(first: Array, second: Array) -> Array:
+    """Return the distances of mean configurations, shape ``(rows,)``."""
+    return np.asarray(np.linalg.norm(first - second, axis=1))

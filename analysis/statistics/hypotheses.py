@@ -66,25 +66,18 @@ def bootstrap_test(
     without spread and difference.
     """
     sample = vector(values) - vector([bound])[0]
-    difference, n, shifted = float(sample.mean()), len(sample), centred(sample)
-    size = float(np.abs(shifted).max())
+    difference, n = float(sample.mean()), len(sample)
     tails = 2 if alternative == "two-sided" else 1
     least = max(tails / 2**n, 1 / (1 + resamples))
+    varies = bool(centred(sample).any())
     differs = abs(difference) > NEGLIGIBLE * np.abs(vector(values)).max()
-    if n < 2 or not (size or differs):
+    if n < 2 or not (varies or differs):
         return Estimate(difference, n=(n,))
-    if not size:
+    if varies:
+        p = _p_of([(sample, 0.0)], alternative, resamples)
+    else:
         as_asked = tails == 2 or (difference > 0) == (alternative == "greater")
         p = least if as_asked else 1.0
-        return Estimate(difference, p=p, n=(n,), resamples=resamples, least_p=least)
-    means, variances = np.empty(resamples), np.empty(resamples)
-    for part, places in (_kept_places if n * resamples <= _MOST_PLACES else _places)(n, resamples):
-        drawn = shifted[places]
-        mean = drawn.mean(axis=0, keepdims=True)
-        means[part], variances[part] = mean[0], drawn.var(axis=0, ddof=1, mean=mean) / n
-    observed = difference / math.sqrt(shifted.var(ddof=1) / n)
-    extreme = _extreme(_studentised(means, variances, size), observed, alternative)
-    p = float(1 + extreme) / (1 + resamples)
     return Estimate(difference, p=p, n=(n,), resamples=resamples, least_p=least)
 
 
@@ -110,28 +103,24 @@ def exchange_test(
     """
     samples = vector(first), vector(second)
     n, m = map(len, samples)
-    pool = centred(np.concatenate(samples))
     value = float(samples[0].mean() - samples[1].mean())
-    if min(n, m) < FEWEST or not pool.any():
+    if min(n, m) < FEWEST or not centred(np.concatenate(samples)).any():
         return Estimate(value, n=(n, m))
-    ways = math.comb(n + m, n)
-    exact = ways <= resamples
-    chosen = ways if exact else resamples
-    tails = 2 if alternative == "two-sided" and n == m else 1
-    least = max(tails / ways, 0.0 if exact else 1 / (1 + resamples))
-    extreme = 0
-    size = float(np.abs(pool).max())
-    observed = _studentised(*_moments(pool, np.arange(n)[None], n), size)[0]
-    kept = chosen * min(n, m) <= _MOST_PLACES
-    for places in (_kept_exchanges if kept else _exchanges)(n, m, chosen, exact):
-        extreme += _extreme(_studentised(*_moments(pool, places, n), size), observed, alternative)
-    p = extreme / ways if exact else (1 + extreme) / (1 + resamples)
+    exact = math.comb(n + m, n) <= resamples
+    p = _p_of([samples], alternative, resamples, exact=exact)
+    least = smallest_p(n, m, resamples, two_tailed=alternative == "two-sided")
     return Estimate(value, p=p, n=(n, m), resamples=0 if exact else resamples, least_p=least)
 
 
-def stratified_test(
-    strata: Sequence[tuple[Array | float, Array | float]], resamples: int = RESAMPLES
-) -> float:
+def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool = True) -> float:
+    """Return the smallest p that a test by exchange can give, for samples of ``n`` and ``m`` values
+    or runs, two or more each; ``two_tailed``: if the test does not know which sample is which."""
+    ways = math.comb(n + m, n)
+    alike = 2 if two_tailed and n == m else 1  # the exchange of both samples is as far apart
+    return max(alike / ways, 1 / (1 + resamples))
+
+
+def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> float:
     """Return the p-value, two-sided, of a difference of means that is itself a mean over strata,
     such as tasks. A stratum is a pair of samples, shapes ``(n,)`` and ``(m,)``; an exact number can
     stand for a sample.
@@ -148,53 +137,68 @@ def stratified_test(
     >>> stratified_test([apart, apart])
     0.0003
     """
-    rng = np.random.default_rng(SEED)
     samples = [each for pair in strata for each in pair if not isinstance(each, float)]
     if not samples or min(map(len, samples)) < FEWEST:
         return math.nan
-    difference, variance, size = np.zeros(1), np.zeros(1), 0.0
-    differences, variances = np.zeros(resamples), np.zeros(resamples)
+    return _p_of(strata, "two-sided", RESAMPLES)
+
+
+def _p_of(
+    strata: Sequence[tuple[Array | float, Array | float]],
+    alternative: Alternative,
+    resamples: int,
+    *,
+    exact: bool = False,
+) -> float:
+    """Return the p-value of :func:`stratified_test` for an alternative; ``exact``, of all exchanges
+    of the labels of one stratum of two samples."""
+    if exact:
+        resamples = math.comb(sum(map(np.size, strata[0])), np.size(strata[0][0]))
+    rng = np.random.default_rng(SEED)
+    observed, null, size = np.zeros((2, 1)), np.zeros((2, resamples)), 0.0
     for first, second in strata:
         if isinstance(first, float) and isinstance(second, float):
-            difference += first - second
+            observed[0] += first - second
             continue
         if isinstance(first, float) or isinstance(second, float):
             values = np.ravel(first - second)
-            pool, n = centred(values), len(values)
-            moments = values.mean(), pool.var(ddof=1) / n
+            pool, n, chosen = centred(values), len(values), len(values)
+            observed[0] += values.mean()
+            observed[1] += pool.var(ddof=1) / n
         else:
             pool, n = centred(np.concatenate([first, second])), len(first)
-            moments = _moments(pool, np.arange(n)[None], n)
-        difference, variance = difference + moments[0], variance + moments[1]
+            chosen = min(n, len(second))
+            observed += _moments(pool, np.arange(n)[None], n)
         size += float(np.abs(pool).max())
-        for part in slices(resamples, max(1, IN_CACHE // len(pool))):
-            rows = part.stop - part.start
-            if n == len(pool):
-                drawn = pool[rng.integers(n, size=(rows, n))]
-                moments = drawn.mean(axis=1), drawn.var(axis=1, ddof=1) / n
-            else:
-                places = drawn_rows(len(pool), min(n, len(pool) - n), rows, rng)
-                moments = _moments(pool, places, n)
-            differences[part] += moments[0]
-            variances[part] += moments[1]
-    statistic = _studentised(difference, variance, size)[0]
-    extreme = _extreme(_studentised(differences, variances, size), statistic, "two-sided")
-    return float(1 + extreme) / (1 + resamples)
+        is_kept = len(strata) == 1 and resamples * chosen <= _MOST_PLACES
+        every = (
+            _kept_places(len(pool), chosen, resamples, exact)
+            if is_kept
+            else places(len(pool), chosen, resamples, exact, rng)
+        )
+        for part, rows in every:
+            null[:, part] += _moments(pool, rows, n)
+    (statistic,) = _studentised(observed, size)
+    extreme = _extreme(_studentised(null, size), statistic, alternative)
+    return extreme / resamples if exact else (1 + extreme) / (1 + resamples)
 
 
-def _moments(pool: Array, places: NDArray[Any], n: int) -> tuple[Array, Array]:
+def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
     """Return the difference of means (first less second sample) and the variance of the difference
-    for each row of ``places``, shapes ``(rows,)``. A row has the indices, in ``pool`` (the values
-    of both samples), of one sample: the first if a row has ``n`` indices, else the second."""
-    few = places.shape[1]
-    values = pool[places]
+    for each of ``rows``, shapes ``(rows,)``. A row has the indices, in ``pool`` (the values of both
+    samples), of one sample: the first if a row has ``n`` indices, else the second. For a single
+    sample, whose values a row draws with replacement, return mean and variance of the mean."""
+    few, many = rows.shape[1], len(pool) - rows.shape[1]
+    values = pool[rows]
+    if not many:
+        return values.mean(axis=1), values.var(axis=1, ddof=1) / n
     sums, squares = values.sum(axis=1), (values**2).sum(axis=1)
-    mean, other = sums / few, (pool.sum() - sums) / (len(pool) - few)
+    mean, other = sums / few, (pool.sum() - sums) / many
     variances = sum(
-        (total - size * centre**2).clip(0) / (size * (size - 1))
-        for total, size, centre in (
+        (total - count * centre**2).clip(0) / (count * (count - 1))
+        for total, count, centre in (
             (squares, few, mean),
-            ((pool**2).sum() - squares, len(pool) - few, other),
+            ((pool**2).sum() - squares, many, other),
         )
     )
     size = float(np.abs(pool).max())
@@ -202,12 +206,12 @@ def _moments(pool: Array, places: NDArray[Any], n: int) -> tuple[Array, Array]:
     return (mean - other) * (1 if few == n else -1), variances
 
 
-def _studentised(differences: Array, variances: Array, size: float) -> Array:
-    """Return differences over the square roots of variances, 0 for no difference, and otherwise
-    infinite without variance. Differences and variances that are rounding of values of ``size``
-    count as 0."""
-    differences = np.where(np.abs(differences) < NEGLIGIBLE * size, 0.0, differences)
-    variances = np.where(variances < (NEGLIGIBLE * size) ** 2, 0.0, variances)
+def _studentised(moments: Array, size: float) -> Array:
+    """Return differences, the first row of ``moments``, over the square roots of their variances,
+    the second, 0 for no difference, and otherwise infinite without variance. Differences and
+    variances that are rounding of values of ``size`` count as 0."""
+    differences = np.where(np.abs(moments[0]) < NEGLIGIBLE * size, 0.0, moments[0])
+    variances = np.where(moments[1] < (NEGLIGIBLE * size) ** 2, 0.0, moments[1])
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(differences == 0, 0.0, differences / np.sqrt(variances))
 
@@ -222,23 +226,6 @@ def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
     return int((extreme | np.isclose(null, observed, rtol=NEGLIGIBLE, atol=0.0)).sum())
 
 
-def _places(size: int, resamples: int) -> Iterator[tuple[slice, NDArray[np.int64]]]:
-    """Yield pairs that together cover all resamples of a sample of ``size`` values: a slice of the
-    resamples, and the indices of the values that these resamples draw, shape ``(size, length of the
-    slice)``. Equal arguments give equal indices."""
-    rng = np.random.default_rng(SEED)
-    for part in slices(resamples, max(1, IN_CACHE // size)):
-        places = rng.integers(size, size=(part.stop - part.start, size))
-        yield part, np.ascontiguousarray(places.T)
-
-
-@lru_cache(maxsize=16)  # most samples have as many values as another
-def _kept_places(size: int, resamples: int) -> list[tuple[slice, NDArray[np.int64]]]:
-    """Return the pairs of :func:`_places` as a list, which is cached for further samples of this
-    size: do not change it."""
-    return [*_places(size, resamples)]
-
-
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.int32]:
     """Return ``size`` draws of ``chosen`` of the indices 0 to ``runs`` - 1 without replacement,
     shape ``(size, chosen)``."""
@@ -246,24 +233,30 @@ def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> N
     return order[:, :chosen].astype(np.int32)  # no view, which would keep all of the order
 
 
-def _exchanges(n: int, m: int, count: int, exact: bool) -> Iterator[NDArray[np.int32]]:
-    """Yield parts of ``count`` exchanges between samples of ``n`` and ``m`` values, the first of
-    all possible exchanges if ``exact``, else random ones: arrays ``(rows, min(n, m))``, with a row
-    for each exchange, the indices in the pool of ``n + m`` values that become the smaller sample
-    (of two equal ones the first). Equal arguments give equal indices."""
-    rng, few = np.random.default_rng(SEED), n if n <= m else m
-    every = combinations(range(n + m), few)
-    for part in slices(count, max(1, IN_CACHE // (n + m))):
+def places(
+    runs: int, chosen: int, resamples: int, exact: bool, rng: np.random.Generator
+) -> Iterator[tuple[slice, NDArray[np.int32]]]:
+    """Yield pairs that together cover all resamples: a slice of the resamples, and for each of them
+    a row of ``chosen`` of the indices 0 to ``runs`` - 1: all choices in turn if ``exact``, or else
+    random ones; with replacement if as many are chosen as there are."""
+    every = combinations(range(runs), chosen)
+    for part in slices(resamples, max(1, IN_CACHE // runs)):
         size = part.stop - part.start
-        chosen = [*islice(every, size)] if exact else drawn_rows(n + m, few, size, rng)
-        yield np.asarray(chosen, np.int32)
+        if exact:
+            yield part, np.array([*islice(every, size)], np.int32)
+        elif chosen == runs:
+            yield part, rng.integers(runs, size=(size, runs)).astype(np.int32)
+        else:
+            yield part, drawn_rows(runs, chosen, size, rng)
 
 
-@lru_cache(maxsize=16)
-def _kept_exchanges(n: int, m: int, count: int, exact: bool) -> list[NDArray[np.int32]]:
-    """Return the arrays of :func:`_exchanges` as a list, which is cached for further samples of
-    these sizes: do not change it."""
-    return [*_exchanges(n, m, count, exact)]
+@lru_cache(maxsize=16)  # most samples have as many values as another
+def _kept_places(
+    runs: int, chosen: int, resamples: int, exact: bool
+) -> list[tuple[slice, NDArray[np.int32]]]:
+    """Return the pairs of :func:`places` for a new generator as a list, which is cached for further
+    samples of this size: do not change it."""
+    return [*places(runs, chosen, resamples, exact, np.random.default_rng(SEED))]
 
 
 @checked_arguments

@@ -1,5 +1,7 @@
 """The builder of planted studies: rows of runs, rewards of trials and solutions by hand."""
 
+import ast
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -96,7 +98,11 @@ def study_of(rows, tasks=(), *, deterministic=(), **parts):
     runs = runs.astype({"reward": "Int64"})
     by_name, plan = {task.name: task for task in tasks}, []
     for (name, method, setting), _ in runs.groupby(["task", "method", "setting"], sort=False):
-        parameters = dict(item.split("=") for item in setting.split(", ") if item)
+        parameters = {}
+        for key, value in (item.split("=") for item in setting.split(", ") if item):
+            with suppress(ValueError):  # a text
+                value = ast.literal_eval(value)
+            parameters[key] = value
         task = by_name.get(name) or load_task(name)
         cell = Cell(task, declared(method, deterministic), parameters)
         plan.append(Job(cell, 0, range(3), suite="paper"))
