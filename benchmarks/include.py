@@ -42,7 +42,8 @@ def include_folders(
     ``plan`` has one job at least; folder ``shipped`` stands for the shipped results. The joined
     plan has the cells of ``plan`` and, on ``tasks`` (None: on all), cells with a run 0 of the
     folders. Missing runs are left to :func:`.perform`. A warning names a folder whose plan has, on
-    ``tasks``, runs that the joined plan lacks.
+    ``tasks``, runs that the joined plan lacks, or another stochastic cell with fewer runs in the
+    joined plan than ``plan`` asks for of its own.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
     at 0, if the folders do not go together, if a folder does not pass the checks of ``coartic
@@ -122,24 +123,44 @@ def _join(
         if runs:
             cell = replace(job.cell, method=methods[job.cell.method.name])
             jobs.setdefault(digest, replace(plan[0], cell=cell, numbers=range(runs)))
-    _warn_of_gaps(plans, jobs)
+    _warn_of_gaps(asked, plans, jobs)
     return list(jobs.values())
 
 
-def _warn_of_gaps(plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]) -> None:
-    """Warn of a source whose plan has runs that the joined plan lacks: name the first cell, and
-    count the others. ``plans``: plans by name of the source; ``jobs``: joined plan, by digest."""
+def _warn_of_gaps(
+    asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
+) -> None:
+    """Warn of a source whose plan has runs that the joined plan lacks. Warn, too, of a source with
+    a cell (method and task) of a stochastic method, all of whose runs are joined and which
+    ``asked`` lacks, if it has fewer runs than the largest number in ``asked``. ``asked``: numbers
+    of runs asked for, by digest of the cell; ``plans``: plans by name of the source; ``jobs``:
+    joined plan, by digest."""
+    most = max(asked.values())
     for name, part in plans.items():
-        there = {digest: len(job.numbers) for digest, job in jobs.items()}
-        lacking = [job for job in part if there.get(job.cell.digest, 0) < len(job.numbers)]
+        lacking, few = list[Job](), list[Job]()
+        for job in part:
+            digest, method = job.cell.digest, job.cell.method
+            there = len(jobs[digest].numbers) if digest in jobs else 0
+            if there < len(job.numbers):
+                lacking.append(job)
+            elif digest not in asked and method.stochastic and there < most:
+                few.append(job)
         if lacking:
-            cell, others = lacking[0].cell, len(lacking) - 1
-            more = f" and of {counted(others, 'other')}" * bool(others)
+            words = f"{name} is not finished: it lacks runs of {_named(lacking)}"
             warnings.warn(
-                f"{name} is not finished: it lacks runs of {cell.label} on {cell.task.name}{more}, "
-                "and gives those before the first that is missing",
-                stacklevel=4,
+                f"{words}, and gives those before the first that is missing", stacklevel=4
             )
+        if few:
+            runs = counted(len(jobs[few[0].cell.digest].numbers), "run")
+            words = f"{name} has {runs} of {_named(few)}; {most} are asked for here"
+            warnings.warn(words, stacklevel=4)
+
+
+def _named(jobs: Sequence[Job]) -> str:
+    """Return words that name the cell of the first job, and count the other jobs, such as
+    ``cma-es/bandit on ascending and of 2 others``."""
+    others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
+    return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 
 
 def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:

@@ -99,6 +99,8 @@ def test_what_no_folder_has_is_performed(parts, left, tmp_path):
     same_results(load(whole), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
     assert joined(parts[:1], tmp_path / "more", LEFT, runs=3).done == 1
     assert joined([tmp_path / "more", parts[0]], tmp_path / "most", LEFT).present == 3 + 1
+    with pytest.warns(UserWarning, match=rf"right has 2 runs of {EC1} on descending; 3 are asked"):
+        joined(parts[1:], tmp_path / "few", LEFT, runs=3)
 
 
 def test_crashed_runs_of_a_source_are_performed_again(tmp_path):

@@ -14,7 +14,7 @@ import pytest
 from coartic import CoarticError, Movement
 from coartic.analysis.report import about, build, render
 from coartic.analysis.report.about import attempt, limits
-from coartic.analysis.report.build import write_report
+from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.player import methods_played, player
 from coartic.analysis.sections import FIGURES, TABLES, coarticulation
 from coartic.analysis.study import Study, load
@@ -48,6 +48,14 @@ def test_a_csv_file_has_the_rows_and_runs_of_its_table(traced, tables_by_name, r
         assert written.run_ids.tolist() == table.run_ids.tolist()
         for shown in (repr(table), repr(table.head()), table._repr_html_()):
             assert "run_ids" not in shown
+
+
+def test_a_report_is_stamped_with_the_results_of_its_runs(traced, report):
+    other = traced.runs.reset_index(drop=True)
+    other.loc[0, "result"] = "other"
+    stamps = [stamp(runs) for runs in (traced.runs, traced.runs[::-1], other)]
+    page = (report / "report.html").read_text("utf-8")
+    assert [f'name="coartic-runs" content="{each}"' in page for each in stamps] == [1, 1, 0]
 
 
 def test_the_folder_below_is_named_where_there_are_no_results(traced, coartic, tmp_path):

@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
@@ -26,6 +27,7 @@ from coartic.analysis.table import Table, caption_of, is_setting
 from coartic.analysis.words import listed, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
+from coartic.runs.plan import hash_of
 from coartic.runs.store import lock
 
 HERE = Path(__file__).parent
@@ -146,6 +148,11 @@ def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     }
 
 
+def stamp(runs: pd.DataFrame) -> str:
+    """Return a hash, 64 hex digits, of the ids and results of runs, whatever their order."""
+    return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
+
+
 def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[str], object]) -> str:
     """Return the page in HTML, which needs no other file and no network.
 
@@ -192,6 +199,7 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         stage=stage,
         suite=study.suite,
         home=home,
+        stamp=stamp(study.runs),
         folder=study.folder_in_commands,
         version=made_with["coartic"],
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
