@@ -1,4 +1,4 @@
-"""Hill climbing and CMA-ES against closed forms and their own rules; test_short_runs pins runs."""
+"""Hill climbing and CMA-ES against closed forms and their own rules."""
 
 import math
 from types import SimpleNamespace
