@@ -56,13 +56,27 @@ def _plain_width(monkeypatch):
 
 
 @pytest.fixture
-def in_this_process(monkeypatch):
+def unranked(monkeypatch):
+    """Commands print no ranking, which takes most of their time."""
+    monkeypatch.setattr("coartic.cli.run.say_ranking", lambda *_: None)
+
+
+@pytest.fixture
+def in_this_process(unranked, monkeypatch):
     """Runs without processes of their own, which take long and have tests of their own."""
     from coartic.benchmarks import pool, reproduce, runner
     from tests.support.suites import InProcess
 
     for module in (pool, reproduce, runner):
         monkeypatch.setattr(module, "Local", InProcess)
+
+
+@pytest.fixture
+def ranked(in_this_process, monkeypatch):
+    """Runs in this process, by commands that print the ranking."""
+    from coartic.cli.read import say_ranking
+
+    monkeypatch.setattr("coartic.cli.run.say_ranking", say_ranking)
 
 
 @pytest.fixture(scope="session")

@@ -281,10 +281,9 @@ def test_results_are_packed_again_where_they_have_not_changed(
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_command(packed, parts, tmp_path, coartic, monkeypatch):
+def test_command(packed, parts, tmp_path, coartic):
     """A method is written by a command, run beside the shipped results, and there when that is
     repeated; a colleague includes the folder with another one, without the method's file."""
-    monkeypatch.setattr("coartic.cli.run.say_ranking", lambda *_: None)  # takes long
     mine, out = tmp_path / "my_search.py", tmp_path / "out"
     small = ("--runs", 2, "--trials", 40, "--tasks", "ascending,descending")
     assert coartic("new", "my-search", "--out", mine)[0] == 0
