@@ -71,6 +71,17 @@ def in_this_process(unranked, monkeypatch):
         monkeypatch.setattr(module, "Local", InProcess)
 
 
+@pytest.fixture(scope="module")
+def not_repeated():
+    """No run of a method of a file is made again in the end."""
+    from coartic.benchmarks import runner
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runner, "repeats_of", lambda run: [])
+        patch.setattr(runner, "doubts_of", lambda *_: ())
+        yield
+
+
 @pytest.fixture
 def ranked(in_this_process, monkeypatch):
     """Runs in this process, by commands that print the ranking."""

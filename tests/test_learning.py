@@ -24,7 +24,6 @@ from coartic import (
     load_task,
     movements_of,
 )
-from coartic.benchmarks.planning import plan_suite
 from coartic.learner.method import METHODS
 from coartic.method import Information, MethodError, Session
 from coartic.motion.batch import SLOTS
@@ -40,6 +39,7 @@ from tests.support.strategies import (
     tiny_task,
     uneven_task,
 )
+from tests.support.suites import suite_of
 
 
 def _tenths(values):
@@ -338,33 +338,16 @@ def test_a_goal_where_the_hand_is_already_takes_no_tick():
     assert run.execute().reward == 0
 
 
-OWN_SUITE = """\
-name = "mine"
-title = "One assumption changed"
-description = "The learner under conditions of my own."
-runs = 2
-trials = 40
-
-[[blocks]]
-methods = ["dual-process/custom"]
-"""
-
-
-def own_suite(folder, line):
-    """A suite of the learner under conditions that a line changes."""
-    suite = folder / "mine.toml"
-    suite.write_text(OWN_SUITE + line, encoding="utf-8")
-    return suite
+CUSTOM = 'tasks = ["two-armed-1"]\nmethods = ["dual-process/custom"]\nparameters = '
 
 
 def test_any_condition_is_a_setting_of_a_method(tmp_path):
     fields = 'base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01'
-    suite = own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}')
-    (job,) = plan_suite(suite)
+    (cell,) = suite_of(tmp_path, f"{CUSTOM}{{ {fields} }}")
     (method,) = (each for each in METHODS if each.name == "dual-process/custom")
-    _, execution, _ = solve(method, "two-armed-1", seed=3, **job.cell.parameters)
+    _, execution, _ = solve(method, "two-armed-1", seed=3, **cell.parameters)
     rules = replace(CONDITIONS["EC3"], modify_other=True, epsilon=0.4, drift=(0.0, 0.3), pull=0.01)
-    assert execution.reward == learn("two-armed-1", rules, seed=3, trials=40).reward
+    assert execution.reward == learn("two-armed-1", rules, seed=3, trials=30).reward
 
 
 @pytest.mark.parametrize(
@@ -380,7 +363,7 @@ def test_any_condition_is_a_setting_of_a_method(tmp_path):
 )
 def test_conditions_that_cannot_be_are_refused_in_a_sentence(fields, sentence, tmp_path):
     with pytest.raises(CoarticError, match=re.escape(sentence)):
-        plan_suite(own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}'))
+        suite_of(tmp_path, f"{CUSTOM}{{ {fields} }}")
 
 
 def test_parameters_of_an_informed_learner_are_refused_where_nothing_goes_by_them():

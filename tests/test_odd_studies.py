@@ -67,6 +67,16 @@ def test_the_sentence_of_the_ranking_is_of_methods_on_the_common_tasks():
     assert "mine" not in said
 
 
+def test_missing_tasks_are_those_without_a_solution_of_every_run():
+    study = planted(
+        *(behind([ONE], method, 10, 11, 12) for method in ("mine", "hill-climbing")),
+        *(behind([TWO, THREE], method, 10, 11, None) for method in ("mine", "hill-climbing")),
+        behind([ONE, TWO, THREE], "random-search", 15, 14, 13),
+    )
+    missing = TABLES["ranking"](study).missing
+    assert missing.to_dict() == {"mine": 2, "hill-climbing": 2, "random-search": 0}
+
+
 def test_names_of_tasks_may_end_as_columns_of_intervals_do():
     base, names = load_task(TWO), ("reach", "reach_low", "reach_high", "reach_sd")
     tasks = [base.model_copy(update={"name": name, "title": name}) for name in names]

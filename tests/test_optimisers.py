@@ -26,6 +26,7 @@ from coartic import (
     load_task,
     objective,
 )
+from coartic.benchmarks import conformance
 from coartic.benchmarks.conformance import check_method
 from coartic.benchmarks.registry import registry
 from coartic.method import BudgetError, Information, MethodError, Session, run_method
@@ -159,7 +160,8 @@ METHODS = [path for path in sorted(EXAMPLES.glob("*.py")) if path.stem not in PR
 
 @pytest.mark.parametrize("path", METHODS, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
-def test_the_examples_are_methods(path, in_this_process):
+def test_the_examples_are_methods(path, in_this_process, monkeypatch):
+    monkeypatch.setattr(conformance, "CHECK_TRIALS", 30)
     text = path.read_text("utf-8")
     for library in re.findall(r"^(?:import|from) (\w+)", text, re.MULTILINE):
         pytest.importorskip(library)

@@ -85,7 +85,7 @@ for file in map(Path, sys.argv[1:]):
 
 
 @pytest.mark.process
-@pytest.mark.usefixtures("unranked")
+@pytest.mark.usefixtures("unranked", "not_repeated")
 def test_a_changed_library_makes_runs_again(coartic, tmp_path, library):
     """Also of an editable install, which lies outside of the installed packages."""
     path = written(tmp_path, imports="import mylib", step="mylib.STEP")
@@ -105,7 +105,7 @@ def test_a_changed_library_makes_runs_again(coartic, tmp_path, library):
 
 @pytest.mark.process
 @pytest.mark.filterwarnings("default")
-@pytest.mark.usefixtures("library", "unranked")
+@pytest.mark.usefixtures("library", "unranked", "not_repeated")
 def test_a_file_that_is_loaded_late_is_named(coartic, tmp_path):
     path = written(tmp_path, first="import mylib as late", step="late.STEP")
     command = ("run", "paper", "--tasks", "ascending", "--trials", 50, "--methods", "mine",

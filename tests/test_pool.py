@@ -13,7 +13,7 @@ import pytest
 
 from coartic import CoarticError, load_task
 from coartic.analysis.study import load
-from coartic.benchmarks import pool, runner
+from coartic.benchmarks import pool
 from coartic.benchmarks.pool import Local, Workers, signal_name
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
@@ -21,7 +21,7 @@ from coartic.runs.store import writing
 from tests.support.processes import comes, folders_of_session, processes, python
 from tests.support.suites import KNOWN, cell_on, made_once, planned, run_and_write
 
-pytestmark = pytest.mark.process
+pytestmark = [pytest.mark.process, pytest.mark.usefixtures("not_repeated")]
 
 METHODS = """
 import itertools, os, shutil, signal, sys, tempfile, threading, time
@@ -129,15 +129,6 @@ HANDLED = {
 """What a method does, how its run ends, and words of the reason."""
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _once():
-    """No run of a method is made again in the end, which test_runner has."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(runner, "repeats_of", lambda run: [])
-        patch.setattr(runner, "doubts_of", lambda *_: ())
-        yield
-
-
 def entries(folder, **bodies):
     """Methods of a file, which do one of these things."""
     things = bodies.items()
@@ -155,7 +146,7 @@ def cells_of(folder, **bodies):
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
+def study(tmp_path_factory, not_repeated):
     """Runs in the same workers, others, and this project's; CPU time ends each, however long it has
     to wait for it."""
 

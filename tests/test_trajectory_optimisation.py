@@ -9,7 +9,7 @@ import pytest
 
 from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
 from coartic.baselines.posture_graph import chains_of, sample_layers
-from coartic.baselines.trajectory_optimisation import cheapest_plan, path_movements
+from coartic.baselines.trajectory_optimisation import cheapest_plan
 from coartic.baselines.trajectory_problem import (
     JOINT_WEIGHT,
     Instance,
@@ -17,7 +17,7 @@ from coartic.baselines.trajectory_problem import (
     trajectory_problem,
 )
 from coartic.baselines.whole_ticks import Rounding, movements
-from coartic.method import Information, Session
+from coartic.method import Session
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, least_cost, steps_from
@@ -176,21 +176,3 @@ def test_goals_that_one_posture_hits_are_merged_in_every_way():
     assert list(plans) == [(), (1,), (2,), (1, 2)]
     for merged, merger in plans.items():
         np.testing.assert_allclose(merger.lengths()[list(merged)], 0.0, atol=1e-9)
-
-
-def test_the_rest_of_a_piece_lies_ahead():
-    """The base moves along x by waypoints closer than a step, past the first goal's rim."""
-    task = small_task(goals=((2.6, 1.0), (3.2, 1.0)))
-    instance = Instance.of(task, ("right", "right"), still=True, radius=task.radius)
-    start = np.array(task.q0)
-    start[:2] += (2.305, 1.0) - task.robot.forward_kinematics(task.q0, "right")
-    task = small_task(
-        goals=task.goals, start={"base": tuple(start[:2]), "left": (1.5,), "right": (0.4, 0.3)}
-    )
-    line = start + np.arange(1, 221)[:, None] * 0.004 * np.eye(len(start))[0]
-    session = Session(task, 0, set(Information), trusted=True)
-    first, second = path_movements(session, task, instance, [line[:80], line[80:]])
-    execution = execute(task, (first, second))
-    assert (execution.completed, execution.corrections, execution.ticks) == (True, 0, 82)
-    hit = execution.configurations[0]
-    np.testing.assert_allclose(second.waypoints, line[line[:, 0] > hit[0]])
