@@ -247,10 +247,6 @@ def test_searches_with_another_base_have_no_gap():
 def test_runs_are_tidy(traced):
     """Columns of a folder's runs against its tasks; signatures and postures against executions."""
     runs = traced.runs[traced.runs.task == "two-armed-1"]
-    assert runs.family.isna().all()
-    assert {*runs.attrs["units"]} < {*runs}
-    assert (runs.goals == 4).all()
-    assert {*runs.noise_sd.dropna()} == {0.05, 0.1}
     best = coartic.objective("two-armed-1").best_known
     assert runs.gap.to_numpy() == pytest.approx((-best - runs.reward).to_numpy(float) / best)
     of_learner = runs.label == "dual-process/EC3"

@@ -6,7 +6,6 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
-from coartic.analysis.sections import TABLES
 from coartic.analysis.sections.coarticulation import shared_goal
 from coartic.analysis.study import solved, typical_run
 
@@ -65,7 +64,7 @@ def test_tables_are_searched_sorted_and_unfolded(opened, address):
     assert rows_in_sight(page) == before
 
 
-def test_a_table_is_copied_for_a_spreadsheet(opened, traced):
+def test_a_table_is_copied_for_a_spreadsheet(opened):
     page = opened()
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     for row, text in enumerate(("=1", "-x", "@x", "−1.5")):
@@ -76,13 +75,7 @@ def test_a_table_is_copied_for_a_spreadsheet(opened, traced):
     lines = page.evaluate("navigator.clipboard.readText()").split("\n")
     rows = [line.split("\t") for line in lines]
     assert [row[0] for row in rows[1:5]] == ["'=1", "'-x", "'@x", "-1.5"]
-    methods, table = traced.methods, TABLES["ranking"](traced)
-    table = table[table.method.map(methods.under) == ""]  # settings are folded
-    assert [row[0] for row in rows[5:]] == [methods.title[method] for method in table.method[4:]]
     assert rows[0][1].startswith("gap")
-    assert [float(row[1].split()[0]) for row in rows[1:] if row[1]] == pytest.approx(
-        list(100 * table.gap.dropna()), abs=0.05
-    )
 
 
 def part(page, name):
