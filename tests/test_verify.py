@@ -98,6 +98,7 @@ EDITS = {  # what is said: of which run, and what was edited
     "initial_reward is -": result(LEARNER, "initial_reward = -9"),
     "hands is RR, not LL": result(TINY, "hands = 'LL'"),
     "solution_corrections is 1": result(TINY, "solution_corrections = 2"),
+    "other_arm_travel is": result(PATH, "other_arm_travel = 1e-8"),
     "status is timeout": result(TINY, "status = 'timeout', reward = NULL, hands = NULL"),
     "its cell is not there": (TINY, "DELETE FROM cells WHERE task = 'tiny'"),
     "of environments that is not there": (None, "UPDATE results SET environment = 99"),
@@ -107,15 +108,18 @@ EDITS = {  # what is said: of which run, and what was edited
     "no number up to": movement(TINY, f"path = {moved('$[0]', 9e9)}"),
     "a joint or a trial": movement(OTHER, f"path = {moved('$[9]', 1e-9)}", part="replay"),
     "is no number": movement(TINY, "path = json_set(path, '$[0]', NULL)"),
+    "not a number for each joint": movement(TINY, "path = json_remove(path, '$[0]')"),
     "has no such points": movement(TINY, "path = '[]'"),
     "goal 1 is not hit": movement(TINY, STANDING),
     "the left hand, which": movement(PATH, "hand = 'left'"),
     "has not one hand": movement(LEARNER, "goal = 2"),
+    "out of order": (PATH, "UPDATE movements SET goal = 4 - goal WHERE kind = 'path'"),
     "which is no count": movement(OTHER, "ticks = ticks + 0.5"),
     "is made after goal 2": movement(TINY, "ticks = 1", order=1),
     "of no known kind": movement(TINY, "kind = 'magic'"),
     "movement 1 is missing": movement(TINY, 'ticks = 0, "order" = 7', order=1),
     "'other'": movement(TINY, "part = 'other'"),
+    "path has no such points": movement(TINY, "kind = 'path'"),
     "planned has no such points": movement(PATH, "kind = 'planned'"),
     "solution is too long": movement(PATH, "path = path || hex(zeroblob(5000000))"),
     "too big": movement(PATH, "path = path || hex(zeroblob(6500000))"),
@@ -124,6 +128,7 @@ EDITS = {  # what is said: of which run, and what was edited
     "that its id says": result(FAILED, "run = 60"),
     "its seed is not": result(TINY, "seed = seed + 1"),
     "at least 2 ticks, not 1": movement(TINY, "ticks = 1"),
+    "no count up to": movement(TINY, "ticks = 1000000000"),
     "the rewards of its 300 trials are damaged": (
         LEARNER,
         f"UPDATE learning SET rewards = x'{zlib.compress(bytes(999)).hex()}'",
@@ -142,6 +147,7 @@ EDITS = {  # what is said: of which run, and what was edited
     ),
     # Of the plan: what it asks for is there.
     "asks for 6 runs, of which the folder has 5": (None, "DELETE FROM results WHERE id = 2"),
+    "asks for 6 runs, of which the folder has 0": (None, "UPDATE suite SET seed = 1"),
     "asks for 7 runs, of which the folder has 6": (None, "UPDATE plan SET runs = 3 WHERE cell = 1"),
     **{
         f"The plan is not as it was written{' ' * number}": (None, statement)
