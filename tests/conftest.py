@@ -56,13 +56,38 @@ def _plain_width(monkeypatch):
 
 
 @pytest.fixture
-def in_this_process(monkeypatch):
+def unranked(monkeypatch):
+    """Commands print no ranking, which takes most of their time."""
+    monkeypatch.setattr("coartic.cli.run.say_ranking", lambda *_: None)
+
+
+@pytest.fixture
+def in_this_process(unranked, monkeypatch):
     """Runs without processes of their own, which take long and have tests of their own."""
     from coartic.benchmarks import pool, reproduce, runner
     from tests.support.suites import InProcess
 
     for module in (pool, reproduce, runner):
         monkeypatch.setattr(module, "Local", InProcess)
+
+
+@pytest.fixture(scope="module")
+def not_repeated():
+    """No run of a method of a file is made again in the end."""
+    from coartic.benchmarks import runner
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runner, "repeats_of", lambda run: [])
+        patch.setattr(runner, "doubts_of", lambda *_: ())
+        yield
+
+
+@pytest.fixture
+def ranked(in_this_process, monkeypatch):
+    """Runs in this process, by commands that print the ranking."""
+    from coartic.cli.read import say_ranking
+
+    monkeypatch.setattr("coartic.cli.run.say_ranking", say_ranking)
 
 
 @pytest.fixture(scope="session")

@@ -31,9 +31,7 @@ def test_equal_numbers_are_equal():
 @pytest.mark.parametrize(
     ("row", "column", "value"),
     [
-        ("CMA-ES", "gap", 0.0106),
         ("CMA-ES", "gap_high", 0.0146),
-        ("learner (EC1, EC4)", "share_low", 0.4649),
         ("learner (EC1, EC4)", "gap_low", NAN),
         ("corrective process", "share", 0.4414),
     ],

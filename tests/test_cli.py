@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from coartic import CoarticError, __version__, load_task
+from coartic import CoarticError, load_task
 from coartic.analysis.report import build
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
@@ -45,7 +45,7 @@ NEAR = GOOD.replace("[5.0, 1.0], [5.0, 2.0]", "[4.7, 0.1], [4.8, 0.1]")
 SMALL = ("run", "paper", "--tasks", "ascending", "--runs", 2, "--trials", 40)
 
 
-@pytest.mark.usefixtures("in_this_process")
+@pytest.mark.usefixtures("ranked")
 def test_run_resumes(coartic, tmp_path):
     out = tmp_path / "my results"
     code, text, error = coartic(*SMALL, "--out", out)
@@ -111,15 +111,6 @@ class Slow(Optimiser):
         for _ in range(2):
             objective(objective.x0 + 0.01 * rng.standard_normal(objective.dim))
 """
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_the_terminal_says_where_there_are_no_gaps(coartic, tmp_path):
-    (tmp_path / "near.toml").write_text(NEAR, encoding="utf-8")
-    asked = ("--tasks", tmp_path / "near.toml", "--methods", "EC1", "--runs", 1, "--trials", 5)
-    code, text, _ = coartic("run", "paper", *asked, "--out", tmp_path / "out")
-    assert code == 0
-    assert re.search(r"No gaps +on .*, where fewer than two methods", " ".join(text.split()))
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -365,20 +356,10 @@ def helper():
         assert words in done.stdout + done.stderr
 
 
-def test_list(coartic, tmp_path):
-    assert coartic("list")[0] == 0
-    (tmp_path / "mine.toml").write_text(GOOD, encoding="utf-8")
-    names = "two-armed-1", "comparison", "long", "dual-process/EC4", "ec4", tmp_path / "mine.toml"
-    for name in (*names, ROOT / "benchmarks" / "suites" / "paper.toml"):
-        assert coartic("list", name)[0] == 0, name
-
-
 def test_draw(coartic, tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text('title = "$x^$"\n' + GOOD, encoding="utf-8")
-    for name in ("one.png", "one.svg", "one.pdf"):
-        assert coartic("draw", "ascending", "--out", tmp_path / name)[0] == 0
-        assert (tmp_path / name).stat().st_size > 5000
-        assert b"Date" not in (tmp_path / name).read_bytes()
+    assert coartic("draw", "ascending", "--out", tmp_path / "one.pdf")[0] == 0
+    assert (tmp_path / "one.pdf").stat().st_size > 5000
     monkeypatch.setattr(draw, "_PICTURED", 2)
     for count, words in ((2, "2 tasks."), (3, "3 tasks, of which 2 are drawn.")):
         many = (f"long/v1/i001..i00{count}", "--out", tmp_path / f"{count}.svg")
@@ -415,12 +396,6 @@ def test_play(coartic, tmp_path, monkeypatch):
     assert "open it in a browser" in coartic("play", "--no-open")[1]
     assert len(shown) == 1
     assert len([*tmp_path.iterdir()]) == 2
-
-
-@pytest.mark.process
-def test_the_installed_script():
-    command = [Path(sys.executable).parent / "coartic", "--version"]
-    assert subprocess.check_output(command, text=True) == f"coartic {__version__}\n"
 
 
 @pytest.mark.process

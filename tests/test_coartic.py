@@ -34,11 +34,6 @@ def test_conditions_are_shown_as_they_are_written():
         assert eval(repr(condition), {**vars(coartic)}) == condition
 
 
-def test_dir_shows_the_interface_alone():
-    assert {name for name in dir(coartic) if not name.startswith("__")} == {*coartic.__all__}
-    assert len(set(coartic.__all__)) == len(coartic.__all__)
-
-
 def test_errors_can_be_imported():
     """But for those of a folder below, which stay within it."""
     errors = [coartic.CoarticError]

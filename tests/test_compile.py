@@ -4,7 +4,6 @@ import logging
 import os
 import shutil
 import sys
-import time
 
 import numba
 import numpy as np
@@ -112,27 +111,13 @@ def waiting(folder):
         return said, lever(folder), place.read_text() == str(os.getpid())
 
 
-def days_later(days, folder):
-    now = time.time
-    time.time = lambda: now() + days * 24 * 3600.0
-    return lever(folder)
-
-
-def test_whoever_waits_is_told_for_which_process_and_no_clock_removes_what_is_used(tmp_path):
+def test_whoever_waits_is_told_for_which_process(tmp_path):
     write_kernel(tmp_path)
     assert apart(lever, tmp_path) == (5.5, 0)
     (first, *_), result, is_ours = apart(waiting, tmp_path)
     assert first.startswith("Waiting for process 1234, which compiles")
     assert first.endswith("across.lock")
     assert (result, is_ours) == ((5.5, 0), True)
-    others = {days: tmp_path / "coartic" / "__pycache__" / f"kernel-{days:016}" for days in (1, 31)}
-    for days, other in others.items():
-        other.mkdir()
-        os.utime(other, (time.time() - days * 24 * 3600.0,) * 2)
-    assert apart(days_later, 0, tmp_path) == (5.5, 1)
-    assert [other.exists() for other in others.values()] == [True, False]
-    assert apart(days_later, 30, tmp_path) == (5.5, 1)
-    assert [other.exists() for other in others.values()] == [False, False]
 
 
 SLOTS = """

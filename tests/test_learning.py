@@ -24,7 +24,6 @@ from coartic import (
     load_task,
     movements_of,
 )
-from coartic.benchmarks.planning import plan_suite
 from coartic.learner.method import METHODS
 from coartic.method import Information, MethodError, Session
 from coartic.motion.batch import SLOTS
@@ -40,6 +39,7 @@ from tests.support.strategies import (
     tiny_task,
     uneven_task,
 )
+from tests.support.suites import suite_of
 
 
 def _tenths(values):
@@ -205,35 +205,6 @@ def test_from_a_first_solution_it_equals_the_slow_learner(away, condition):
 
 
 @pytest.mark.parametrize(
-    ("name", "condition", "low", "high", "hands"),
-    [
-        # Published mean and spread, widened by the standard error of a few runs.
-        ("ascending", "EC1", -307, -299, {"RRR"}),
-        ("descending", "EC1", -319, -311, {"RRR"}),
-        ("two-armed-1", "EC2", -640, -510, {"RRRR", "RRLR", "LLRR"}),
-        ("two-armed-1", "EC3", -510, -494, {"LRLR"}),
-        ("two-armed-1", "EC4", -508, -470, {"LRLR"}),
-        ("two-armed-2", "EC3", -356, -344, {"RRRR", "RLRR"}),
-        ("two-armed-2", "EC4", -358, -326, {"RRRR", "RLRR", "RLLR"}),
-    ],
-)
-def test_learned_rewards_of_the_paper(name, condition, low, high, hands):
-    """In runs of the paper's length; one of those that take longest."""
-    runs = learn_many(name, condition, seeds=range(2 if condition == "EC1" else 1))
-    assert low < np.mean([run.reward for run in runs]) < high
-    assert {run.hands for run in runs} <= hands
-    for run in runs:
-        again = run.execute()  # the best trial, executed anew
-        assert again.reward == run.reward
-        assert [m.ticks for m in run.solution] == [m.ticks for m in again.movements]
-        # On two-armed 2 most runs of EC4 find nothing better.
-        assert run.reward > run.initial_reward or (name, condition) == ("two-armed-2", "EC4")
-        assert run.reward >= run.initial_reward
-        assert abs(run.replay_reward - run.reward) < 30
-        assert run.counters.failed_trials == 0
-
-
-@pytest.mark.parametrize(
     ("shift", "visited"),
     [(0.0, [True, True]), (1e-12, [True, True]), (1e-6, [False, True]), (-1e-6, [True, True])],
 )
@@ -260,18 +231,6 @@ def test_what_a_policy_spends_is_counted():
     assert (meter.corrections, meter.jacobians) == (64, meter.corrective_iterations)
     named = Session(load_task("two-armed-1"), 0, information)
     assert (named.find_initial_hands(), named.meter.initial_trials) == ("RRRR", 0)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        *(("step", step) for step in (0.0, math.nan, 1e-20)), ("gain", 0.0),
-        ("arrival_tolerance", -1.0), ("correction_tolerance", 0.1), ("max_iterations", -1),
-    ],
-)  # fmt: skip
-def test_models_no_movement_can_be_made_with(name, value):
-    with pytest.raises(ValueError, match=rf"model\.{name}"):
-        execute("ascending", [], model=MotionModel(**{name: value}))
 
 
 def test_a_trial_that_failed_stays_failed_where_the_hand_is_in_the_next_goal():
@@ -313,17 +272,15 @@ LEFT_FIRST = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"
         (CoarticError, "no left hand", {"start": movements_of("LLL", [ZERO] * 3)}),
         (CoarticError, "the first .* left",
          {"task": "two-armed-1", "start": movements_of("LLLL", [ZERO] * 4)}),
-        *((SolutionError, "ovement", {"start": start}) for start in ("x", [1])),
+        (SolutionError, "ovement", {"start": "x"}),
         *((ValueError, "seed is", {"seeds": [seed]}) for seed in (-1, 2**128)),
-        *((TypeError, "seeds is .*; it must be", {"seeds": seeds}) for seeds in ("1", 3)),
         (ValueError, "seeds has more than 1,000,000 entries", {"seeds": range(10**9)}),
         (ValueError, "seeds has more than 20,000 entries",
          {"seeds": itertools.count(), "trials": 10_000}),
-        *((ValueError, "trials is", {"trials": most}) for most in (0, 10**12)),
-        *((ValueError, "jobs is", {"jobs": jobs}) for jobs in (0, 10**9)),
-        *((TypeError, "must be a MotionModel", {"model": model}) for model in (None, {})),
-        (ValueError, "model.step is 'x'; it must be", {"model": MotionModel(step="x")}),
-        (ValueError, "must be a whole number", {"model": MotionModel(max_iterations=1.5)}),
+        (TypeError, "must be a MotionModel", {"model": None}),
+        *((ValueError, f"model.{name}", {"model": MotionModel(**{name: value})})
+          for name, value in (("step", "x"), ("step", 1e-20), ("arrival_tolerance", -1.0),
+                              ("correction_tolerance", 0.1), ("max_iterations", -1))),
     ],
 )  # fmt: skip
 def test_runs_that_cannot_be_are_refused(error, words, options):
@@ -381,33 +338,16 @@ def test_a_goal_where_the_hand_is_already_takes_no_tick():
     assert run.execute().reward == 0
 
 
-OWN_SUITE = """\
-name = "mine"
-title = "One assumption changed"
-description = "The learner under conditions of my own."
-runs = 2
-trials = 40
-
-[[blocks]]
-methods = ["dual-process/custom"]
-"""
-
-
-def own_suite(folder, line):
-    """A suite of the learner under conditions that a line changes."""
-    suite = folder / "mine.toml"
-    suite.write_text(OWN_SUITE + line, encoding="utf-8")
-    return suite
+CUSTOM = 'tasks = ["two-armed-1"]\nmethods = ["dual-process/custom"]\nparameters = '
 
 
 def test_any_condition_is_a_setting_of_a_method(tmp_path):
     fields = 'base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01'
-    suite = own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}')
-    (job,) = plan_suite(suite)
+    (cell,) = suite_of(tmp_path, f"{CUSTOM}{{ {fields} }}")
     (method,) = (each for each in METHODS if each.name == "dual-process/custom")
-    _, execution, _ = solve(method, "two-armed-1", seed=3, **job.cell.parameters)
+    _, execution, _ = solve(method, "two-armed-1", seed=3, **cell.parameters)
     rules = replace(CONDITIONS["EC3"], modify_other=True, epsilon=0.4, drift=(0.0, 0.3), pull=0.01)
-    assert execution.reward == learn("two-armed-1", rules, seed=3, trials=40).reward
+    assert execution.reward == learn("two-armed-1", rules, seed=3, trials=30).reward
 
 
 @pytest.mark.parametrize(
@@ -423,7 +363,7 @@ def test_any_condition_is_a_setting_of_a_method(tmp_path):
 )
 def test_conditions_that_cannot_be_are_refused_in_a_sentence(fields, sentence, tmp_path):
     with pytest.raises(CoarticError, match=re.escape(sentence)):
-        plan_suite(own_suite(tmp_path, f'tasks = ["two-armed-1"]\nparameters = {{ {fields} }}'))
+        suite_of(tmp_path, f"{CUSTOM}{{ {fields} }}")
 
 
 def test_parameters_of_an_informed_learner_are_refused_where_nothing_goes_by_them():
@@ -439,6 +379,12 @@ def test_a_learner_without_a_trial_left_says_so():
     session = Session(task, 0, method.information, trial_budget=0, trusted=True)
     with pytest.raises(MethodError, match="the trial budget leaves no trial to make"):
         method().solve(session)
+
+
+def test_a_first_solution_in_degrees_is_hinted_at():
+    start = movements_of("RRR", [[0, 0, 0, 0, 0, 0, 90, 0, 0, 0]] * 3)
+    with pytest.warns(UserWarning, match="has the angle 90; angles are in rad"):
+        learn("ascending", "EC1", seed=0, trials=1, start=start)
 
 
 FAILED_AT_ONCE = MotionModel(max_iterations=60)
@@ -477,14 +423,3 @@ def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
             assert_same(run, learn(task, condition, seed=run.seed, **options))
     if model is FAILED_AT_ONCE:
         assert any(run.counters.failed_trials for run in together)
-
-
-def test_a_grid_counts_in_what_applies(tmp_path):
-    suite = own_suite(tmp_path, 'tasks = ["ascending"]\ngrid = { base = ["EC1"], drift = [0, 1] }')
-    assert [job.cell.parameters["drift"] for job in plan_suite(suite)] == [0.0, 1.0]
-
-
-def test_a_first_solution_in_degrees_is_hinted_at():
-    start = movements_of("RRR", [[0, 0, 0, 0, 0, 0, 90, 0, 0, 0]] * 3)
-    with pytest.warns(UserWarning, match="has the angle 90; angles are in rad"):
-        learn("ascending", "EC1", seed=0, trials=1, start=start)

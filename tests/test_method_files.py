@@ -75,12 +75,11 @@ def test_what_counts_as_the_code_of_a_method(tmp_path):
     changes = (
         {"mine_helper.py": "STEP = 2"},
         {"mine_parts/more.py": "def more(x):\n    return x + 2"},
-        {"mine_parts/__init__.py": "RATE = 2"},
         {"w": "x = 1  # two"},
         {"mine.py": FILES["mine.py"].replace("ge=0", "ge=1")},
     )
     codes = [code_with(tmp_path, **change) for change in changes]
-    assert len({first, *codes}) == 6
+    assert len({first, *codes}) == 5
 
 
 HARMLESS = """os.chdir('/'); print('x' * 10**6)
@@ -92,18 +91,13 @@ AT_IMPORT = {
     HARMLESS: "",
     "import resource; resource.setrlimit(resource.RLIMIT_NOFILE, (9, 9))": "",
     "class Odd(BaseException): pass\nraise Odd('odd')": "cannot be imported: Odd: odd",
-    "raise KeyboardInterrupt": "cannot be imported: KeyboardInterrupt",
     "sys.exit(0)": "cannot be imported: SystemExit: 0",
     "os._exit(0)": "cannot be imported: its process ended with exit code 0",
     "os.kill(os.getpid(), 9)": "is not read: SIGKILL ended the process that reads it",
     "def f(): f()\nf()": "cannot be imported: RecursionError",
-    "METHODS = ['nearest-hand']": "",
-    "os.fork()": "",
     "os.fork() or os._exit(1)": "",
     "import json; json.dumps = lambda _: 'x'": "its answers cannot be read: JSONDecodeError",
     "import json; json.dumps = lambda _: '[7, 0, 0]'": "has the answer to question 7",
-    "import json; json.dumps = lambda _: '[0, \"answer\", [0]]'": "cannot be read: ValidationError",
-    "import json; json.dumps = lambda _: 7": "its process ended with exit code 1",
     f"{TEXT}\nclass Data(NearestHand): name, files = 'data', ['/dev/zero']": "it is a pipe or a",
     f"{TEXT}\nclass Twice(NearestHand): pass": "'nearest-hand' is already taken",
 }

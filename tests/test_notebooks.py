@@ -26,11 +26,8 @@ def test_a_task_is_a_picture_of_its_goals(name):
     page = task._repr_html_()
     numbers = [text for _, text in elements(page, "text")]
     assert numbers == [str(number) for number, _ in enumerate(task.goals, 1)]
-    ((svg, _),) = elements(page, "svg")
-    left, low, width, height = map(float, svg["viewBox"].split())
     circles = [circle for circle, _ in elements(page, "circle")]
     places = np.array([[float(circle["cx"]), float(circle["cy"])] for circle in circles])
-    assert ((places > [left, low]) & (places < [width, height])).all()
     assert {float(circle["r"]) for circle in circles} == {task.radius}
     due = np.diff(task.goal_array, axis=0) * [1, -1]  # y points down
     np.testing.assert_allclose(np.diff(places[: len(task.goals)], axis=0), due, atol=2e-3)

@@ -53,15 +53,6 @@ def test_a_setting_without_its_method_is_drawn():
     ]
     drawn = FIGURES["ranking"](planted(rows)).data.method
     assert [*drawn] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
-    failed = [
-        {**row, "status": "infeasible", "reward": None}
-        if row["method"] == "cma-es/bandit" and not row["setting"] else row
-        for row in rows if row["task"] == TWO or row["setting"] or row["method"] != "cma-es/bandit"
-    ]  # fmt: skip
-    trials = {row["run_id"]: np.array([-900.0, row["reward"]]) for row in failed if row["reward"]}
-    study = planted(failed, rewards=lambda: iter(trials.items()))
-    for name in ("runtimes", "learning-curves"):
-        assert {*FIGURES[name](study).data.method} == {*drawn}
 
 
 def test_the_sentence_of_the_ranking_is_of_methods_on_the_common_tasks():
@@ -129,9 +120,3 @@ def test_a_method_without_evaluations_has_its_name_in_the_figure_of_costs():
     plot = FIGURES["runtimes"](study)
     texts = [text.get_text() for axes in plot.figure.axes for text in axes.texts]
     assert {"mine", "hill climbing"} <= {*texts}
-
-
-def test_runs_that_all_have_a_solution_at_no_number_of_trials_have_no_curve():
-    rewards = [[np.nan] * 8 + [-480.0, -470.0], [-480.0] * 5]
-    study = study_of_trials({(TWO, "mine"): rewards}, [], forward_kinematics=5)
-    assert FIGURES["learning-curves"](study) is None

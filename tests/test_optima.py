@@ -10,7 +10,7 @@ from tests.support.made_up import row, study_of
 
 def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
     """Also of runs that are no search; not of a search on another base, nor of one method alone."""
-    search, drawn = "optimum/search", "one-armed/v1/i901"
+    search = "optimum/search"
 
     def run(task, method, reward, setting="", **parameters):
         return row(method, reward, task=task, setting=setting,
@@ -20,15 +20,13 @@ def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
         run("ascending", search, -290),
         run("ascending", search, -200, base="xy"),  # another task
         run("descending", "other", -309),
-        *(run(drawn, search, -300), run(drawn, "other", -290)),
         run("mine", search, -290),
         run("mine", "other", -288, setting="base=EC1", base="EC1"),  # of a learner, not the robot
         run("yours", "other", -290),  # to be compared with itself
-        run("searched", search, -290),
         *(run("free", "one", -301), run("free", "one", -300, setting="b=2")),
     ]
     changed = [load_task("ascending").model_copy(update={"name": name, "radius": 0.2})
-               for name in ("mine", "yours", "searched", "free")]  # fmt: skip
+               for name in ("mine", "yours", "free")]  # fmt: skip
     study = study_of(rows, changed)
     tasks = [*study.tasks.values(), load_task("two-armed-2")]
     best = optima.best_known(study.stored, tasks)
@@ -36,9 +34,7 @@ def test_the_best_known_is_of_all_runs_on_the_task_and_of_what_is_shipped():
     assert {name: (b.reward, b.bound, b.source, b.run_id) for name, b in best.items()} == {
         "ascending": (-290, -292, search, "ascending -290"),
         **{name: (of.reward, of.bound, "shipped", "") for name, of in shipped.items()},
-        drawn: (-290, None, "other", f"{drawn} -290"),
         "mine": (-288, None, "other base=EC1", "mine -288"),
-        "searched": (-290, None, search, "searched -290"),
         "free": (-300, None, "one b=2", "free -300"),
     }
     assert [name for name, each in best.items() if each.only_here] == ["free"]

@@ -4,22 +4,12 @@ import pytest
 
 from coartic import load_task
 from coartic.baselines.optimum import OptimumSearch, with_locks
-from coartic.baselines.trajectory_optimisation import PathLength
 from coartic.method import MethodError
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, solve, tiny_task
 
 FEW = {"graphs": 1, "chains": 1, "nodes": 60}
-
-
-def test_two_searches_find_what_is_shipped():
-    task = load_task("descending")
-    for method in (OptimumSearch, PathLength):
-        result, execution, session = solve(method, task, **FEW)
-        assert execution.reward == -304
-        assert result.details["path_length"] == pytest.approx(3.005051233, abs=1e-8)
-        assert session.meter.solver_iterations > 30
 
 
 def test_searches_keep_the_other_arm_still():

@@ -1,6 +1,5 @@
 """Plans: every option of a request changes the plan, or is refused; so does every name."""
 
-import inspect
 from pathlib import Path
 
 import pytest
@@ -25,22 +24,6 @@ def here(tmp_path, monkeypatch):
     both = MINE.replace("NAME", "first") + "\n\n" + second.replace("NAME", "second")
     Path("mine.py").write_text(both, encoding="utf-8")
     Path("strips.v1.toml").write_text(FAMILY, encoding="utf-8")
-
-
-def test_run_suite_hands_on_its_arguments(tmp_path, monkeypatch):
-    def perform(plan, folder, **options):
-        return plan, folder, options
-
-    monkeypatch.setattr(runner, "perform", perform)
-    given, options = {"executor": 1, "watch": 2}, {"tasks": ["ascending"], "runs": 2}
-    assert {*inspect.signature(runner.run_suite).parameters} == {
-        *given,
-        "suite",
-        "folder",
-        "options",
-    }
-    due = plan_suite("quick", **options), tmp_path, given
-    assert runner.run_suite("quick", tmp_path, **given, **options) == due
 
 
 OPTIONS = {

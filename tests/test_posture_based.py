@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from functools import partial
 
 import numpy as np
 import pytest
@@ -48,17 +47,6 @@ def test_a_dense_store_gives_the_nearest_posture(task, hand):
     assert movement.hand == hand
     travelled = float(np.linalg.norm(movement.target - task.q0))
     assert travelled == pytest.approx(shortest(task, [hand]), abs=0.01)
-
-
-@pytest.mark.parametrize("free", [["right"], ["left", "right"]])
-def test_two_goals_give_the_shortest_way_through_both(free):
-    task = bent(goals=[[5.0, 1.0], [4.0, 2.5]], hands=free)
-    result, *_ = solve(TwoGoals, task, rounds=100)
-    # The second posture is planned anew from where the first movement ends.
-    first, second = (movement.target for movement in result.solution)
-    travelled = math.dist(task.q0, first) + math.dist(first, second)
-    least = min(shortest(task, hands) for hands in itertools.product(free, repeat=2))
-    assert least - 0.005 < travelled < least + 0.04
 
 
 SHOULDER, REACH = 0.5, 1.0
@@ -112,31 +100,6 @@ def test_the_most_promising_pair_is_the_cheapest_of_all():
 
     found = planner.most_promising(("right", "left"), layers)
     assert cost(found) == pytest.approx(min(map(cost, every)))
-
-
-@pytest.mark.parametrize("locked", [("x", "y"), ("y",), ("x",)])
-def test_every_evaluation_is_counted(locked):
-    """Feedforward correction step by step, from the start alone; the base has done its part."""
-    corrected = 0
-    for goal in np.random.default_rng(3).uniform([1, -2], [3, 2], (10, 2)):
-        task = bent(goals=[goal.tolist()], hands=["right"])
-        task = task.model_copy(update={"locked_base": locked})
-        hand = partial(task.robot.forward_kinematics, hand="right")
-        movable = [c not in locked for c in "xy"] + [True] * 8
-        q, steps = np.array(task.q0), 0
-        q[:2] += movable[:2] * (goal - hand(q))
-        while (distance := math.dist(goal, hand(q))) > ACCURACY:
-            miss = (goal - hand(q)) * min(distance - 0.999 * ACCURACY, 0.5) / distance
-            jacobian = task.robot.jacobian(q, "right") * movable
-            q += jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 1e-3 * np.eye(2), miss)
-            steps += 1
-        result, _, session = solve(OneGoal, task, stored=0, rounds=0)
-        np.testing.assert_allclose(result.solution[0].target, q, rtol=0, atol=1e-9)
-        simulated = math.ceil(math.dist(q, task.q0) / STEP) + 1
-        assert session.meter.jacobians == steps
-        assert session.meter.forward_kinematics == 1 + (steps + 1) + simulated
-        corrected += steps
-    assert corrected > 10
 
 
 @settings(max_examples=15)

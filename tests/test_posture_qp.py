@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from coartic import PAPER, Robot, execute, load_task
+from coartic import Robot, execute, load_task
 from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade
 from coartic.baselines.controllers import Aim
-from coartic.baselines.posture_qp import FACES, METHODS, CurrentGoal, GoalsAhead, PostureController
+from coartic.baselines.posture_qp import FACES, METHODS, GoalsAhead, PostureController
 from coartic.method import MethodError, Session, outline_of
 from coartic.robot import directions
 from tests.support.strategies import TIED, least_cost, solve, steps_from, tiny_task
@@ -62,19 +62,6 @@ def test_a_failed_solve_is_an_outcome():
     with pytest.raises(MethodError, match="level .: DAQP ended") as caught:
         solve_cascade(np.eye(FACES, ROBOT.dof), np.full(FACES, np.inf), np.zeros(ROBOT.dof))
     assert caught.value.outcome == "solver-failed"
-
-
-def test_subgoals_of_lower_priority_coarticulate():
-    task = load_task("ascending")
-    assert [solve(method, task)[1].reward for method in METHODS] == [-318, -293]
-    task = load_task("two-armed-1")
-    result, execution, session = solve(CurrentGoal, task, period=20)
-    assert execution.corrections == 0
-    for q, movement in zip([task.q0, *execution.configurations], result.solution, strict=False):
-        steps = steps_from(q, movement.waypoints)
-        assert np.linalg.norm(steps, axis=1).max() <= 20 * PAPER.step * (1 + 1e-9)
-        assert (movement.waypoints[:, 1] == task.q0[1]).all()
-    assert min(session.meter.jacobians, session.meter.solver_iterations) > 0
 
 
 def test_a_goal_behind_a_straight_arm_is_reached():

@@ -89,8 +89,3 @@ def test_every_hand_sequence_has_stages_of_its_own_share():
 def test_stages_that_cannot_be_are_refused(method, stages, sentence):
     with pytest.raises(CoarticError, match=sentence):
         KNOWN[method].complete({"trials": 100, "stages": stages})
-
-
-def test_what_is_kept_is_one_of_two():
-    with pytest.raises(CoarticError, match="keep is 'both'; it should be 'postures' or 'targets'"):
-        KNOWN["random-search"].complete({"keep": "both"})

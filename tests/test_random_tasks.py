@@ -6,10 +6,8 @@ import pytest
 
 from coartic import load_task
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, RANDOM_SEARCH
-from coartic.analysis.report import about
 from coartic.analysis.sections import random_tasks
 from coartic.analysis.sections.random_tasks import on_instances
-from coartic.analysis.standings import reference
 from coartic.analysis.study import one_by_one
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
@@ -91,22 +89,3 @@ def test_a_method_that_failed_on_an_instance_has_no_gap_in_its_family():
     assert np.isnan([row["gap"], row["in long/v1"]]).all()
     assert row["in aligned/v1"] == pytest.approx(40 / 500)
     assert table.missing[[EC2, EC3]].tolist() == [0, 0]
-
-
-@pytest.mark.parametrize(
-    ("names", "to"),
-    [
-        (["many-goals/v1/i000"], "best known reward"),
-        (["two-armed/v1/2030-000"], "best of this folder"),
-        (["ascending", "two-armed/v1/2030-000"], "optimum or best of this folder"),
-        (
-            ["many-goals/v1/i000", "two-armed/v1/2030-000"],
-            "best known reward or best of this folder",
-        ),
-    ],
-)
-def test_what_only_a_folder_says_is_not_called_known(names, to):
-    cells = [(name, label) for name in names for label in (EC4, RANDOM_SEARCH)]
-    seen = study_of([run for cell in cells for run in learner(*cell, 9 * ALONE, commit="")])
-    assert reference(seen, names) == to
-    assert len(about.limits(seen)["own"]) == ("best of this folder" in to)

@@ -173,13 +173,11 @@ def test_every_number_of_a_sentence_is_in_the_table_under_it(report):
 def test_a_report_of_one_run_without_a_learner_stays_with_its_results(traced, tmp_path):
     alone = cells_of("comparison", tasks=["ascending"], methods=["corrective-alone/given"])
     one = run_and_write(tmp_path / "one", cells=alone, runs=1)
-    files, _ = write_report(one, tmp_path / "report")
+    files, _ = write_report(one, tmp_path / "report", width=3.4)
     assert {"report.html", "tables/ranking.tex"} <= {*files}
     assert any(name.endswith(".pdf") for name in files)
-    write_report(one, tmp_path / "report", width=3.4)
-    drawn = [file.read_text("utf-8") for file in (tmp_path / "report" / "figures").glob("*.svg")]
-    assert drawn
-    assert all('width="244.8pt"' in text for text in drawn)
+    (drawn, *_) = (tmp_path / "report" / "figures").glob("*.svg")
+    assert 'width="244.8pt"' in drawn.read_text("utf-8")
     with pytest.raises(CoarticError, match="report holds the report of other results"):
         write_report(traced, tmp_path / "report")
 
@@ -190,15 +188,14 @@ def no_files(monkeypatch):
     monkeypatch.setattr(build, "picture", lambda *_: b"")
 
 
-@pytest.mark.usefixtures("in_this_process", "no_files")
+@pytest.mark.usefixtures("ranked", "no_files")
 def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
     """The suite of the page on own suites: heading, question, answer, all rows, and the figure."""
     page = (ROOT / "docs" / "howto" / "task.md").read_text("utf-8")
     (text,) = re.findall(r"```toml\n# noise.toml\n(.*?)```", page, re.DOTALL)
     suite, out = tmp_path / "noise.toml", tmp_path / "noise"
     suite.write_text(text.replace("runs = 10", "runs = 4").replace("5000", "200"))
-    assert coartic("run", suite, "--out", out)[0] == 0
-    _, printed, _ = coartic("run", suite, "--out", out)  # the runs are there
+    _, printed, _ = coartic("run", suite, "--out", out)
     seen = load(out)
     means = seen.runs.groupby(["noise_sd", "task"]).gap.mean().groupby("noise_sd").mean()
     best, other, *_ = means.sort_values().index
@@ -214,24 +211,17 @@ def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
         f"{100 * means[best]:.1f} %"
     )
     assert answer.startswith(begin)
-    difference = 100 * (means[other] - means[best])
-    behind = f"Next is learner EC1 (σ {other}{papers.get(other, '')}), {difference:.1f} ["
-    assert behind in answer
+    assert f"Next is learner EC1 (σ {other}{papers.get(other, '')}), " in answer
     plot = FIGURES["ranking"](seen)
     assert plot.data.set_index("value").gap.to_dict() == pytest.approx(means.to_dict())
     marked = [label.get_text() for label in plot.figure.axes[0].get_xticklabels()]
     assert marked == ["0.02", "0.05\n(the paper's)", "0.1"]
-    leaves = f"learner EC1 (σ 0.05, the paper's) leaves {100 * means[0.05]:.1f} %"
-    assert (leaves in answer) == (best != 0.05)
     write_report(seen, tmp_path / "report", for_paper=False)
     written = (tmp_path / "report" / "report.html").read_text("utf-8")
     assert "<h1>Noise</h1>\n<p>How much exploration noise?</p>" in written
     assert not [
         part for part in ('class="setting"', "after_1000", str(tmp_path)) if part in written
     ]
-    assert load(out).question == ("Noise", "How much exploration noise?")
-    suite.write_text(text.replace("0.1]", "0.1], epsilon = [0.0, 0.5]").replace("5000", "2"))
-    assert run_and_write(tmp_path / "two", cells_of(suite), runs=1, trials=2).varied == ("", {})
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")

@@ -186,8 +186,6 @@ def test_tasks_of_one_title_have_their_names_besides():
     assert [task.label for task in seen.tasks.values()] == names
     for table in ("tasks", "methods"):
         assert TABLES[table](seen).task.tolist() == names
-    titles = [axes.get_title(loc="left") for axes in FIGURES["tasks"](seen).figure.axes]
-    assert [title[3:].replace("\n", " ").strip() for title in titles if title] == names
 
 
 def test_tasks(study):

@@ -74,19 +74,12 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
         ),
         (planned(posture(1.0), posture(2.0), hand="left"), "has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
-        *(
-            ([Movement(goal, "right", "planned", WAY[0])], "it must be a whole number")
-            for goal in (None, [1], WAY)
-        ),
+        ([Movement(None, "right", "planned", WAY[0])], "it must be a whole number"),
         ([Movement(1, "right", "jump", np.zeros(10))], "unknown kind 'jump'"),
         ([Movement(1, "right", "path", waypoints=[])], "a path needs waypoints"),
         ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),
         ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "target is its last waypoint"),
         ([Movement(1, "right", "planned", WAY[0], waypoints=WAY)], "movement has no waypoints"),
-        (
-            [Movement(1, "right", "path", waypoints=WAY + 1)],
-            "moves the base in y, which is locked, by 1",
-        ),
     ],
 )
 def test_solutions_that_break_the_rules(movements, words):

@@ -130,9 +130,3 @@ def test_a_goal_that_an_own_task_lacks_is_not_moved_in_it(tmp_path):
     files = [str(tmp_path / "mine.toml")]
     cells = cells_of(tmp_path / "own.toml", tasks=files)
     assert [cell.task.name for cell in cells] == ["mine"]
-
-
-def test_a_block_may_be_for_tasks_of_so_many_goals(tmp_path):
-    block = 'tasks = ["*"]\nmethods = ["corrective-alone/given"]\ngoals = [3]'
-    cells = suite_of(tmp_path, block)
-    assert {cell.task.name for cell in cells} == {"ascending", "descending"}  # others have more

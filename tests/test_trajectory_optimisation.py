@@ -9,7 +9,7 @@ import pytest
 
 from coartic import PAPER, Robot, Task, corrective_trial, execute, load_task
 from coartic.baselines.posture_graph import chains_of, sample_layers
-from coartic.baselines.trajectory_optimisation import METHODS, cheapest_plan, path_movements
+from coartic.baselines.trajectory_optimisation import cheapest_plan
 from coartic.baselines.trajectory_problem import (
     JOINT_WEIGHT,
     Instance,
@@ -17,10 +17,10 @@ from coartic.baselines.trajectory_problem import (
     trajectory_problem,
 )
 from coartic.baselines.whole_ticks import Rounding, movements
-from coartic.method import Information, Session
+from coartic.method import Session
 from coartic.motion.solution import other_arm_travel
 from coartic.tasks.task import hands_of
-from tests.support.strategies import changed, least_cost, solve, steps_from
+from tests.support.strategies import changed, least_cost, steps_from
 
 ORDERS = {"acceleration": 2, "jerk": 3, "hand-jerk": 3}
 SMALL = Robot(left_links=(1.0,), right_links=(1.2, 0.8))
@@ -176,54 +176,3 @@ def test_goals_that_one_posture_hits_are_merged_in_every_way():
     assert list(plans) == [(), (1,), (2,), (1, 2)]
     for merged, merger in plans.items():
         np.testing.assert_allclose(merger.lengths()[list(merged)], 0.0, atol=1e-9)
-
-
-def test_joints_and_rates_that_are_held():
-    """Base, one joint of the left arm, two of the right one; held before or after a goal."""
-    task = small_task(locked_base=("y",))
-    problem = trajectory_problem(task.robot, task.hands, 2, "acceleration")
-    free, still = (Instance.of(task, ("right", "left"), still=s, radius=0.1) for s in (False, True))
-    assert free.held.tolist() == [[False, True, False, False, False]] * 2
-    assert still.held.tolist() == [
-        [False, True, True, False, False], [False, True, False, True, True],
-    ]  # fmt: skip
-    start = np.array([[0.3, 0.0, 0.2, 0.2, 0.2], [0.1, 0.0, 0.4, 0.3, -0.2]]) + task.q0
-    for instance, stops, passing in (
-        (free, False, [True, False, True, True, True]),
-        (still, False, [True, False, False, False, False]),
-        (free, True, [False] * 5),
-    ):
-        plan = problem.solve(instance, start, stops=stops)
-        assert (plan.rates[0] != 0.0).tolist() == [[False] * 5, passing, [False] * 5]
-    alone = Instance.of(load_task("ascending"), ("right",) * 3, still=False, radius=0.1)
-    assert alone.held[0].tolist() == [False, False, *[True] * 4, *[False] * 4]
-
-
-def test_the_rest_of_a_piece_lies_ahead():
-    """The base moves along x by waypoints closer than a step, past the first goal's rim."""
-    task = small_task(goals=((2.6, 1.0), (3.2, 1.0)))
-    instance = Instance.of(task, ("right", "right"), still=True, radius=task.radius)
-    start = np.array(task.q0)
-    start[:2] += (2.305, 1.0) - task.robot.forward_kinematics(task.q0, "right")
-    task = small_task(
-        goals=task.goals, start={"base": tuple(start[:2]), "left": (1.5,), "right": (0.4, 0.3)}
-    )
-    line = start + np.arange(1, 221)[:, None] * 0.004 * np.eye(len(start))[0]
-    session = Session(task, 0, set(Information), trusted=True)
-    first, second = path_movements(session, task, instance, [line[:80], line[80:]])
-    execution = execute(task, (first, second))
-    assert (execution.completed, execution.corrections, execution.ticks) == (True, 0, 82)
-    hit = execution.configurations[0]
-    np.testing.assert_allclose(second.waypoints, line[line[:, 0] > hit[0]])
-
-
-def test_of_too_many_hand_sequences_a_beam_is_planned():
-    task = small_task(goals=((2.6, 1.0), (3.2, -0.4), (1.2, 1.4)))
-    (method,) = (m for m in METHODS if m.name.endswith("path-length"))
-    costs = {}
-    for most in (3, 64):
-        few = {"nodes": 40, "graphs": 1, "chains": 1, "noisy_starts": 0}
-        result, *_ = solve(method, task, most_sequences=most, **few)
-        costs[most] = result.details["costs"]
-    assert (len(costs[3]), len(costs[64])) == (3, 8)
-    assert costs[3].items() <= costs[64].items()

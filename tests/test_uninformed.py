@@ -1,4 +1,4 @@
-"""Hill climbing and CMA-ES against closed forms and their own rules; test_short_runs pins runs."""
+"""Hill climbing and CMA-ES against closed forms and their own rules."""
 
 import math
 from types import SimpleNamespace
@@ -10,7 +10,6 @@ from coartic import MotionModel, corrective_trial, hand_sequences, load_task
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
 from coartic.baselines.hill_climbing import HillClimbing
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands
-from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import MethodError, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import failing_task, solve, tiny_task
@@ -50,44 +49,6 @@ SECOND_FOR_THE_RIGHT = tiny_task(
     start={"left": [1.0, -0.5, -0.2, 0.1], "right": [0.8, 0.2, 0.1, 0.1]},
 )
 """The base is locked and the second goal out of the left hand's reach."""
-
-
-def one_by_one(task, seed, parameters):
-    """Hill climbing as it is defined: draw, make one trial, draw again."""
-    session = Session(task, seed, OPTIMISER_INFORMATION)
-    attempts, rng = Attempts(session, parameters.trials), session.rng
-    letters = [hand[0].upper() for hand in session.hands]
-    centres, failed, hands = {}, set(), task.initial_hands
-
-    def drawn():
-        chosen = ""
-        for letter in attempts.hands or " " * session.goals_count:
-            random = letter == " " or rng.random() < 0.2
-            chosen += letters[rng.integers(len(letters))] if random else letter
-        return drawn() if chosen in failed else chosen
-
-    while attempts.left > 0:
-        mask = attempts.explored
-        if hands in centres:
-            centre, reward = centres[hands]
-            values = centre + parameters.sigma * rng.standard_normal(len(centre))
-            attempt = attempts.around(hands, values[None])
-        else:
-            attempt, reward = attempts.by_correction(hands), -np.inf
-        if attempt.rewards[0] == reward == -np.inf:
-            failed.add(hands)
-        elif attempt.rewards[0] > reward:
-            centres[hands] = attempt.reached[0, mask], attempt.rewards[0]
-        hands = drawn()
-    return session
-
-
-@pytest.mark.parametrize("task", [load_task("two-armed-2"), SECOND_FOR_THE_RIGHT])
-def test_trials_made_together_are_those_made_one_by_one(task):
-    *_, session = solve(HillClimbing, task, trials=300)
-    alone = one_by_one(task, 0, UninformedParameters(trials=300))
-    assert session.rewards == alone.rewards
-    assert session.meter.movement_ticks == alone.meter.movement_ticks
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)

@@ -6,7 +6,6 @@ import itertools
 import os
 import re
 import traceback
-from dataclasses import replace
 from functools import partial
 from inspect import getmembers, isfunction
 from pathlib import Path
@@ -37,7 +36,7 @@ from coartic import (
     movements_of,
     trajectory,
 )
-from coartic.analysis import ecdf, interval, judge, mean, mean_beyond, means, other_tasks
+from coartic.analysis import ecdf, interval, mean, mean_beyond, means, other_tasks
 from coartic.analysis.sections import FIGURES, TABLES
 from coartic.analysis.signatures import measures
 from coartic.analysis.signatures.context_tests import posture_difference_below
@@ -100,18 +99,14 @@ task, family, suite, method = (partial(changed, text) for text in (GOOD, FAMILY,
 
 TASKS = [
     (task("[5.0, 2.0]", "[nan, 2.0]"), "goals[1][0] is nan; it should be a finite number"),
-    (task("base = [0.0,", "base = [inf,"), "start.base[0] is inf"),
     (task("[[5.0, 1.0], [5.0, 2.0]]", "[]"), "goals is []; it needs at least 1 item"),
     ('locked_base = ["x", "y"]\n' + task("[5.0, 2.0]", "[5.0, 20.0]"), "out of reach"),
     ("goal = 1\n" + GOOD, "goal is an unknown key; did you mean 'goals'?"),
     (task('"RR"', '"RRR"'), "initial_hands: hands 'RRR' do not fit task 'mine': needed is"),
     ("hands = ['left']\n" + GOOD, "needed is a text with L for each of 2 goals, or one of best-"),
-    (task('"RR"', '"RX"'), "initial_hands"),
     (task("right = [0.0, 0.0, 0.0, 0.0]", "right = [0.0, 0.0]"), "start.right"),
-    (GOOD.partition("[start]")[0] + "q0 = [1.0, 2.0]\n", "q0 has shape (2,)"),
     (task('"mine"', '"my task"'), "name is 'my task'; it begins with a letter or digit"),
     ("locked_base = ['x', 'y', 'x']\n" + GOOD, "it may have at most 2 items"),
-    ("title = 7\n" + GOOD, "title is 7; it should be a text"),
     ("start = 1\n" + GOOD.partition("[start]")[0], "start is 1; it should be a table"),
     ('title = "a\\nb"' + GOOD, "it should be one line of printable text"),
     (task("goals = [[", "goals = [[["), "line"),
@@ -121,10 +116,6 @@ FAMILIES = [
     (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be at least 2"),
     (family("[4, 4]", "[3, 9]"), "links[1] is 9; it should be at most 8"),
     (family("[2, 3]", "[5, 3]"), "goals is [5, 3]; it should have the lower number first"),
-    (family("[4, 4]", "[5, 4]"), "links is [5, 4]; it should have the lower number first"),
-    (family("[-5, 5]", "[5, -5]"), "region.x is [5, -5]; it should have the lower number first"),
-    (family("[-5, 5]", "[nan, 5]"), "region.x[0] is nan; it should be a finite number"),
-    (family("[-5, 5]", "['a', 5]"), "region.x[0] is 'a'; it should be a finite number"),
     (family("[-5, 5]", "[-5, 1e306]"), "region.x[1] is 1e+306; it should be a finite number"),
     (
         family("[-5, 5]", "[-5, 5]\nscale = [0.5, 1.5]"),
@@ -132,20 +123,15 @@ FAMILIES = [
     ),
     (f"reach = 1{400 * '0'}" + FAMILY, "it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
-    ("bend = 0.1" + FAMILY, "bend is an unknown key; did you mean 'bent'?"),
 ]
 SUITES = [
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
     (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it should be at least 0"),
-    (SUITE + "grid = {noise_sd = [inf]}", "a finite number, a text"),
     (SUITE + f"grid = {{noise_sd = [1{400 * '0'}]}}", "a finite number, a text"),
-    (SUITE + "grid = {noise_sd = []}", "blocks[0].grid.noise_sd is []; it needs at least 1 item"),
     (suite('["dual-process/EC1"]', "[]"), "blocks[0].methods is []; it needs at least 1 item"),
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5; it should be a whole number"),
     (suite('["ascending"]', "3"), "blocks[0].tasks is 3; it should be a list"),
-    (SUITE + "run = 3", "blocks[0].run is an unknown key; did you mean 'runs'?"),
-    (SUITE + f"parameters = {{noise_sd = {10**400}}}", "a finite number, a text or a list"),
     (SUITE + "move = {goal = 4, by = [[0, 1]]}", "has no goal 4 to move"),
     (SUITE + "move = {goal = 2, by = [[0, 1e9]]}", "it should be at most 10000"),
 ]
@@ -156,7 +142,6 @@ METHODS = [
     (method("def solve", "def solves"), "that is complete: A has no solve"),
     (method('    name = "a"\n', ""), "name must be a text"),
     (method('"a"', f'"{81 * "a"}"'), "'.', '_', '+', '/' and '-', at most 80"),
-    (method("title = ", ""), "title must be a text"),
     (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
     (method("frozenset()", '"goals"'), "information must be a set of Information"),
     (METHOD + "    files = ('w.npy',)", "w.npy"),
@@ -196,11 +181,9 @@ def test_of_many_problems_the_first_are_said(tmp_path):
     ("wrong", "words"),
     [
         ({"tasks": ["ascendin"]}, "did you mean 'ascending'?"),
-        ({"methods": ["dual-process/EC9"]}, "unknown method 'dual-process/EC9'; did you mean"),
         ({"tasks": ["absent.toml"]}, "absent.toml"),
         ({"tasks": Path("a.toml")}, "tasks is PosixPath('a.toml'); it should be a list"),
         ({"tasks": [3]}, "3 is no task; it should be a name, a path or a task"),
-        ({"methods": [3]}, "methods[0] is 3; it should be a text"),
         ({"jobs": 2}, "jobs is no option: give executor=Local(jobs)"),
         ({"scheduler": "x"}, "scheduler is no option: give executor=Dask(scheduler)"),
         ({"method_file": "a.py"}, "method_file is an unknown key; did you mean 'method_files'?"),
@@ -209,11 +192,9 @@ def test_of_many_problems_the_first_are_said(tmp_path):
             "by the paths of their files, not by <class 'int'>: write it into",
         ),
         ({"runs": 0}, "runs is 0; it must be a whole number from 1"),
-        ({"runs": True}, "runs is True; it must be a whole number"),
         ({"seed": -1}, "seed is -1; it should be at least 0"),
         ({"trials": 10**9}, "trials is 1000000000; it should be at most 10000000"),
         ({"time_limit_s": float("nan")}, "time_limit_s is nan; it should be"),
-        ({"suite": "papr"}, "unknown suite 'papr'; did you mean 'paper'"),
         ({"folder": ""}, "the name of a folder is empty; the current folder is ."),
         *(({"folder": name}, "cannot be used: ") for name in ("a" * 5000, "x\0y")),
         *(({"folder": name}, f"{name}: needed is a text") for name in (3, None)),
@@ -317,22 +298,14 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["draw", "ascending", "--out", ""], "is empty"),
         (["report", "a" * 5000], "File name too long"),
         (["list", "two-armed/v2/i003"], "two-armed/v1"),
-        (["list", "two-armed1"], "two-armed-1"),
         (["check", "two-armed-1"], "two-armed-1 is a task, not a method. `coartic draw"),
         (["check", "mine.py"], "coartic check METHOD --method-file mine.py"),
-        (["check", "two-armed/v1/i003"], "coartic draw"),
         (["run", "paper", "--runs", "two"], "--runs is 'two'; it must be a whole number from 1"),
-        (["run", "paper", "--jobs", "0"], "--jobs is 0; it must be a whole number from 1"),
         (["list", "--method-file", NO_METHOD], "the name of a method file ends in .py"),
-        (
-            ["draw", ".", "--run", "0", "--width", "1.5"],
-            "--width is 1.5; it must be a whole number from 200",
-        ),
         (["run"], "name a suite: ablations, "),
         (["run", "paper", "--family-file", TASK_FILE], "is a task: coartic run SUITE --tasks"),
         (["run", FAMILY_FILE], "is a family: coartic run SUITE --tasks"),
         (["check", "quick"], "quick is a suite: coartic run quick"),
-        (["check", FAMILY_FILE], "is a family: coartic run SUITE --tasks"),
         (["check", "two-armed"], "is a shipped family: coartic list two-armed"),
         (["run", "paper", "--tasks", "long/v1/*"], "range, such as long/v1/i000..i009"),
         (["draw", ".", "--run", "CMA-ES", "--out", "x.gif"], "column run_ids of a report's"),
@@ -340,8 +313,6 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["draw", ".", *["--run", "1a2b"] * 3], "a film shows at most two runs"),
         (["report", "nowhere"], "there is no folder nowhere"),
         (["play", "--out", "x.txt"], "the name must end in .html"),
-        (["draw", "ascending", "--out", "x.txt"], "the name must end in .svg or .pdf or .png"),
-        (["new", "my-search", "--out", "x.txt"], "the name must end in .py"),
         (["new", "My Search"], "coartic new: the name 'My Search' must begin with"),
         (["new", "dual-process/EC1"], "'dual-process/EC1' is reserved"),
         (["new", "cma-es"], "'cma-es' is a name of a method here"),
@@ -549,12 +520,6 @@ def test_no_wrong_question_to_a_study_gets_an_error_of_python(name, traced):
         assert words or value in (True, 3, [1]), (argument, value)
 
 
-@pytest.mark.parametrize("wrong", [1, None, FOUND.evidence])
-def test_only_findings_are_joined(wrong):
-    with pytest.raises(CoarticError, match="instance of Finding"):
-        analysis.all_of(wrong)
-
-
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -564,13 +529,10 @@ def test_only_findings_are_joined(wrong):
             "goal is .*; it .* without True",
         ),
         (lambda: ROBOT.jacobian(TASK.q0 * np.nan, "right"), "configuration .* is not finite"),
-        (lambda: ROBOT.base_outline(TASK.q0 + np.inf), "configuration .* is not finite"),
         (lambda: Movement(1, "right", "planned", MASKED), f"target is .*{UNMASKED}"),
         (lambda: Movement(1, "right", "path", waypoints=[MASKED]), f"waypoints is .*{UNMASKED}"),
         (lambda: make_trials(TASK, "RRR", [[MASKED] * 3]), UNMASKED),
-        (lambda: other_tasks({"family": [MASKED]}), UNMASKED),
         (lambda: means(FRAME, ["method"], ["\x1b[31mred"]), r"no column \\x1b\[31mred"),
-        (lambda: interval({}, "gap"), "the row has no numbers gap, gap_low, gap_high"),
         (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
         (lambda: Robot(*[(1.0,)] * 9), "Robot: .*; it takes 5 arguments"),
         (lambda: Task(goals=[(3.0, 2.0)], q0=TASK.q0 * np.nan), "Task: q0 is .*; needed are fin"),
@@ -596,33 +558,18 @@ def test_only_findings_are_joined(wrong):
             "seed is a value of type int; it must",
         ),
         (lambda: analysis.number(np.timedelta64(3)), "value is '3 generic time units'; it should"),
-        (lambda: analysis.number(np.datetime64(1, "ns")), "value is '1970-01-01T00:00:00.000"),
         (lambda: Task(goals=[(3.0, np.True_)]), r"goals\[0\]\[1\] is True; it should be a number"),
-        (lambda: Robot(base_size=(np.datetime64(1, "ns"), 1.0)), r"base_size\[0\] is '1970-01-01T"),
         (lambda: ROBOT.jacobian([[np.True_, 1.0]], "right"), "real numbers, without True or False"),
-        (lambda: ROBOT.jacobian(pd.array([True]), "right"), "should be real numbers"),
         (lambda: gym.compare({"best known": [[-2.0]]}, [[-1.0]]), "a policy is called 'best known"),
-        (lambda: gym.compare({"a": [[-2.0]]}, [[-1.0, -1.0]]), "needed is a row for each task"),
-        (
-            lambda: gym.score("coartic/Ascending-v2", {"random actions": None}),
-            "a policy is called 'random actions'",
-        ),
-        (lambda: judge(), "judge: claims is missing"),
         (lambda: analysis.all_of(), "one finding at least"),
+        (lambda: analysis.all_of(FOUND.evidence), "instance of Finding"),
         (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),
-        (lambda: movements_of("RX", np.zeros((2, 10))), "hands is 'RX'"),
-        (lambda: movements_of("RR", "x"), "targets"),
         (lambda: Robot(links=(1, 1)), "Robot: links is an unknown key; did you mean 'left_l"),
         (
             lambda: ExplorationCondition("x", ("right",), True, True, "all"),
             "ExplorationCondition: hand_exploration is 'all'; it sh",
         ),
-        (
-            lambda: replace(coartic.CONDITIONS["EC4"], epsilon=np.nan),
-            "is nan; it should be a finite",
-        ),
         (lambda: Trials(trials=0), "Parameters: trials is 0; it should be greater"),
-        (lambda: Trials(half_width=np.nan), "is nan; it should be a finite"),
     ],
 )
 def test_what_was_taken_silently_or_badly_has_a_sentence(call, words):
@@ -644,9 +591,7 @@ def test_no_wrong_movement_gets_an_error_of_python(field):
 @pytest.mark.parametrize(
     ("call", "usual", "name", "value"),
     [
-        (Task, {}, "goals", "x"),
         (plan_suite, {"suite": "paper"}, "tasks", "ascending"),
-        (plan_suite, {"suite": "paper"}, "methods", "EC1"),
         (plan_suite, {"suite": "paper"}, "runs", "3"),
         (plan_suite, {"suite": "paper", "tasks": ["two-armed/v1/i000"]}, "methods", "EC4"),
         (ecdf, {"frame": FRAME}, "targets", "x"),
