@@ -18,9 +18,8 @@ from typing import Any, get_args
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import Study, by_task, fill_page, load, mean_beyond, means
+from coartic.analysis import Study, by_task, fill_page, load, means
 from coartic.analysis.judging import Verdict
-from coartic.analysis.methods import title_of
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
@@ -87,11 +86,6 @@ def p_of_shares(values: dict[Any, Any], published_runs: int) -> float:
     return float(stats.fisher_exact([[n, of - n] for n, of in counts]).pvalue)
 
 
-def p_above(values: pd.Series, bound: float) -> float:
-    """One-tailed p that a mean over tasks is above a bound, as claims test it, uncorrected."""
-    return mean_beyond("{}", values, bound).p
-
-
 def published_spreads() -> pd.DataFrame:
     """Return the published spreads (±) with the tests of both readings; a spread that is published
     of a hand sequence is compared with runs that have it."""
@@ -127,29 +121,25 @@ def zeros_of_gain(study: Study) -> pd.DataFrame:
 
 
 def filled_pages() -> dict[str, str]:
-    """Every page that is made from a template, by its path below ``docs``.
-
-    A page that has the name of a suite waits until something of that suite is stored.
-    """
+    """Every page that is made from a template, by its path below ``docs``."""
     replication = STUDIES / "replication"
+    published = tomllib.loads((replication / "published.toml").read_text("utf-8"))
     values = {
-        "table": table, "row": row, "claim": claim, "cells_of_the_paper": cells_of_the_paper,
-        "verdicts": verdicts, "seen": seen,
-        "title_of": title_of,
+        "table": table,
+        "row": row,
+        "claim": claim,
+        "cells_of_the_paper": cells_of_the_paper,
+        "verdicts": verdicts,
+        "seen": seen,
         "published_spreads": published_spreads,
-        "p_of_shares": p_of_shares, "p_above": p_above,
-        "published": tomllib.loads(
-            (replication / "published.toml").read_text("utf-8")
-        )["general"],
-        "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
+        "p_of_shares": p_of_shares,
+        "published": published["general"],
+        "readings": table("reconstruction", "readings"),
         "goal_sets": pd.read_csv(replication / "sets.csv"),
-        "stored": lambda suite: (STORED / suite).is_dir(),
-    }  # fmt: skip
-    waiting = {f"{suite}.md" for suite in KEPT if not (STORED / suite).is_dir()}
+    }
     return {
         str(path.relative_to(DOCS).with_suffix("")): fill_page(path, **values)
         for path in sorted(DOCS.rglob("*.md.jinja"))
-        if path.stem not in waiting
     }
 
 
@@ -164,19 +154,21 @@ def store(results: Path) -> None:
             continue
         shutil.rmtree(kept, ignore_errors=True)
         kept.mkdir(parents=True)
-        for name in tables.split():
-            frame = pd.read_csv(report / "tables" / f"{name}.csv", index_col="row")
-            frame = frame.drop(columns="run_ids", errors="ignore")
-            frame.to_csv(kept / f"{name}.csv", float_format="%.6g", lineterminator="\n")
+        frames = {
+            name: pd.read_csv(report / "tables" / f"{name}.csv", index_col="row")
+            for name in tables.split()
+        }
         for name in figures.split():
             shutil.copy(report / "figures" / f"{name}.svg", kept)
         if suite == "families":  # what means over tasks are computed from
-            table = by_task(load(results / suite).runs)
-            table.to_csv(
-                kept / "by-task.csv", float_format="%.6g", lineterminator="\n", index=False
-            )
-            zeros = zeros_of_gain(load(results / suite))
-            zeros.to_csv(kept / "zeros.csv", float_format="%.6g", lineterminator="\n")
+            study = load(results / suite)
+            frames |= {
+                "by-task": by_task(study.runs).set_index("task"),
+                "zeros": zeros_of_gain(study),
+            }
+        for name, frame in frames.items():
+            frame = frame.drop(columns="run_ids", errors="ignore")
+            frame.to_csv(kept / f"{name}.csv", float_format="%.6g", lineterminator="\n")
 
 
 def main() -> None:
