@@ -45,9 +45,8 @@ docs: $(VENV)/.docs
 	$(BIN)/python docs/check_links.py build/docs
 	@echo "Look at build/docs/index.html."
 
-# make speed LONG=1 adds suite comparison.
 speed: $(READY)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/scripts/speed.py $(if $(LONG),--long)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/scripts/speed.py
 
 # The wheel and the source distribution of the last commit, each run in an empty environment, by
 # each Python of this machine; what is not tried is named.
