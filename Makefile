@@ -38,11 +38,10 @@ format: $(READY)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# Notebooks are run, warnings are errors, and what pages link to is there.
+# Notebooks are run, and warnings are errors: also of a link to what is not there.
 docs: $(VENV)/.docs
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m sphinx -q -W --keep-going -d build/doctrees \
 	  docs build/docs
-	$(BIN)/python docs/check_links.py build/docs
 	@echo "Look at build/docs/index.html."
 
 speed: $(READY)
