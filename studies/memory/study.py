@@ -15,28 +15,12 @@ weight it. All tests and intervals resample tasks within families, which weigh t
 import sys
 from pathlib import Path
 
-import pandas as pd
 from cells import KEEPS, MEASURES, measure_cells, measure_contexts, measure_runs
 from equal_gain import tabulate_equal
 from predictions import judge_claims
 from scales import tabulate, tabulate_keeping, tabulate_scales
 
 from coartic.analysis import figures, load, write_study
-
-
-def tabulate_methods(cells):
-    """Tabulate means over tasks of each method by family, over all, and on the paper's tasks."""
-    drawn_tasks = cells[cells.task.str.contains("/")]
-    every = pd.concat([drawn_tasks.assign(group="all"), cells])
-    keys = ["group", "name", "trials", "stages"]
-    table = every.groupby(keys, sort=False)[[*MEASURES]].mean()
-    table.insert(0, "tasks", every.groupby(keys, sort=False).size())
-    table = table.reset_index()
-    table.index = [
-        f"{row.group} {row.name_} {row.trials:g} {row.stages}"
-        for row in table.rename(columns={"name": "name_"}).itertuples()
-    ]
-    return table.rename_axis("row")
 
 
 @figures.styled
@@ -75,7 +59,6 @@ def measure(study):
         "scales": tabulate_scales(cells),
         "keeping": tabulate_keeping(cells),
         "equal": tabulate_equal(cells),
-        "methods": tabulate_methods(cells),
         "contexts": measure_contexts(study),
         "claims": judge_claims(cells),
     }
