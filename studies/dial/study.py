@@ -37,14 +37,10 @@ def measure_runs(raw):
 
 
 def tabulate(runs):
-    """Tabulate gains: means over random tasks (tasks count alike), over the first ten of each
-    family, or over the runs on a task of the paper; medians of trials."""
+    """Tabulate gains: means over random tasks (tasks count alike), or over the runs on a task of
+    the paper; medians of trials."""
     drawn = runs[runs.family.isin(FAMILIES)]
-    first = drawn[drawn.task.str[-3:] < "010"]
-    every = pd.concat([
-        drawn.assign(group="random"), first.assign(group="first ten"),
-        runs.assign(group=runs.family),
-    ])  # fmt: skip
+    every = pd.concat([drawn.assign(group="random"), runs.assign(group=runs.family)])
     unit = every.run.where(~every.family.isin(FAMILIES), 0)
     numbers = [f"gain_{n}" for n in AFTER]
     by = ["group", "setting", "task", unit]
@@ -186,10 +182,8 @@ def measure(folder):
     """Return the tables by name; each becomes a CSV file."""
     runs, others, shifts, named = (pd.read_csv(Path(folder) / f"{name}.csv")
                                    for name in ("runs", "others", "shifts", "named"))  # fmt: skip
-    is_first = ~others.family.isin(FAMILIES) | (others.task.str[-3:] < "010")
-    stored = pd.concat([runs, others[is_first]], ignore_index=True)
-    runs, moved = measure_runs(stored), shifts.set_index("task")
-    shifts = measure_shifts(shifts)
+    stored = pd.concat([runs, others], ignore_index=True)
+    runs, moved, shifts = measure_runs(stored), shifts.set_index("task"), measure_shifts(shifts)
     return {
         "runs": stored.set_index("task").sort_index(kind="stable"),
         "moved": moved.sort_index(kind="stable"),
