@@ -85,10 +85,8 @@ def measure_repeats(study):
 def tabulate(study, plans):
     """Gaps by goals ahead and what each goal gains, then the gaps of other methods, as shares."""
     plans = plans.sort_values(["family", "horizon"], kind="stable")
-    columns = ["gap", "gain", "together", "cpu_s"]
-    planned = means(plans, ["family", "method", "horizon"], columns)
-    planned = planned.drop(columns=["cpu_s_low", "cpu_s_high"])
-    planned = planned.rename(columns={"horizon": "h", "rows": "tasks", "cpu_s": "seconds"})
+    planned = means(plans, ["family", "method", "horizon"], ["gap", "gain", "together"])
+    planned = planned.rename(columns={"horizon": "h", "rows": "tasks"})
     planned.index = planned.family + " h=" + planned.h.astype(str)
     return pd.concat([planned, tabulate_others(study)]).rename_axis("row")
 

@@ -50,7 +50,7 @@ def average(plans):
     ``gain``: of the last goal in view. ``ahead``: goals ahead at the first movement.
     """
     keys = ["task", "family", "goals", "ahead", "h"]
-    plans = plans.groupby(keys, sort=False)[["gap", "cpu_s", *SIGNATURES]].mean().reset_index()
+    plans = plans.groupby(keys, sort=False)[["gap", *SIGNATURES]].mean().reset_index()
     gaps = plans.pivot_table("gap", "task", "h")
     before = [gaps.loc[task, min(h - 1, 4)] if h else np.nan
               for task, h in zip(plans.task, plans.h, strict=True)]  # fmt: skip
@@ -59,23 +59,14 @@ def average(plans):
     return pd.concat([plans, every]).sort_values("step", kind="stable")
 
 
-def tabulate(study, plans):
-    """Gap by goals ahead and what the last of them gains, over kinds of tasks."""
-    tasks = plans.task.map(study.tasks)
-    kinds = {
-        "all": "all",
-        "family": plans.family.str.partition("/")[0],
-        "goals": plans.goals.map(lambda count: str(count) if count <= 5 else "6 or more"),
-        "arms": tasks.map(lambda task: ["one", "two"][len(task.hands) - 1]),
-        "links": tasks.map(lambda task: str(len(task.robot.right_links))),
-        "base": tasks.map(lambda task: ["free", "on a rail", "fixed"][len(task.locked_base)]),
-    }
-    parts = [plans.assign(group=group, value=value).sort_values("value", kind="stable")
-             for group, value in kinds.items()]  # fmt: skip
-    table = means(pd.concat(parts), ["group", "value", "step"], ["gap", "gain", "cpu_s"])
-    table = table.rename(columns={"step": "h", "rows": "tasks", "cpu_s": "seconds"})
-    table.index = (table.group + " " + table.value + " h=" + table.h).rename("row")
-    return table.drop(columns=["cpu_s_low", "cpu_s_high"])
+def tabulate(plans):
+    """Gap by goals ahead and what the last of them gains, over all tasks and by number of goals."""
+    count = plans.goals.map(lambda goals: str(goals) if goals <= 5 else "6 or more")
+    by_goals = plans.assign(group="goals", value=count).sort_values("value", kind="stable")
+    every = pd.concat([plans.assign(group="all", value="all"), by_goals])
+    table = means(every, ["group", "value", "step"], ["gap", "gain"])
+    table = table.rename(columns={"step": "h", "rows": "tasks"})
+    return table.set_index((table.group + " " + table.value + " h=" + table.h).rename("row"))
 
 
 def tabulate_movements(gains):
@@ -176,7 +167,7 @@ def measure(study):
     }
     steps = plans[plans.step != "all"]
     return {
-        "results": tabulate(study, plans),
+        "results": tabulate(plans),
         "signatures": tabulate_signatures(plans),
         "gains": (gains := steps.set_index("task")[["family", "goals", "h", "gap", "gain"]]),
         "movements": tabulate_movements(gains.reset_index()),
