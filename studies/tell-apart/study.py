@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from announced import HALF, with_shares
-from changes import AFTER
-from people import NOISE
+from protocols import AFTER, NOISE
 from scipy import stats
 
 from coartic.analysis import all_of, figures, judge, mean_beyond, means, write_study
