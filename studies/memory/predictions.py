@@ -1,11 +1,15 @@
 """The predictions, with their bounds and tests."""
 
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 from cells import MEASURES, groups_of
 from scales import BOUNDS, KEEPS, MOST, Scale
 
 from coartic.analysis import all_of, judge, mean_beyond
+
+CLAIMS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text("utf-8"))
 
 
 def judge_claims(cells):
@@ -35,69 +39,29 @@ def judge_claims(cells):
 
     families = [name for name in groups_of(cells, "gain")["all"] if name != "long"]
     but_long = {("gain", "postures"): Scale(cells, "gain", "postures", families)}
-    test = "one-tailed bootstrap tests over random tasks, family as a factor"
-    bounds = (
-        f"{test}: within ± {BOUNDS['gain']:g} ticks (gain), ± {BOUNDS['arm']:g} ticks and "
-        f"± {BOUNDS['other arm']:g}"
-    )
     targets = {measure: scales[measure, "targets"] for measure in MEASURES}
     both = {measure: targets[measure].by_task(
         (targets[measure].table[MOST] - scales[measure, "postures"].table[MOST]).dropna()
     ) for measure in MEASURES}  # fmt: skip
-    return judge({
-        "rises-with-postures": (
-            "With postures kept, gain and each signature rise with the number of parts.",
-            f"{test}: slope by log r above 0",
-            rises("postures"),
+    findings = {
+        "rises-with-postures": rises("postures"),
+        "rises-with-targets": rises("targets"),
+        "level-from-a-hundred": same(100, MOST, MEASURES),
+        "learner-at-the-level": same("learner", MOST, signatures),
+        "learner-gains-the-level": same("learner", MOST, ["gain"], but_long),
+        "targets-gain-more": mean_beyond("gain {} ticks", both["gain"], BOUNDS["gain"]),
+        "targets-slow-more": mean_beyond(
+            "first movement slower by {} ticks", both["first"], BOUNDS["first"]
         ),
-        "rises-with-targets": (
-            "With targets kept, gain and each signature rise with the number of parts.",
-            f"{test}: slope by log r above 0",
-            rises("targets"),
+        "targets-pass-the-learner": mean_beyond(
+            "gain {} ticks", targets["gain"].more(30, "learner")
         ),
-        "level-from-a-hundred": (
-            "With postures kept, a hundred parts gain and show what a thousand do.",
-            bounds,
-            same(100, MOST, MEASURES),
-        ),
-        "learner-at-the-level": (
-            "By each signature the learner is at the level of a thousand parts with postures kept.",
-            bounds,
-            same("learner", MOST, signatures),
-        ),
-        "learner-gains-the-level": (
-            "In all families but long the learner gains what a thousand parts with postures kept "
-            "do.",
-            bounds,
-            same("learner", MOST, ["gain"], but_long),
-        ),
-        "targets-gain-more": (
-            f"With targets kept a thousand parts gain over {BOUNDS['gain']:g} ticks more than with "
-            "postures.",
-            f"{test}: above {BOUNDS['gain']:g} ticks",
-            mean_beyond("gain {} ticks", both["gain"], BOUNDS["gain"]),
-        ),
-        "targets-slow-more": (
-            f"With targets kept a thousand parts slow the first movement over {BOUNDS['first']:g} "
-            "ticks more than with postures.",
-            f"{test}: above {BOUNDS['first']:g} ticks",
-            mean_beyond("first movement slower by {} ticks", both["first"], BOUNDS["first"]),
-        ),
-        "targets-pass-the-learner": (
-            "With targets kept thirty parts gain more than the learner.",
-            f"{test}: above 0",
-            mean_beyond("gain {} ticks", targets["gain"].more(30, "learner")),
-        ),
-        "one-place": (
-            "With targets kept the learner lies between ten and a hundred parts, by gain and by "
-            "each signature.",
-            f"{test}: above ten, below a hundred",
-            all_of(*(
-                finding for measure in MEASURES for finding in (
-                    mean_beyond(f"{words[measure]} {{}} above ten",
-                                targets[measure].more("learner", 10)),
-                    mean_beyond("{} below a hundred", targets[measure].more(100, "learner")),
-                )
-            )),
-        ),
-    })  # fmt: skip
+        "one-place": all_of(*(
+            finding for measure in MEASURES for finding in (
+                mean_beyond(f"{words[measure]} {{}} above ten",
+                            targets[measure].more("learner", 10)),
+                mean_beyond("{} below a hundred", targets[measure].more(100, "learner")),
+            )
+        )),
+    }  # fmt: skip
+    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
