@@ -116,22 +116,16 @@ def confuse(people):
     return pd.crosstab(row.rename("row"), people.model).reindex(columns=[*MODELS], fill_value=0)
 
 
-def scatter(people):
-    """Return the parameters of people with 100 complete trials on the paper's tasks."""
-    chosen = people.true.isin(["informed", "best"]) & (people.trials == 100)
-    chosen &= people.task.isin(TASKS) & (people.data == "complete")
-    names = [f"{start}{name}" for name in PARAMETERS for start in ("true_", "")]
-    return people[chosen].sort_values(["task", "repeat", "person"])[["task", "true", *names]]
-
-
 @figures.styled
 def draw(table):
-    """Draw estimates against true values, and the share of right models by trials."""
-    people = pd.read_csv(HERE / "people.csv")
+    """Draw estimates against true values of informed people with 100 complete trials on the paper's
+    tasks, and the share of right models by trials."""
+    informed = pd.read_csv(HERE / "runs.csv.xz").query(
+        "true == 'informed' and trials == 100 and data == 'complete' and task in @TASKS"
+    )
     figure, panels = figures.panels((1, 4), (figures.TWO, 2.1))
     labels = {"sigma": "σ", "epsilon": "ε", "kappa": "κ"}
     for axes, name in zip(panels, PARAMETERS, strict=False):
-        informed = people[people.true == "informed"]
         ends = [informed[f"true_{name}"].min(), informed[f"true_{name}"].max()]
         axes.plot(ends, ends, color=figures.GREY, linewidth=0.6)
         for number, task in enumerate(TASKS):
@@ -163,7 +157,6 @@ def measure(folder):
         "runs": people.sort_values(by).set_index("task"),
         "results": tabulate(people), "confusion": confuse(people),
         "answers": answer(people), "outliers": outliers(people),
-        "people": scatter(people).reset_index(drop=True),
     }  # fmt: skip
 
 

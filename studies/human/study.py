@@ -24,22 +24,9 @@ from coartic.estimates import Estimate
 
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
-GROUPS, MODELS = FINDINGS.pop("groups"), FINDINGS.pop("models")
+GROUPS, MODELS, FURTHER = (FINDINGS.pop(key) for key in ("groups", "models", "further"))
 """The findings by id, in the order of the table; groups of models by name; models that are compared
-with people, by name: methods with their parameters."""
-FURTHER = {
-    "learner, begun": MODELS["learner"] | {"parameters": {"trials": 100}},
-    "learner, replayed, begun": MODELS["learner, replayed"] | {"parameters": {"trials": 100}},
-    "least acceleration, stopping": MODELS["least acceleration"] | {"parameters": {"stop": 1}},
-    "least jerk, stopping": MODELS["least jerk"] | {"parameters": {"stop": 1}},
-    "any goals ahead": {"method": "receding-horizon"},
-    "random search by hands": {"method": "random-search", "parameters": {"idle_arm": True}},
-    "random search, idle arm still": {"method": "random-search", "parameters": {"idle_arm": False}},
-    "random search, every hand sequence": {"method": "random-search/hands"},
-}
-"""Further models that some measures need: the learner after a hundredth of its practice, plans that
-stop at each goal, all points of the planner's curve, random search with the hands of other models.
-"""
+with people, and further ones that measures need, by name: methods with their parameters."""
 SEARCH = "random search"
 OF_TWO_ARMS = {"first movement against isolated reach", "near-tie repeats"}
 """Measures on tasks for two arms, where random search can have other hands than a model."""
