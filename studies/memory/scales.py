@@ -115,18 +115,20 @@ def where(scale, bound):
 
 
 def every_scale(cells):
-    """Yield measure, group of families, content of memory and scale, for all of them."""
-    for measure in MEASURES:
-        for group, families in groups_of(cells, measure).items():
-            for keep in KEEPS:
-                yield measure, group, keep, Scale(cells, measure, keep, families)
+    """Return the scales by measure, group of families and content of memory."""
+    return {
+        (measure, group, keep): Scale(cells, measure, keep, families)
+        for measure in MEASURES
+        for group, families in groups_of(cells, measure).items()
+        for keep in KEEPS
+    }
 
 
-def tabulate_scales(cells):
+def tabulate_scales(scales):
     """Tabulate for each family, content of memory and measure: the trend, the least number of
     stages at the level, and the learner's place."""
     rows = {}
-    for measure, group, keep, scale in every_scale(cells):
+    for (measure, group, keep), scale in scales.items():
         row = {"group": group, "keep": keep, "measure": measure, "tasks": len(scale.table)}
         for name, value in {
             "rise": scale.difference(MOST, 1),
@@ -140,11 +142,11 @@ def tabulate_scales(cells):
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
 
-def tabulate(cells):
+def tabulate(scales):
     """Tabulate both scales and the learner: means over tasks, and by how much they exceed random
     search in one part, by family and over all."""
     rows = {}
-    for measure, group, keep, scale in every_scale(cells):
+    for (measure, group, keep), scale in scales.items():
         for column, mean in scale.means.items():
             name = "learner" if column == "learner" else keep
             row = rows.setdefault(f"{group} {name} {column}".removesuffix(" learner"), {})
