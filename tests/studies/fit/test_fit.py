@@ -195,18 +195,12 @@ def test_a_person_in_two_files_is_refused_and_several_files_are_fitted(
         assert printed.count("trials are equal to others") == len(files)  # once for each
 
 
-@pytest.mark.parametrize(
-    "option",
-    [
-        *(("--noise", noise) for noise in ("-1", "nan", "inf", "9999")),
-        ("--out", "no/such/file.csv"),
-    ],
-)
-def test_an_option_that_cannot_be_is_refused(option, monkeypatch, capsys):
-    monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", "no file", *option])
+@pytest.mark.parametrize("noise", ["-1", "nan", "inf", "9999"])
+def test_a_noise_that_cannot_be_is_refused(noise, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["fit.py", "two-armed-1", "no file", "--noise", noise])
     with pytest.raises(SystemExit, match="2"):
         FIT.main()
-    assert capsys.readouterr().err.startswith(f"error: {option[0]}")
+    assert capsys.readouterr().err.startswith("error: --noise")
 
 
 def test_recordings_are_of_a_simulator_without_the_package(tmp_path):
