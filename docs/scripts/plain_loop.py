@@ -68,30 +68,23 @@ def correct(q: Any, arm: Any, goal: Any, rules: Any, free: Any, x: Any, y: Any) 
 
 
 @numba.njit
-def trial(q0: Any, targets: Any, hands: Any, goals: Any, arms: Any, rules: Any, free: Any) -> int:
-    """Make one trial; return its ticks, -1 where it fails."""
-    q, ticks, x, y = q0.copy(), 0, np.empty(16), np.empty(16)
-    for g in range(len(goals)):
-        arm = arms[0] if hands[g] == 0 else arms[1]
-        spent, hit = move(q, targets[g], arm, goals[g], True, rules, x, y)
-        ticks += spent
-        if not hit:
-            corrected = q.copy()
-            if not correct(corrected, arm, goals[g], rules, free, x, y):
-                return -1
-            spent, hit = move(q, corrected, arm, goals[g], False, rules, x, y)
-            ticks += spent
-            if not hit:
-                return -1
-    return ticks
-
-
-@numba.njit
 def trials(q0: Any, targets: Any, hands: Any, goals: Any, arms: Any, rules: Any, free: Any) -> Any:
-    """Make trials one after the other; return their ticks, shape ``(N,)``."""
-    ticks = np.empty(len(targets), np.int64)
+    """Make trials one after the other; return their ticks, shape ``(N,)``, -1 where one fails."""
+    ticks, x, y = np.zeros(len(targets), np.int64), np.empty(16), np.empty(16)
     for n in range(len(targets)):
-        ticks[n] = trial(q0, targets[n], hands, goals, arms, rules, free)
+        q = q0.copy()
+        for g in range(len(goals)):
+            arm = arms[0] if hands[g] == 0 else arms[1]
+            spent, hit = move(q, targets[n, g], arm, goals[g], True, rules, x, y)
+            ticks[n] += spent
+            if not hit:
+                corrected = q.copy()
+                if correct(corrected, arm, goals[g], rules, free, x, y):
+                    spent, hit = move(q, corrected, arm, goals[g], False, rules, x, y)
+                    ticks[n] += spent
+            if not hit:
+                ticks[n] = -1
+                break
     return ticks
 
 
