@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from announced import HALF, with_shares
+from announced import DISTANCES, HALF, with_shares
 from protocols import AFTER, NOISE
 from scipy import stats
 
@@ -139,19 +139,21 @@ def find_power(shares, starts, steps):
     ratio = starts[(starts.model == "learner") & (starts.trials == 1)]
     apart = np.sqrt(np.median(ratio.between / ratio.within) - 1)  # of groups, in RMS within pairs
     person = steps.groupby("model")[["same", "kept"]].agg(["mean", "std"])
-    cases = {}
-    for distance in (0.25, 0.5, 1.0):
-        planned = shares[(shares.distance == distance) & (shares.model == "planner, all goals")]
+
+    def of_change(distance, model, words=""):
+        planned = shares[(shares.distance == distance) & (shares.model == model)]
         noise = NOISE * np.sqrt(1.05) / planned["shift"].quantile(0.25)
-        cases |= {f"change {distance:g}, {k} goals": (0, 1, noise, k) for k in (1, 4)}
+        return {f"change {distance:g}, {k} goals{words}": (0, 1, noise, k) for k in (1, 4)}
+
+    cases = {}
+    for distance in DISTANCES:
+        cases |= of_change(distance, "planner, all goals")
     cases["start"] = 1, 0, np.sqrt(2) / apart, 1
     records = round(steps.records[steps.model == "learner"].mean())
     for name, items in (("same", 400), ("kept", records)):
         (a, spread), (b, other) = person.loc["learner", name], person.loc["planner", name]
         cases[f"step {name}"] = a, b, max(spread, other) * np.sqrt(items), items
-    ahead = shares[(shares.distance == 0.5) & (shares.model == "planner, next goal")]
-    noise = NOISE * np.sqrt(1.05) / ahead["shift"].quantile(0.25)
-    cases |= {f"change 0.5, {k} goals, one goal ahead": (0, 1, noise, k) for k in (1, 4)}
+    cases |= of_change(0.5, "planner, next goal", ", one goal ahead")
     rows = {
         name: {"learner": case[0], "planner": case[1], "noise": case[2] / np.sqrt(case[3]),
                **{f"people_{kind}": people_needed(*case, planned, rng) for kind, planned in
