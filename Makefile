@@ -49,12 +49,13 @@ speed: $(READY)
 
 # The wheel and the source distribution of the last commit, each run in an empty environment, by
 # each Python of this machine; what is not tried is named.
+release-check: CHECKED := --release
 release-check: shipped-check
 	COARTIC_PACKAGES=1 $(BIN)/python -m pytest -rs tests/test_packages.py
 
 # Shipped runs, performed again: one of each cell of the comparison, and of each method on each family.
 shipped-check: $(READY)
-	$(BIN)/python docs/scripts/check_shipped.py
+	$(BIN)/python docs/scripts/check_shipped.py $(CHECKED)
 
 # The results that are shipped, anew, by the present code: packed where they are as before. With
 # CHANGED=1 also where they are not.
