@@ -65,28 +65,27 @@ def judge_claims(runs):
         )
 
     informed, quick = more(INFORMED, PAPER), more(PAPER, PLANNER, "log_quarter")
-    mean = "{} points more "
     findings = {
-        "information-in-exploration-brings-much": in_each(f"{mean}with κ = 0.3", informed, POINTS),
+        "information-in-exploration-brings-much": in_each(
+            "{} points more with κ = 0.3", informed, POINTS
+        ),
         "information-makes-quick": in_each("10^{} times fewer trials", quick, np.log10(TIMES)),
         "information-in-correction-brings-little": in_each(
-            f"{mean}than twice the pull's",
+            "{} points more than twice the pull's",
             lambda family: informed(family) - 2 * more("correction", PAPER)(family),
         ),
         "planning-alone-is-short-sighted": in_each(
-            f"{mean}with noise", more(PLANNER, "1 0", "gain_10000"), POINTS
+            "{} points more with noise", more(PLANNER, "1 0", "gain_10000"), POINTS
         ),
         "wrong-information-helps-less": in_each(
-            f"{mean}towards the next goal", more(INFORMED, "0.3 0.05 start"), POINTS
+            "{} points more towards the next goal", more(INFORMED, "0.3 0.05 start"), POINTS
         ),
         "wrong-information-harms": in_each(
-            f"{mean}without drift",
-            more(PAPER, "1 0.05 start", "gain_10000"),
-            POINTS,
+            "{} points more without drift", more(PAPER, "1 0.05 start", "gain_10000"), POINTS,
             families=FAMILIES[1:],
         ),
         "drawn-drift-is-as-good": in_each(
-            f"{mean}with a drawn drift", more("drawn", INFORMED), -POINTS
+            "{} points more with a drawn drift", more("drawn", INFORMED), -POINTS
         ),
         "information-about-hands": all_of(
             in_each("{} points more", more("hands", PAPER), POINTS, families=("long",)),
