@@ -38,25 +38,24 @@ format: $(READY)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# Notebooks are run, warnings are errors, and what pages link to is there.
+# Notebooks are run, and warnings are errors: also of a link to what is not there.
 docs: $(VENV)/.docs
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m sphinx -q -W --keep-going -d build/doctrees \
 	  docs build/docs
-	$(BIN)/python docs/check_links.py build/docs
 	@echo "Look at build/docs/index.html."
 
-# make speed LONG=1 adds suite comparison.
 speed: $(READY)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/scripts/speed.py $(if $(LONG),--long)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/scripts/speed.py
 
 # The wheel and the source distribution of the last commit, each run in an empty environment, by
 # each Python of this machine; what is not tried is named.
+release-check: CHECKED := --release
 release-check: shipped-check
 	COARTIC_PACKAGES=1 $(BIN)/python -m pytest -rs tests/test_packages.py
 
 # Shipped runs, performed again: one of each cell of the comparison, and of each method on each family.
 shipped-check: $(READY)
-	$(BIN)/python docs/scripts/check_shipped.py
+	$(BIN)/python docs/scripts/check_shipped.py $(CHECKED)
 
 # The results that are shipped, anew, by the present code: packed where they are as before. With
 # CHANGED=1 also where they are not.

@@ -18,9 +18,8 @@ from typing import Any, get_args
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import Study, by_task, fill_page, load, mean_beyond, means
+from coartic.analysis import by_task, fill_page, load
 from coartic.analysis.judging import Verdict
-from coartic.analysis.methods import title_of
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
@@ -28,7 +27,7 @@ STORED = DOCS / "stored"
 KEPT = {
     "comparison": (
         "contexts learning methods runtimes ranking signatures",
-        "postures ranking runtimes learning-curves",
+        "postures ranking runtimes",
     ),
     "families": ("family-gaps", ""),
 }
@@ -87,11 +86,6 @@ def p_of_shares(values: dict[Any, Any], published_runs: int) -> float:
     return float(stats.fisher_exact([[n, of - n] for n, of in counts]).pvalue)
 
 
-def p_above(values: pd.Series, bound: float) -> float:
-    """One-tailed p that a mean over tasks is above a bound, as claims test it, uncorrected."""
-    return mean_beyond("{}", values, bound).p
-
-
 def published_spreads() -> pd.DataFrame:
     """Return the published spreads (±) with the tests of both readings; a spread that is published
     of a hand sequence is compared with runs that have it."""
@@ -100,56 +94,36 @@ def published_spreads() -> pd.DataFrame:
     return spreads.sort_index()
 
 
-def zeros_of_gain(study: Study) -> pd.DataFrame:
-    """Return the gain of random tasks from either zero, in per cent of the way to the best known
-    reward, by family and over families of up to eight goals: of the corrective process alone with
-    its best hands from the initial solution, and of the learner from both."""
-    runs = study.runs[study.runs.status == "ok"]
-    of_learner = runs.method.isin(["dual-process/EC1", "dual-process/EC4"])
-    rewards = {
-        "initial": runs[runs.method == "corrective-alone/given"].groupby("task").reward.first(),
-        "hands": pd.Series(study.corrective_best),
-        "learner": runs[of_learner].groupby("task").reward.mean(),
-        "best": runs.groupby("task").best_known.first(),
-    }
-    tasks = pd.DataFrame(rewards).astype(float).dropna()
-    gains = pd.DataFrame(index=tasks.index)
-    gains["family"] = gains.index.str.partition("/").get_level_values(0)
-    for name, reached, zero in (
-        ("hands", "hands", "initial"),
-        ("learner", "learner", "initial"),
-        ("learner_from_hands", "learner", "hands"),
-    ):
-        gains[name] = 100 * (tasks[reached] - tasks[zero]) / (tasks.best - tasks[zero])
-    every = gains[gains.family != "many-goals"].assign(family="all")
-    table = means(pd.concat([every, gains]), ["family"], ["hands", "learner", "learner_from_hands"])
-    return table.set_index("family").rename(columns={"rows": "tasks"}).rename_axis("row")
+def gain_of_best_hands() -> float:
+    """Return the gain of the corrective process alone with its best hands from the initial
+    solution, in per cent of the way to the best known reward: a mean over the random tasks of
+    families of up to eight goals."""
+    tasks = table("families", "by-task").query("method == 'corrective-alone/given'")
+    share = tasks.share[~tasks.index.str.startswith("many-goals")]  # from best hands, so below 0
+    return float((-100 * share / (1 - share)).mean())
 
 
 def filled_pages() -> dict[str, str]:
-    """Every page that is made from a template, by its path below ``docs``.
-
-    A page that has the name of a suite waits until something of that suite is stored.
-    """
+    """Every page that is made from a template, by its path below ``docs``."""
     replication = STUDIES / "replication"
+    published = tomllib.loads((replication / "published.toml").read_text("utf-8"))
     values = {
-        "table": table, "row": row, "claim": claim, "cells_of_the_paper": cells_of_the_paper,
-        "verdicts": verdicts, "seen": seen,
-        "title_of": title_of,
+        "table": table,
+        "row": row,
+        "claim": claim,
+        "cells_of_the_paper": cells_of_the_paper,
+        "verdicts": verdicts,
+        "seen": seen,
         "published_spreads": published_spreads,
-        "p_of_shares": p_of_shares, "p_above": p_above,
-        "published": tomllib.loads(
-            (replication / "published.toml").read_text("utf-8")
-        )["general"],
-        "readings": pd.read_csv(STORED / "reconstruction" / "readings.csv", index_col=0),
+        "p_of_shares": p_of_shares,
+        "gain_of_best_hands": gain_of_best_hands,
+        "published": published["general"],
+        "readings": table("reconstruction", "readings"),
         "goal_sets": pd.read_csv(replication / "sets.csv"),
-        "stored": lambda suite: (STORED / suite).is_dir(),
-    }  # fmt: skip
-    waiting = {f"{suite}.md" for suite in KEPT if not (STORED / suite).is_dir()}
+    }
     return {
         str(path.relative_to(DOCS).with_suffix("")): fill_page(path, **values)
         for path in sorted(DOCS.rglob("*.md.jinja"))
-        if path.stem not in waiting
     }
 
 
@@ -164,19 +138,17 @@ def store(results: Path) -> None:
             continue
         shutil.rmtree(kept, ignore_errors=True)
         kept.mkdir(parents=True)
-        for name in tables.split():
-            frame = pd.read_csv(report / "tables" / f"{name}.csv", index_col="row")
-            frame = frame.drop(columns="run_ids", errors="ignore")
-            frame.to_csv(kept / f"{name}.csv", float_format="%.6g", lineterminator="\n")
+        frames = {
+            name: pd.read_csv(report / "tables" / f"{name}.csv", index_col="row")
+            for name in tables.split()
+        }
         for name in figures.split():
             shutil.copy(report / "figures" / f"{name}.svg", kept)
         if suite == "families":  # what means over tasks are computed from
-            table = by_task(load(results / suite).runs)
-            table.to_csv(
-                kept / "by-task.csv", float_format="%.6g", lineterminator="\n", index=False
-            )
-            zeros = zeros_of_gain(load(results / suite))
-            zeros.to_csv(kept / "zeros.csv", float_format="%.6g", lineterminator="\n")
+            frames["by-task"] = by_task(load(results / suite).runs).set_index("task")
+        for name, frame in frames.items():
+            frame = frame.drop(columns="run_ids", errors="ignore")
+            frame.to_csv(kept / f"{name}.csv", float_format="%.6g", lineterminator="\n")
 
 
 def main() -> None:

@@ -9,45 +9,35 @@ from pathlib import Path
 
 import pandas as pd
 
+from coartic.analysis import interval, load
 from coartic.analysis.sections import TABLES
-from coartic.analysis.study import load
 
 README = Path(__file__).parents[2] / "README.md"
 
 
-def rows_of(text: str) -> dict[str, tuple[list[str], list[str]]]:
-    """Return the numbers of gap and share as printed, in per cent, by the name of the row."""
+def rows_of(text: str) -> dict[str, tuple[str, ...]]:
+    """Return gap and share as printed, in per cent, by the name of the row."""
     row = r"^\| \**(.+?)\**(?: of the paper|:.*?)? \| .+? \| (.+?%.*?) \| (.+?) \|$"
     rows = re.findall(row, text, re.MULTILINE)
-    return {name: (numbers_in(gap), numbers_in(share)) for name, gap, share in rows}
-
-
-def numbers_in(text: str) -> list[str]:
-    """Return the numbers of a text, as they are printed."""
-    return re.findall(r"-?\d+(?:\.\d+)?", text.replace("\N{MINUS SIGN}", "-"))
-
-
-def is_same(printed: list[str], row: pd.Series, column: str) -> bool:
-    """Return whether a row rounds, in per cent, to the printed numbers: value, then interval."""
-    values = [100 * row[name] for name in (column, f"{column}_low", f"{column}_high")]
-    there = [value for value in values if pd.notna(value)]
-    decimals = [len(text.partition(".")[2]) for text in printed]
-    rounded = [f"{value:.{places}f}" for value, places in zip(there, decimals, strict=False)]
-    return len(there) == len(printed) and rounded == printed
+    return {name: tuple(cell.replace("*", "") for cell in cells) for name, *cells in rows}
 
 
 def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
     """Return the number of rows of README's text, and a line for each that the ranking, by the
     titles of its methods, has otherwise."""
     lines, rows = [], rows_of(text)
-    for name, (gap, share) in rows.items():
+    for name, printed in rows.items():
         titles = [title for title in ranking.index if title.partition(" (")[0] == name]
         if not titles:
             lines.append(f"{name}: not in this folder")
             continue
-        row = ranking.loc[titles[0]]
-        if not (is_same(gap, row, "gap") and is_same(share, row, "share")):
-            lines.append(f"{name}: gap {100 * row.gap:.2f} %, share {100 * row.share:.1f} %")
+        row, decimals = ranking.loc[titles[0]], (cell.split()[0].partition(".") for cell in printed)
+        there = tuple(
+            interval(row, column, len(digits), 100, " %")
+            for column, (*_, digits) in zip(("gap", "share"), decimals, strict=True)
+        )
+        if there != printed:
+            lines.append(f"{name}: gap {there[0]}, share {there[1]}")
     return len(rows), lines
 
 

@@ -1,7 +1,6 @@
 """Draw the robot with its joints named, and its null space: ``python docs/scripts/draw_robot.py``
 writes ``docs/robot.svg`` and ``docs/nullspace.svg``."""
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +67,8 @@ def nullspace() -> Figure:
 
     starts = [np.array([a, 0.4 - 0.5 * a, 0.2 - 0.5 * a, -1.5]) for a in (1.6, 1.1, 0.6, 0.1, -0.4)]
     after = hitting(goals[1], np.array([-0.4, 0.4, 0.2, -1.5]))
-    postures = sorted((hitting(goals[0], start) for start in starts), key=partial(distance, after))
+    postures = [hitting(goals[0], start) for start in starts]
+    postures.sort(key=lambda q: float(np.linalg.norm(after - q)))
     drawing, (axes,) = panels((1, 1), (TWO, 0.42 * TWO))
     for q, color, line in ((after, GREY, ":"), *((q, GREY, "-") for q in postures[1:]),
                            (postures[0], "black", "-")):  # fmt: skip
@@ -84,11 +84,6 @@ def nullspace() -> Figure:
     axes.set_aspect("equal")
     axes.set_axis_off()
     return drawing
-
-
-def distance(one: Array, other: Array) -> float:
-    """Euclidean distance of two configurations, rad."""
-    return float(np.linalg.norm(one - other))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable
@@ -69,30 +68,23 @@ def correct(q: Any, arm: Any, goal: Any, rules: Any, free: Any, x: Any, y: Any) 
 
 
 @numba.njit
-def trial(q0: Any, targets: Any, hands: Any, goals: Any, arms: Any, rules: Any, free: Any) -> int:
-    """Make one trial; return its ticks, -1 where it fails."""
-    q, ticks, x, y = q0.copy(), 0, np.empty(16), np.empty(16)
-    for g in range(len(goals)):
-        arm = arms[0] if hands[g] == 0 else arms[1]
-        spent, hit = move(q, targets[g], arm, goals[g], True, rules, x, y)
-        ticks += spent
-        if not hit:
-            corrected = q.copy()
-            if not correct(corrected, arm, goals[g], rules, free, x, y):
-                return -1
-            spent, hit = move(q, corrected, arm, goals[g], False, rules, x, y)
-            ticks += spent
-            if not hit:
-                return -1
-    return ticks
-
-
-@numba.njit
 def trials(q0: Any, targets: Any, hands: Any, goals: Any, arms: Any, rules: Any, free: Any) -> Any:
-    """Make trials one after the other; return their ticks, shape ``(N,)``."""
-    ticks = np.empty(len(targets), np.int64)
+    """Make trials one after the other; return their ticks, shape ``(N,)``, -1 where one fails."""
+    ticks, x, y = np.zeros(len(targets), np.int64), np.empty(16), np.empty(16)
     for n in range(len(targets)):
-        ticks[n] = trial(q0, targets[n], hands, goals, arms, rules, free)
+        q = q0.copy()
+        for g in range(len(goals)):
+            arm = arms[0] if hands[g] == 0 else arms[1]
+            spent, hit = move(q, targets[n, g], arm, goals[g], True, rules, x, y)
+            ticks[n] += spent
+            if not hit:
+                corrected = q.copy()
+                if correct(corrected, arm, goals[g], rules, free, x, y):
+                    spent, hit = move(q, corrected, arm, goals[g], False, rules, x, y)
+                    ticks[n] += spent
+            if not hit:
+                ticks[n] = -1
+                break
     return ticks
 
 
@@ -112,44 +104,26 @@ def arguments(task: Task, hands: str) -> tuple[Any, ...]:
     return codes, task.goal_array, tuple(arms), rules, free
 
 
-class _Arm(ctypes.Structure):
-    _fields_ = (
-        *[(name, ctypes.c_long) for name in ("first", "links")],
-        ("lengths", ctypes.c_void_p),
-        *[(name, ctypes.c_double) for name in ("shoulder_x", "shoulder_y")],
-    )  # fmt: skip
-
-
-class _Rules(ctypes.Structure):
-    _fields_ = (
-        *[(name, ctypes.c_double) for name in ("radius", "step", "arrival", "gain", "tolerance")],
-        ("iterations", ctypes.c_long),
-        *[(name, ctypes.c_double) for name in ("free_x", "free_y")],
-    )  # fmt: skip
-
-
 def trials_in_c(task: Task, hands: str, targets: Array) -> dict[str, Callable[[], Array]]:
     """Compile ``plain_loop.c``; return functions that make these trials, one after the other, and
-    return their ticks, without and with bounds. Empty where no compiler is there."""
-    compiler = shutil.which("cc")
-    if compiler is None:
-        return {}
+    return their ticks, without and with bounds."""
     library = Path(tempfile.mkdtemp()) / "plain_loop.so"
     source = Path(__file__).with_suffix(".c")
     options = ["-O3", "-march=native", "-shared", "-fPIC", "-lm", "-o"]
-    subprocess.run([compiler, source, *options, library], check=True)
+    subprocess.run(["cc", source, *options, library], check=True)
     codes, goals, arms, rules, free = arguments(task, hands)
-    in_c = (_Arm * 2)(*[_Arm(a, b, links.ctypes.data, x, y) for a, b, links, x, y in arms])
-    constants = _Rules(*rules[:5], int(rules[5]), *free)
+    # Structures of the C code: arms, and rules with the free base coordinates.
     arrays = [np.ascontiguousarray(each) for each in (task.q0, targets, codes, goals)]
+    rows = [(first, links, lengths.ctypes.data, x, y) for first, links, lengths, x, y in arms]
+    arrays += [
+        np.array(rows, "i8, i8, u8, f8, f8"),
+        np.array((*rules, *free), "f8, f8, f8, f8, f8, i8, f8, f8"),
+    ]
     ticks = np.empty(len(targets), np.int64)
 
     def make(bounds: bool) -> Array:
-        pointers = [ctypes.c_void_p(each.ctypes.data) for each in arrays]
-        ctypes.CDLL(str(library)).trials(
-            *map(ctypes.c_long, targets.shape), *pointers, in_c,
-            ctypes.byref(constants), bounds, ctypes.c_void_p(ticks.ctypes.data),
-        )  # fmt: skip
+        sizes, places = map(ctypes.c_long, targets.shape), (each.ctypes for each in arrays)
+        ctypes.CDLL(str(library)).trials(*sizes, *places, bounds, ticks.ctypes)
         return ticks
 
     return {"plain loop in C": lambda: make(False), "loop in C, with bounds": lambda: make(True)}

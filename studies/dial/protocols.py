@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from settings import AFTER, FAMILIES, FEW, LONG, NAMED, RUNS, SETTINGS, TRIALS, base_of
 from shifts import SHIFT_COLUMNS, SHIFT_TASKS, run_shifts
 
@@ -128,8 +129,7 @@ def main(folder):
             path = Path(folder) / f"{part}.csv"
             if not path.exists():
                 path.write_text(",".join(columns) + "\n", encoding="utf-8")
-            with path.open(encoding="utf-8", newline="") as lines:
-                done = {row["task"] for row in csv.DictReader(lines)}
+            done = {*pd.read_csv(path).task}
             futures |= {pool.submit(run, name): path for name in tasks if name not in done}
         for future in as_completed(futures):
             with futures[future].open("a", encoding="utf-8", newline="") as file:

@@ -1,7 +1,11 @@
 """Settings of the learner along the dial, of leaning towards the next goal, and off it."""
 
+import tomllib
+from pathlib import Path
+
 from coartic import CONDITIONS
 
+CLAIMS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text("utf-8"))
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 DRIFTS, NOISES = (0.03, 0.1, 0.3, 1.0), (0.01, 0.05)
 TRIALS, RUNS, AFTER = 10_000, 3, (30, 100, 1_000, 10_000)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from settings import AFTER, DIAL, FAMILIES, INFORMED, PAPER, PLANNER, TIMES, TRIALS
+from settings import AFTER, CLAIMS, DIAL, FAMILIES, INFORMED, PAPER, PLANNER, TIMES, TRIALS
 from shifts import by_task, in_each, judge_shifts, measure_shifts, tabulate_shifts
 
 from coartic.analysis import all_of, figures, judge, means, write_study
@@ -37,14 +37,10 @@ def measure_runs(raw):
 
 
 def tabulate(runs):
-    """Tabulate gains: means over random tasks (tasks count alike), over the first ten of each
-    family, or over the runs on a task of the paper; medians of trials."""
+    """Tabulate gains: means over random tasks (tasks count alike), or over the runs on a task of
+    the paper; medians of trials."""
     drawn = runs[runs.family.isin(FAMILIES)]
-    first = drawn[drawn.task.str[-3:] < "010"]
-    every = pd.concat([
-        drawn.assign(group="random"), first.assign(group="first ten"),
-        runs.assign(group=runs.family),
-    ])  # fmt: skip
+    every = pd.concat([drawn.assign(group="random"), runs.assign(group=runs.family)])
     unit = every.run.where(~every.family.isin(FAMILIES), 0)
     numbers = [f"gain_{n}" for n in AFTER]
     by = ["group", "setting", "task", unit]
@@ -68,75 +64,36 @@ def judge_claims(runs):
             by_task(runs, first, column, family) - by_task(runs, second, column, family)
         )
 
-    how = "one-tailed bootstrap tests over 40 random tasks, in each family, of the gain "
-    return judge({
-        "information-in-exploration-brings-much": (
-            "κ = 0.3 with the paper's noise gains more after 100 trials than no drift, in every "
-            "family.",
-            f"{how}after 100 trials: with κ = 0.3 more than {POINTS:g} points more than with 0"
-            "; refuted where a family gains less",
-            in_each("{} points more with κ = 0.3", more(INFORMED, PAPER), POINTS),
+    informed, quick = more(INFORMED, PAPER), more(PAPER, PLANNER, "log_quarter")
+    findings = {
+        "information-in-exploration-brings-much": in_each(
+            "{} points more with κ = 0.3", informed, POINTS
         ),
-        "information-makes-quick": (
-            "With κ = 1 and little noise a quarter of the gain takes less than a fifth of the "
-            "paper's learner's trials, in every family.",
-            "one-tailed bootstrap tests over random tasks, in each family, of the logarithm of the "
-            f"trials to a quarter of the gain: κ = 1, σ = 0.01 takes {TIMES:g} times fewer than "
-            "the paper's learner"
-            "; refuted where it takes more",
-            in_each("10^{} times fewer trials", more(PAPER, PLANNER, "log_quarter"),
-                    float(np.log10(TIMES))),
+        "information-makes-quick": in_each("10^{} times fewer trials", quick, np.log10(TIMES)),
+        "information-in-correction-brings-little": in_each(
+            "{} points more than twice the pull's",
+            lambda family: informed(family) - 2 * more("correction", PAPER)(family),
         ),
-        "information-in-correction-brings-little": (
-            "A pull of 0.05 in correction brings less than half of what κ = 0.3 brings after 100 "
-            "trials, in every family.",
-            f"{how}after 100 trials: what κ = 0.3 adds is more than twice what β = 0.05 adds"
-            "; refuted where it brings more than half",
-            in_each("{} points more than twice the pull's", lambda family:
-                    more(INFORMED, PAPER)(family) - 2 * more("correction", PAPER)(family)),
+        "planning-alone-is-short-sighted": in_each(
+            "{} points more with noise", more(PLANNER, "1 0", "gain_10000"), POINTS
         ),
-        "planning-alone-is-short-sighted": (
-            "κ = 1 gains more in the end with noise of 0.01 than without noise, in every family.",
-            f"{how}after 10,000 trials: with σ = 0.01 more than {POINTS:g} points more than "
-            "without noise"
-            "; refuted where noise gains nothing",
-            in_each("{} points more with noise", more(PLANNER, "1 0", "gain_10000"), POINTS),
+        "wrong-information-helps-less": in_each(
+            "{} points more towards the next goal", more(INFORMED, "0.3 0.05 start"), POINTS
         ),
-        "wrong-information-helps-less": (
-            "κ = 0.3 towards the start of the trial gains less after 100 trials than towards the "
-            "next goal, in every family.",
-            f"{how}after 100 trials: towards the next goal more than {POINTS:g} points more"
-            "; refuted where it gains as much",
-            in_each("{} points more towards the next goal", more(INFORMED, "0.3 0.05 start"),
-                    POINTS),
+        "wrong-information-harms": in_each(
+            "{} points more without drift", more(PAPER, "1 0.05 start", "gain_10000"), POINTS,
+            families=FAMILIES[1:],
         ),
-        "wrong-information-harms": (
-            "κ = 1 towards the start of the trial gains less in the end than no drift, in every "
-            "family with two arms.",
-            f"{how}after 10,000 trials: without drift more than {POINTS:g} points more"
-            "; refuted where it gains more",
-            in_each("{} points more without drift", more(PAPER, "1 0.05 start", "gain_10000"),
-                    POINTS, families=FAMILIES[1:]),
+        "drawn-drift-is-as-good": in_each(
+            "{} points more with a drawn drift", more("drawn", INFORMED), -POINTS
         ),
-        "drawn-drift-is-as-good": (
-            "A drift that each trial draws gains as much after 100 trials as κ = 0.3, to five "
-            "points, in every family.",
-            f"{how}after 100 trials: drawn drift less than {POINTS:g} points less than κ = 0.3"
-            "; refuted where it gains less",
-            in_each("{} points more with a drawn drift", more("drawn", INFORMED), -POINTS),
+        "information-about-hands": all_of(
+            in_each("{} points more", more("hands", PAPER), POINTS, families=("long",)),
+            in_each("{} points less", more(PAPER, "hands", "gain_10000"),
+                    families=("two-armed", "redundancy")),
         ),
-        "information-about-hands": (
-            "Hands by the nearest posture gain more than random hands after 100 trials on long "
-            "tasks, and less in the end on two-armed and redundancy tasks.",
-            f"{how}: on long tasks after 100 trials more than {POINTS:g} points more, on two-armed "
-            "and redundancy tasks after 10,000 less",
-            all_of(
-                in_each("{} points more", more("hands", PAPER), POINTS, families=("long",)),
-                in_each("{} points less", more(PAPER, "hands", "gain_10000"),
-                        families=("two-armed", "redundancy")),
-            ),
-        ),
-    })  # fmt: skip
+    }  # fmt: skip
+    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
 
 
 OTHERS = {
@@ -186,10 +143,8 @@ def measure(folder):
     """Return the tables by name; each becomes a CSV file."""
     runs, others, shifts, named = (pd.read_csv(Path(folder) / f"{name}.csv")
                                    for name in ("runs", "others", "shifts", "named"))  # fmt: skip
-    is_first = ~others.family.isin(FAMILIES) | (others.task.str[-3:] < "010")
-    stored = pd.concat([runs, others[is_first]], ignore_index=True)
-    runs, moved = measure_runs(stored), shifts.set_index("task")
-    shifts = measure_shifts(shifts)
+    stored = pd.concat([runs, others], ignore_index=True)
+    runs, moved, shifts = measure_runs(stored), shifts.set_index("task"), measure_shifts(shifts)
     return {
         "runs": stored.set_index("task").sort_index(kind="stable"),
         "moved": moved.sort_index(kind="stable"),

@@ -5,6 +5,7 @@ python studies/dose/study.py results/dose
 """
 
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,8 @@ from coartic.analysis import (
     write_study,
 )  # fmt: skip
 
+HERE = Path(__file__).parent
+CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 RANDOM_SEARCH = "random-search"
 KEYS = ["group", "counted", "dose"]
 MEASURES = {
@@ -85,8 +88,7 @@ def tabulate(study, runs):
 
 def tabulate_posture_difference(study, runs):
     """Tabulate the posture difference (length unit and rad mixed) at the goal that two tasks of the
-    paper share, by γ, with p of a permutation test against no difference, and of a test against
-    the difference of random search (``beyond_p``)."""
+    paper share, by γ, with p of a test against the difference of random search (``beyond_p``)."""
     rows = {}
     first = runs[runs.task == SHARED[0]].groupby("kind").first()
     labels = (first.method + " " + first.setting).str.strip()
@@ -97,7 +99,6 @@ def tabulate_posture_difference(study, runs):
         control = contexts_of_control(study, ours)
         rows[f"{SHARED[0]} {kind}"] = {
             "posture_difference": ours.posture_difference,
-            "posture_difference_p": ours.p,
             "beyond_p": np.nan if control is None else ours.p_beyond(control),
         }
     return pd.DataFrame.from_dict(rows, orient="index")
@@ -116,68 +117,29 @@ def judge_claims(runs):
 
     words = {"all 0": "0", "all 0.5": "0.5", "all 0.75": "0.75", "all 1": "1"}
     words["later 1"] = "1, later movements"
-    of_saved = (
-        "one-tailed bootstrap test over random tasks, of ticks that noiseless replays save, in per "
-        "cent of the initial solution's: "
-    )
-    return judge({
-        "dose-moves-postures": (
-            "With γ = 1 postures leave the next goal nearer than with γ = 0, and nearer than in "
-            "random search.",
-            "one-tailed bootstrap tests over random tasks, of noiseless replays: with γ = 1 "
-            "postures of base and chosen arm leave the next goal nearer by more than 1 tick more "
-            "than with γ = 0, and nearer than that of random search with the same hands",
-            all_of(
-                mean_beyond("With γ = 1 postures leave the next goal nearer by {} ticks more than "
-                            "with γ = 0", nearer["all 1"] - nearer["all 0"], TICK),
-                mean_beyond("than that of random search by {} ticks", beyond["all 1"]),
-            ),
+    to_half = (saved["all 0"] + saved["all 1"]) / 2 - saved["all 0.1"]
+    first_to_half = (first["all 0"] + first["all 1"]) / 2 - first["all 0.1"]
+    findings = {
+        "dose-moves-postures": all_of(
+            mean_beyond("With γ = 1 postures leave the next goal nearer by {} ticks more than "
+                        "with γ = 0", nearer["all 1"] - nearer["all 0"], TICK),
+            mean_beyond("than that of random search by {} ticks", beyond["all 1"]),
         ),
-        "dose-slows-first-movements": (
-            "With γ = 1 the first movement takes longer than with γ = 0.",
-            "one-tailed bootstrap test over random tasks, of noiseless replays: with γ = 1 the "
-            "first movement takes more than 1 tick longer than with γ = 0, each against the "
-            "corrective process with the same hands",
-            mean_beyond("With γ = 1 the first movement takes {} ticks longer than with γ = 0",
-                        first["all 1"] - first["all 0"], TICK),
+        "dose-slows-first-movements": mean_beyond(
+            "With γ = 1 the first movement takes {} ticks longer than with γ = 0",
+            first["all 1"] - first["all 0"], TICK,
         ),
-        "dose-saves": (
-            "With γ = 1 learning saves more ticks than with γ = 0.",
-            f"{of_saved}with γ = 1 more than 1 point more than with γ = 0",
-            saves("all 1", "all 0"),
+        "dose-saves": saves("all 1", "all 0"),
+        "no-step-at-a-small-dose": all_of(
+            mean_beyond("with γ = 0.1 {} points saved are missing to half of the way", to_half),
+            mean_beyond("with γ = 0.1 {} ticks of the first movement are missing to half of the "
+                        "way", first_to_half),
         ),
-        "no-step-at-a-small-dose": (
-            "With γ = 0.1 learning saves less, and slows the first movement less, than half-way "
-            "between γ = 0 and γ = 1.",
-            "one-tailed bootstrap tests over random tasks, of noiseless replays: the mean of γ = 0 "
-            "and γ = 1 less that of γ = 0.1 is above 0, of the ticks that are saved and of those "
-            "by which the first movement is longer",
-            all_of(
-                mean_beyond("with γ = 0.1 {} points saved are missing to half of the way",
-                            (saved["all 0"] + saved["all 1"]) / 2 - saved["all 0.1"]),
-                mean_beyond("with γ = 0.1 {} ticks of the first movement are missing to half of "
-                            "the way", (first["all 0"] + first["all 1"]) / 2 - first["all 0.1"]),
-            ),
-        ),
-        "half-a-dose-saves-less": (
-            "With γ = 0.5 learning saves less than with γ = 1.",
-            f"{of_saved}with γ = 1 more than 1 point more than 0.5",
-            saves("all 1", "all 0.5"),
-        ),
-        "three-quarters-suffice": (
-            "With γ = 0.75 learning saves as much as with γ = 1, to one percentage point of the "
-            "initial solution's ticks.",
-            f"{of_saved}with γ = 0.75 less than 1 point less than with γ = 1",
-            saves("all 0.75", "all 1", -GAIN),
-        ),
-        "earlier-movements-count": (
-            "Credited with later movements alone, learning saves less than with all movements' "
-            "rewards.",
-            f"{of_saved}with γ = 1 more than 1 point more where all movements count than where "
-            "later ones alone do",
-            saves("all 1", "later 1"),
-        ),
-    })  # fmt: skip
+        "half-a-dose-saves-less": saves("all 1", "all 0.5"),
+        "three-quarters-suffice": saves("all 0.75", "all 1", -GAIN),
+        "earlier-movements-count": saves("all 1", "later 1"),
+    }  # fmt: skip
+    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
 
 
 LOOKS = {
@@ -217,4 +179,4 @@ def measure(study):
 
 
 if __name__ == "__main__":
-    write_study(Path(__file__).parent, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)
+    write_study(HERE, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

@@ -11,7 +11,6 @@ import os
 import sys
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more are slower on a machine that others use
 
@@ -210,15 +209,11 @@ def main():
     parser.add_argument("--ticks-per-unit", type=float, help="ticks in a duration of 1")
     parser.add_argument("--implausible", choices=("refuse", "drop"), default="refuse",
                         help="hits that nobody can have made")  # fmt: skip
-    parser.add_argument("--out", help="CSV file for all numbers")
     given = parser.parse_args()
     warnings.showwarning = lambda text, *_: print(printable(f"warning: {text}"), file=sys.stderr)
     warnings.filterwarnings("ignore", "the frame")  # checked by fit again
     try:
         check_noise(given.noise, "--noise")
-        out = Path(given.out or "")
-        if given.out and (out.is_dir() or not os.access(out.parent, os.W_OK)):
-            raise CoarticError(f"--out {out}: name a file, in a folder that may be written")
         task = load_task(given.task)
         condition, files, people = CONDITIONS.get(given.condition), {}, []
         options = {"implausible": given.implausible}
@@ -244,8 +239,6 @@ def main():
         raise SystemExit(2)
     for _, row in table.iterrows():
         print(printable(sentence(row)))
-    if given.out:
-        table.to_csv(given.out, index=False)
 
 
 if __name__ == "__main__":

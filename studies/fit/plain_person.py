@@ -1,18 +1,27 @@
-"""Two simulated people in metres, for the how-to: a simulator that does not use coartic.
+"""Four simulated people in metres, for the how-to: a simulator that does not use coartic.
 
-    python studies/fit/plain_person.py > studies/fit/metres.csv
+    python studies/fit/plain_person.py studies/fit
 
 A right arm (upper arm, forearm, hand) practises four targets of 1 cm. p1 keeps the best trial; p2
 averages: what is kept moves half the way to each better trial, as none of the six models does.
-Recorded are the duration in s (100 control steps) and joint angles with motor noise of 0.005 rad.
+metres.csv has the duration in s (100 control steps) and joint angles with motor noise of 0.005 rad.
+
+m1 and m2, with a file each in markers, keep the best trial, and rest for 50 ms at each target:
+places (m) of shoulder, elbow, wrist and hand, 100 a second, of two sessions, with noise of 0.001 of
+the arm's length; m1's elbow is lost once for 30 ms.
 """
 
 import math
 import random
+import sys
+from pathlib import Path
 
 LINKS, START = (0.33, 0.27, 0.09), (0.6, 1.4, 0.5)
 GOALS, RADIUS = ((0.05, 0.45), (0.25, 0.40), (0.20, 0.25), (-0.05, 0.35)), 0.01
 STEP, GAIN, EXPLORATION, MOTOR = 0.01, 0.05, 0.05, 0.005
+MARKERS = ("right_1", "right_2", "right_3", "right_tip")
+NOISE, REST, GAP, TRIALS = 0.001 * sum(LINKS), 5, range(150, 153), 12
+"""Of recordings of markers."""
 
 
 def places(q):
@@ -79,14 +88,48 @@ def practise(averages, trials, rng):
             yield trial, goal, ticks / 100, [angle + rng.gauss(0, MOTOR) for angle in q], moves
 
 
-def main(trials=100):
-    """Print the recording as CSV."""
-    print("subject,trial,goal,hand,duration,right_1,right_2,right_3")
+def hits(trials):
+    """Yield the lines of the recording of hits."""
+    yield "subject,trial,goal,hand,duration,right_1,right_2,right_3"
     for subject, averages in (("p1", False), ("p2", True)):
         for trial, goal, duration, q, _ in practise(averages, trials, random.Random(subject)):
             angles = ",".join(f"{angle:.3f}" for angle in q)
-            print(f"{subject},{trial},{goal},right,{duration:.2f},{angles}")
+            yield f"{subject},{trial},{goal},right,{duration:.2f},{angles}"
+
+
+def samples(rng):
+    """Yield trial, time (s) and places of the markers (m) of each sample."""
+    q, clock, last = list(START), 0, 1
+    for trial, _, _, _, moves in practise(False, TRIALS, rng):
+        if trial > last:
+            q, clock, last = list(START), 0, trial
+        for steps, end in [*moves, (REST, moves[-1][1])]:
+            for k in range(steps):
+                here = [a + (b - a) * k / max(steps - 1, 1) for a, b in zip(q, end, strict=True)]
+                yield trial, clock / 100, places(here)
+                clock += 1
+            q = end
+
+
+def markers(subject):
+    """Yield the lines of the recording of a person's markers."""
+    rng, noise = random.Random(subject), random.Random(f"{subject} noise")
+    axes = ",".join(f"{name}_{axis}" for name in MARKERS for axis in "xy")
+    yield f"subject,session,trial,time,{axes}"
+    for number, (trial, time, points) in enumerate(samples(rng)):
+        at = [f"{x + noise.gauss(0, NOISE):.4f}" for point in points for x in point]
+        if number in GAP and subject == "m1":
+            at[2:4] = "", ""
+        session = 1 if trial <= TRIALS / 2 else 2
+        yield f"{subject},{session},{trial},{time:.2f},{','.join(at)}"
+
+
+def main(folder, trials=100):
+    """Write the recordings."""
+    files = {f"markers/{subject}": markers(subject) for subject in ("m1", "m2")}
+    for name, lines in {"metres": hits(trials), **files}.items():
+        Path(folder, f"{name}.csv").write_text("\n".join(lines) + "\n", "utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1])

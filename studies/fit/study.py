@@ -42,8 +42,7 @@ def tabulate(people):
     model BIC excludes (``wrong``) and for whom no other model is left (``decided``).
     ``excluded_drift``: largest drift of excluded people, true of the informed and estimated of
     those who keep the best; infinite where others are excluded. ``informed`` of
-    them: correlation, bias (of σ as a share), and coverage of intervals of each parameter;
-    ``kappa_0_cover`` and ``kappa_0_bias`` of people who keep the best and have κ = 0.
+    them: correlation, bias (of σ as a share), and coverage of intervals of each parameter.
     """
     people = people[people.true.isin([*MODELS])]
     pooled = people.assign(group=np.where(people.task.isin(TASKS), "paper", "random"))
@@ -61,7 +60,7 @@ def tabulate(people):
             "right": (of_cell.model == of_cell.true).mean(), "wrong": 1 - np.mean(kept),
             "decided": (of_cell.others == "").mean(), "excluded_drift": drift.max(),
         }  # fmt: skip
-        informed, best = (of_cell[of_cell.true == model] for model in ("informed", "best"))
+        informed = of_cell[of_cell.true == "informed"]
         row["informed"] = len(informed)
         for name in PARAMETERS:
             fitted = informed.dropna(subset=name)
@@ -72,17 +71,10 @@ def tabulate(people):
                 row[f"{name}_r"] = np.corrcoef(truth, value)[0, 1]
                 row[f"{name}_bias"] = (value - truth).mean()
                 row[f"{name}_rmse"] = np.sqrt(((value - truth) ** 2).mean())
-                row[f"{name}_cover"] = covers(fitted, name).mean()
-        row |= {"best": len(best), "kappa_0_bias": best.kappa.mean(),
-                "kappa_0_cover": covers(best, "kappa").mean()}  # fmt: skip
+                low, high = fitted[f"{name}_low"], fitted[f"{name}_high"]
+                row[f"{name}_cover"] = fitted[f"true_{name}"].between(low, high).mean()
         rows[" ".join(map(str, key))] = row
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
-
-
-def covers(people, name):
-    """Return where intervals have the true value of a parameter."""
-    truth = people[f"true_{name}"]
-    return (people[f"{name}_low"] <= truth) & (truth <= people[f"{name}_high"])
 
 
 def answer(people):
@@ -116,22 +108,16 @@ def confuse(people):
     return pd.crosstab(row.rename("row"), people.model).reindex(columns=[*MODELS], fill_value=0)
 
 
-def scatter(people):
-    """Return the parameters of people with 100 complete trials on the paper's tasks."""
-    chosen = people.true.isin(["informed", "best"]) & (people.trials == 100)
-    chosen &= people.task.isin(TASKS) & (people.data == "complete")
-    names = [f"{start}{name}" for name in PARAMETERS for start in ("true_", "")]
-    return people[chosen].sort_values(["task", "repeat", "person"])[["task", "true", *names]]
-
-
 @figures.styled
 def draw(table):
-    """Draw estimates against true values, and the share of right models by trials."""
-    people = pd.read_csv(HERE / "people.csv")
+    """Draw estimates against true values of informed people with 100 complete trials on the paper's
+    tasks, and the share of right models by trials."""
+    informed = pd.read_csv(HERE / "runs.csv.xz").query(
+        "true == 'informed' and trials == 100 and data == 'complete' and task in @TASKS"
+    )
     figure, panels = figures.panels((1, 4), (figures.TWO, 2.1))
     labels = {"sigma": "σ", "epsilon": "ε", "kappa": "κ"}
     for axes, name in zip(panels, PARAMETERS, strict=False):
-        informed = people[people.true == "informed"]
         ends = [informed[f"true_{name}"].min(), informed[f"true_{name}"].max()]
         axes.plot(ends, ends, color=figures.GREY, linewidth=0.6)
         for number, task in enumerate(TASKS):
@@ -163,7 +149,6 @@ def measure(folder):
         "runs": people.sort_values(by).set_index("task"),
         "results": tabulate(people), "confusion": confuse(people),
         "answers": answer(people), "outliers": outliers(people),
-        "people": scatter(people).reset_index(drop=True),
     }  # fmt: skip
 
 

@@ -9,6 +9,7 @@ r"""Is a planner's horizon a number of goals, or a share of those left?
 """
 
 import sys
+import tomllib
 from pathlib import Path
 
 import pandas as pd
@@ -26,6 +27,8 @@ from coartic.analysis import (
     write_study,
 )  # fmt: skip
 
+HERE = Path(__file__).parent
+CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 PLANNER = "receding-horizon"
 OTHERS = [
     "dual-process/EC1", "dual-process/EC4", "cma-es/bandit", "cma-es/goal-by-goal",
@@ -85,10 +88,8 @@ def measure_repeats(study):
 def tabulate(study, plans):
     """Gaps by goals ahead and what each goal gains, then the gaps of other methods, as shares."""
     plans = plans.sort_values(["family", "horizon"], kind="stable")
-    columns = ["gap", "gain", "together", "cpu_s"]
-    planned = means(plans, ["family", "method", "horizon"], columns)
-    planned = planned.drop(columns=["cpu_s_low", "cpu_s_high"])
-    planned = planned.rename(columns={"horizon": "h", "rows": "tasks", "cpu_s": "seconds"})
+    planned = means(plans, ["family", "method", "horizon"], ["gap", "gain", "together"])
+    planned = planned.rename(columns={"horizon": "h", "rows": "tasks"})
     planned.index = planned.family + " h=" + planned.h.astype(str)
     return pd.concat([planned, tabulate_others(study)]).rename_axis("row")
 
@@ -112,23 +113,15 @@ def at(plans, families, h, column):
     return 100 * rows.set_index("task")[column]
 
 
-def fourth_gains(arms, than, gains):
-    """Return the statement, the test and the finding of a claim that the fourth goal ahead gains
-    ``more`` or ``less`` (``than``) than 1 %; ``gains``: per cent, a value for each task."""
-    side = "greater" if than == "more" else "less"
-    return (
-        f"With {arms} the fourth goal ahead of fourteen gains {than} than 1 %.",
-        "one-tailed bootstrap test over random tasks with fourteen goals: from three goals ahead "
-        f"to four the planner gains {than} than 1 % of a mean movement, for each movement that has "
-        "a fourth goal ahead",
-        mean_beyond("The fourth goal ahead gains {} %", gains, GAIN, side),
-    )
+def fourth_gains(gains, side="greater"):
+    """Return the finding that the fourth goal ahead gains more, or with ``side`` less, than 1 %;
+    ``gains``: per cent, a value for each task."""
+    return mean_beyond("The fourth goal ahead gains {} %", gains, GAIN, side)
 
 
-def signed_rank(gains, than):
-    """Return p of a one-tailed signed-rank test that gains, per cent by task, are ``more`` or
-    ``less`` (``than``) than :data:`GAIN`."""
-    side = "greater" if than == "more" else "less"
+def signed_rank(gains, side="greater"):
+    """Return p of a one-tailed signed-rank test that gains, per cent by task, are more or less than
+    :data:`GAIN`."""
     return stats.wilcoxon(gains - GAIN, alternative=side).pvalue
 
 
@@ -152,11 +145,11 @@ def tabulate_fourth(repeats):
     for name, part in parts.items():
         if part.empty:
             continue
-        alone = judge({"more": fourth_gains("two arms", "more", part)})
+        alone = judge({"more": ("", "", fourth_gains(part))})
         rows[name] = {
             "tasks": len(part), "losing": (part < 0).sum(), "median": part.median(),
             **mean(part).columns("gain"),
-            "p": alone.p_holm["more"], "signed_rank_p": signed_rank(part, "more"),
+            "p": alone.p_holm["more"], "signed_rank_p": signed_rank(part),
         }  # fmt: skip
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
@@ -169,51 +162,29 @@ def judge_claims(study, plans, repeats):
              for families, h in ((MANY, 2), (HALF, 1), (HALF, 2))]  # fmt: skip
     nearer = pairs[0] - (pairs[1] + pairs[2]) / 2
     sentence = "Two goals ahead of fourteen gain {} points more than the middle of seven"
-    pairs_test = (
-        "one-tailed bootstrap test over pairs of random tasks, of the same arms and number, one "
-        "with fourteen goals and one with seven: two goals ahead of fourteen gain {} than the "
-        "middle between what one and what two goals ahead gain of seven (together, in per cent of "
-        "a mean movement, for each movement that has them ahead)"
-    )
     learner = study.runs[study.runs.method.str.startswith("dual-process")]
     cma_es = study.runs[study.runs.method == "cma-es/bandit"]
     learner, cma_es = (100 * runs.groupby("task").gap.mean() for runs in (learner, cma_es))
-    claims = judge({
-        "fourth-of-fourteen-gains-little-on-one-arm": fourth_gains("one arm", "less", one),
-        "fourth-of-fourteen-gains-more-on-one-arm": fourth_gains("one arm", "more", one),
-        "fourth-of-fourteen-gains-little-on-two-arms": fourth_gains("two arms", "less", two),
-        "fourth-of-fourteen-gains-more-on-two-arms": fourth_gains("two arms", "more", two),
-        "horizon-is-a-number-of-goals": (
-            "A horizon is a number of goals: two goals ahead of fourteen gain as much as two of "
-            "seven, not as one of seven.",
-            pairs_test.format("more"),
-            mean_beyond(sentence, nearer),
+    findings = {
+        "fourth-of-fourteen-gains-little-on-one-arm": fourth_gains(one, "less"),
+        "fourth-of-fourteen-gains-more-on-one-arm": fourth_gains(one),
+        "fourth-of-fourteen-gains-little-on-two-arms": fourth_gains(two, "less"),
+        "fourth-of-fourteen-gains-more-on-two-arms": fourth_gains(two),
+        "horizon-is-a-number-of-goals": mean_beyond(sentence, nearer),
+        "horizon-is-a-share-of-goals": mean_beyond(sentence, nearer, 0.0, "less"),
+        "learner-behind-no-goal-ahead": mean_beyond(
+            "The learner loses {} points more than the planner",
+            learner - at(plans, MANY, 0, "gap"), GAIN,
         ),
-        "horizon-is-a-share-of-goals": (
-            "A horizon is a share of the goals that are left: two goals ahead of fourteen gain as"
-            " much as one of seven, not as two of seven.",
-            pairs_test.format("less"),
-            mean_beyond(sentence, nearer, 0.0, "less"),
+        "cma-es-behind-one-goal-ahead": mean_beyond(
+            "CMA-ES loses {} points more than the planner",
+            cma_es - at(plans, MANY[:1], 1, "gap"), GAIN,
         ),
-        "learner-behind-no-goal-ahead": (
-            "The learner has a larger gap than the planner without a goal ahead.",
-            "one-tailed bootstrap test over random tasks with fourteen goals: the learner's gap is "
-            "higher by more than 1 %",
-            mean_beyond("The learner loses {} points more than the planner",
-                        learner - at(plans, MANY, 0, "gap"), GAIN),
-        ),
-        "cma-es-behind-one-goal-ahead": (
-            "With one arm CMA-ES has a larger gap than the planner with one goal ahead.",
-            "one-tailed bootstrap test over random tasks with fourteen goals for one arm: the gap "
-            "of CMA-ES is higher by more than 1 %",
-            mean_beyond("CMA-ES loses {} points more than the planner",
-                        cma_es - at(plans, MANY[:1], 1, "gap"), GAIN),
-        ),
-    })  # fmt: skip
-    for name, than in (("little", "less"), ("more", "more")):
+    }  # fmt: skip
+    claims = judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
+    for name, side in (("little", "less"), ("more", "greater")):
         row = f"fourth-of-fourteen-gains-{name}-on-two-arms"
-        claims.loc[row, "test"] += "; and a signed-rank test, p < 0.05 uncorrected"
-        if claims.verdict[row] == "supported" and signed_rank(two, than) >= 0.05:
+        if claims.verdict[row] == "supported" and signed_rank(two, side) >= 0.05:
             claims.loc[row, "verdict"] = "undecided"
     return claims
 
@@ -260,4 +231,4 @@ def measure(study):
 
 
 if __name__ == "__main__":
-    write_study(Path(__file__).parent, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)
+    write_study(HERE, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

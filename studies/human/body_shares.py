@@ -12,14 +12,12 @@ study.py joins with the other effects.
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
-from study import FINDINGS, LEVEL, MODELS, RESAMPLES, by_model, decide, verdict_of
+from study import MODELS, RESAMPLES, SEARCH, columns_of, decide, tabulate_effects
 
 from coartic.analysis import load
 from coartic.estimates import Estimate
 
 TASKS, NAME = ("ascending", "descending"), "body-shares"
-SEARCH = "random search"
 
 
 def postures(study, model):
@@ -58,34 +56,25 @@ def with_interval(sides, joints, level):
 
 def measure_body(study):
     """Return rows of the effects for this finding, as :func:`study.measure_effects` does."""
-    finding, rows = FINDINGS[NAME], []
-    silent, built_in = (by_model(finding[words]) for words in ("silent", "built_in"))
     robot = study.tasks[TASKS[0]].robot
     arm = np.arange(robot.dof)[robot.joints("right")]
     groups = {"base": [0, 1], "shoulder": arm[:1], "elbow": arm[1:2]}
-    level, search = LEVEL / len(finding["tests"]), postures(study, SEARCH)
-    for model in MODELS:
-        ours, tests = ([] if model in silent else postures(study, model)), []
-        for test in finding["tests"]:
-            joints = groups[test["measure"].split()[0]]
-            seen = with_interval([ours], joints, level) if ours else Estimate(np.nan)
-            over = Estimate(np.nan)
-            if ours and model != SEARCH:
-                over = with_interval([ours, search], joints, level)
-            count = min(map(len, ours)) if ours else 0
-            verdict, because = decide(test, seen, over, count and np.inf, silent.get(model, ""))
-            tests.append({
-                "measure": test["measure"], "bound": f"above {test['above']:g}",
-                **seen.columns("value"), "tasks": count, **over.columns("over_random_search"),
-                "of_test": verdict, "because": because,
-            })  # fmt: skip
-        verdict = verdict_of([test["of_test"] for test in tests])
-        judged = {"verdict": verdict, "built_in": built_in.get(model) == verdict}
-        rows += [{"finding": NAME, "model": model, **test, **judged} for test in tests]
-    effects = pd.DataFrame(rows)
-    effects["because"] = effects.pop("because")
-    names = effects.finding + " " + effects.model + " " + effects.measure
-    return effects.set_index(names.rename("row"))
+    search = postures(study, SEARCH)
+
+    def judge(model, test, level, silent):
+        ours = [] if silent else postures(study, model)
+        joints = groups[test["measure"].split()[0]]
+        seen, over = Estimate(np.nan), Estimate(np.nan)
+        if ours:
+            seen = with_interval([ours], joints, level)
+        if ours and model != SEARCH:
+            over = with_interval([ours, search], joints, level)
+        count = min(map(len, ours)) if ours else 0
+        return columns_of(
+            test, seen, over, count, *decide(test, seen, over, count and np.inf, silent)
+        )
+
+    return tabulate_effects([NAME], judge)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import json
 import re
 import sys
 import tomllib
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -24,22 +24,9 @@ from coartic.estimates import Estimate
 
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
-GROUPS, MODELS = FINDINGS.pop("groups"), FINDINGS.pop("models")
+GROUPS, MODELS, FURTHER = (FINDINGS.pop(key) for key in ("groups", "models", "further"))
 """The findings by id, in the order of the table; groups of models by name; models that are compared
-with people, by name: methods with their parameters."""
-FURTHER = {
-    "learner, begun": MODELS["learner"] | {"parameters": {"trials": 100}},
-    "learner, replayed, begun": MODELS["learner, replayed"] | {"parameters": {"trials": 100}},
-    "least acceleration, stopping": MODELS["least acceleration"] | {"parameters": {"stop": 1}},
-    "least jerk, stopping": MODELS["least jerk"] | {"parameters": {"stop": 1}},
-    "any goals ahead": {"method": "receding-horizon"},
-    "random search by hands": {"method": "random-search", "parameters": {"idle_arm": True}},
-    "random search, idle arm still": {"method": "random-search", "parameters": {"idle_arm": False}},
-    "random search, every hand sequence": {"method": "random-search/hands"},
-}
-"""Further models that some measures need: the learner after a hundredth of its practice, plans that
-stop at each goal, all points of the planner's curve, random search with the hands of other models.
-"""
+with people, and further ones that measures need, by name: methods with their parameters."""
 SEARCH = "random search"
 OF_TWO_ARMS = {"first movement against isolated reach", "near-tie repeats"}
 """Measures on tasks for two arms, where random search can have other hands than a model."""
@@ -110,18 +97,10 @@ def of_control(runs, model, measure):
 
 
 def measure_effects(study):
-    """Return the effects, a row for each finding, model and test, in their order, and the values
-    that they are statistics of, by measure, model and task (``sample``: ``model`` or ``control``).
-
-    ``value`` with its interval, of ``tasks``; ``over_random_search``: by how much it exceeds that
-    of random search; ``of_test``, the verdict of the test,
-    and ``verdict``, that of the finding; ``built_in``: it follows from how the model is built;
-    ``because``: why a model is silent, or does not agree though its interval is beyond the bound.
-    """
-    runs, rows = tidy(study), []
-    findings = {name: each for name, each in FINDINGS.items() if name != "body-shares"}
+    """Return the effects (:func:`tabulate_effects`), and the values that they are statistics of, by
+    measure, model and task (``sample``: ``model`` or ``control``)."""
+    runs, used = tidy(study), {}
     of_model = cache(lambda measure, model: MEASURES[measure][0](runs, model))
-    used = {}
 
     def measured(measure, model):
         """Return the values of a model and of its control, by task."""
@@ -132,12 +111,28 @@ def measure_effects(study):
         used[measure, model, "control"] = control if model != SEARCH else control[:0]
         return used[measure, model, "model"], used[measure, model, "control"]
 
-    for name, finding in findings.items():
+    findings = [name for name in FINDINGS if name != "body-shares"]
+    effects = tabulate_effects(findings, partial(judge_test, measured))
+    values = pd.concat({key: pd.DataFrame(each) for key, each in used.items()}, names=VALUE_KEYS)
+    return effects, values.reset_index()
+
+
+def tabulate_effects(findings, judge):
+    """Return the effects, a row for each finding, model and test, in their order. ``judge``:
+    function of model, test, level and why the model is silent that returns the columns of a test.
+
+    ``value`` with its interval, of ``tasks``; ``over_random_search``: by how much it exceeds that
+    of random search; ``of_test``, the verdict of the test,
+    and ``verdict``, that of the finding; ``built_in``: it follows from how the model is built;
+    ``because``: why a model is silent, or does not agree though its interval is beyond the bound.
+    """
+    rows = []
+    for name in findings:
+        finding = FINDINGS[name]
         silent, built_in = (by_model(finding.get(words, {})) for words in ("silent", "built_in"))
         level = LEVEL / len(finding["tests"])
         for model in MODELS:
-            tests = [judge_test(measured, model, test, level, silent.get(model, ""))
-                     for test in finding["tests"]]  # fmt: skip
+            tests = [judge(model, test, level, silent.get(model, "")) for test in finding["tests"]]
             verdict = verdict_of([test["of_test"] for test in tests])
             judged = {"verdict": verdict, "built_in": built_in.get(model) == verdict}
             rows += [{"finding": name, "model": model, **test, **judged} for test in tests]
@@ -145,8 +140,7 @@ def measure_effects(study):
     effects["because"] = effects.pop("because")  # the last column
     bounds = effects.bound.where(effects.duplicated(["finding", "model", "measure"]), "")
     names = effects.finding + " " + effects.model + " " + effects.measure + " " + bounds
-    values = pd.concat({key: pd.DataFrame(each) for key, each in used.items()}, names=VALUE_KEYS)
-    return effects.set_index(names.str.strip().rename("row")), values.reset_index()
+    return effects.set_index(names.str.strip().rename("row"))
 
 
 def by_model(words):
@@ -155,21 +149,26 @@ def by_model(words):
 
 
 def judge_test(measured, model, test, level, silent):
-    """Apply one test of a finding to a model; return its columns of :func:`measure_effects`.
+    """Apply one test of a finding to a model; return its columns (:func:`columns_of`).
     ``measured``: function of measure and model that returns values of the model and its control;
     ``level``: of the interval, two-sided; ``silent``: why nothing follows for the model, or empty.
     """
-    name, word = test["measure"], "above" if "above" in test else "below"
-    bound, statistic = test[word], MEASURES[name][1]
-    values, control = (pd.Series(), pd.Series()) if silent else measured(name, model)
+    statistic = MEASURES[test["measure"]][1]
+    values, control = (pd.Series(), pd.Series()) if silent else measured(test["measure"], model)
     seen, over = bootstrap([values], statistic, level), Estimate(np.nan)
     tasks = seen.n[0]
     if tasks and len(control):
         over = bootstrap([values, control], statistic, level)
-    verdict, because = decide(test, seen, over, tasks, silent)
+    return columns_of(test, seen, over, tasks, *decide(test, seen, over, tasks, silent))
+
+
+def columns_of(test, seen, over, tasks, verdict, because):
+    """Return the columns of a test, as :func:`tabulate_effects` has them."""
+    word = "above" if "above" in test else "below"
     return {
-        "measure": name, "bound": f"{word} {bound:g}", **seen.columns("value"), "tasks": tasks,
-        **over.columns("over_random_search"), "of_test": verdict, "because": because,
+        "measure": test["measure"], "bound": f"{word} {test[word]:g}", **seen.columns("value"),
+        "tasks": tasks, **over.columns("over_random_search"), "of_test": verdict,
+        "because": because,
     }  # fmt: skip
 
 
@@ -257,22 +256,13 @@ def draw(table):
 
 
 def measure(study):
-    """Return the tables by name; each becomes a CSV file."""
+    """Return the tables by name; each becomes a CSV file. ``runs`` has values by task; verdicts are
+    also on finding body-shares."""
     effects, values = measure_effects(study)
-    return {"results": tabulate(effects), "effects": effects, "values": values}
-
-
-def main(folder=None):
-    """Measure a folder, if one is given; join finding body-shares; write all."""
-    body = pd.read_csv(HERE / "body.csv", index_col=0).fillna({"because": ""})
-    tables = measure(load(folder)) if folder else {}
-    if tables:
-        tables["results"] = tabulate(pd.concat([tables["effects"], body]))
-        tables.pop("values").to_csv(
-            HERE / "values.csv.xz", float_format="%.6g", index=False, lineterminator="\n"
-        )
-    write_study(HERE, tables, draw)
+    body = pd.read_csv(HERE / "body.csv", index_col=0)
+    results = tabulate(pd.concat([effects, body]))
+    return {"results": results, "effects": effects, "runs": values.set_index("measure")}
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    write_study(HERE, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

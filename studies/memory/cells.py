@@ -81,7 +81,7 @@ def groups_of(cells, measure):
 
 def measure_contexts(study):
     """Tabulate the posture difference at the first goal of both one-armed tasks of the paper, with
-    the mean gain on both, by method, trials and stages."""
+    the mean gain on both, by label of the method."""
     rows = {}
     runs = measure_runs(study)
     runs = runs[runs.task.isin(("ascending", "descending"))]
@@ -89,12 +89,7 @@ def measure_contexts(study):
         if of.task.nunique() == 2:
             both = (study.executed(task, label) for task in ("ascending", "descending"))
             contexts = TwoContexts(*both, 1, "right")
-            first = of.iloc[0]
             rows[label] = {
-                "name": first["name"],
-                "trials": first.trials,
-                "stages": first.get("stages", 0),
-                "keep": first.get("keep", ""),
                 "runs": len(of) // 2,
                 "gain": of.groupby("task").gain.mean().mean(),
                 "distance": contexts.posture_difference,

@@ -5,6 +5,8 @@ import pandas as pd
 from cells import MEASURES
 from scales import drawn
 
+from coartic.estimates import Estimate
+
 
 def at_equal_gain(cells):
     """Return each cell's signatures next to the learner's where the learner gains as much,
@@ -53,9 +55,8 @@ def tabulate_equal(cells):
                     ("difference", (mine - learner).mean(), differences),
                     ("ratio", mine.sum() / learner.sum(), ratios),
                 ):
-                    low, high = np.quantile(each, [0.025, 0.975])
-                    column = f"{measure}_{word}"
-                    row |= {column: value, f"{column}_low": low, f"{column}_high": high}
+                    ends = np.quantile(each, [0.025, 0.975])
+                    row |= Estimate(value, *ends).columns(f"{measure}_{word}")
                 row[f"{measure}_tasks"] = len(pairs)
             rows[f"{group} {name} {stages}"] = row
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")

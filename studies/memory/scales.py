@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 from cells import KEEPS, MEASURES, groups_of
 
+from coartic.estimates import Estimate
+
 BOUNDS = {"gain": 5.0, "first": 2.0, "arm": 2.0, "other arm": 0.1}
 """Differences that count as none, set on development instances before any test instance ran."""
 STAGES = [1, 2, 4, 10, 30, 100, 1_000]
@@ -40,30 +42,26 @@ class Scale:
         families = self.table.index.get_level_values("group").to_series(index=self.table.index)
         # Families weigh the same, whatever the number of their tasks.
         weights = 1 / families.groupby(families).transform("size") / families.nunique()
-        values = self.table[[*self.stages, "learner"]].to_numpy(float)
-        places = drawn(families)
-        self.means = dict(zip(self.table[[*self.stages, "learner"]], weights @ values, strict=True))
+        columns = [*self.stages, "learner"]
+        values, places = self.table[columns].to_numpy(float), drawn(families)
+        self.means = pd.Series(weights @ values, columns)
         resampled = np.einsum("bt,btc->bc", weights.to_numpy()[places], values[places])
-        self.resampled = dict(zip(self.means, resampled.T, strict=True))
+        self.resampled = pd.DataFrame(resampled, columns=columns)
         self.families = families
-
-    def __len__(self):
-        return len(self.table)
 
     def difference(self, first, second, coverage=0.95):
         """Return the mean of a column less that of another, with its interval."""
-        of = self.resampled[first] - self.resampled[second]
         tail = (1 - coverage) / 2
-        ends = np.quantile(of, [tail, 1 - tail])
-        return float(self.means[first] - self.means[second]), *map(float, ends)
+        ends = np.quantile(self.resampled[first] - self.resampled[second], [tail, 1 - tail])
+        return Estimate(self.means[first] - self.means[second], *ends)
 
     def level(self, bound):
         """Return the least number of stages from which on the 90 % interval of the difference to
         the largest number stays within ± bound; the largest if it does from nowhere."""
         least = self.stages[-1]
         for stages in self.stages[-2::-1]:
-            _, low, high = self.difference(stages, self.stages[-1], 0.9)
-            if not -bound < low <= high < bound:
+            of = self.difference(stages, self.stages[-1], 0.9)
+            if not -bound < of.low <= of.high < bound:
                 break
             least = stages
         return least
@@ -71,15 +69,11 @@ class Scale:
     def place(self):
         """Return the number of stages at which the mean is the learner's, interpolated over log r,
         infinite beyond the scale and 1 below it, with its 95 % interval."""
-        scale = np.array([self.resampled[stages] for stages in self.stages]).T
-        found = [
-            first_crossing(self.stages, *each)
-            for each in zip(scale, self.resampled["learner"], strict=True)
-        ]
-        mean = first_crossing(
-            self.stages, [self.means[stages] for stages in self.stages], self.means["learner"]
+        mean, *found = (
+            first_crossing(self.stages, values, learner)
+            for *values, learner in np.vstack([self.means, self.resampled])
         )
-        return mean, *map(float, np.quantile(found, [0.025, 0.975], method="inverted_cdf"))
+        return Estimate(mean, *np.quantile(found, [0.025, 0.975], method="inverted_cdf"))
 
     def slopes(self):
         """Return the slope of each task by log10 of the stages, family as a factor."""
@@ -114,50 +108,52 @@ def first_crossing(stages, scale, value):
 def where(scale, bound):
     """Return where the learner is: ``level``, ``above`` or ``below`` the largest number of stages
     by more than the bound, or ``open``."""
-    _, low, high = scale.difference("learner", scale.stages[-1], 0.9)
-    if -bound < low <= high < bound:
+    of = scale.difference("learner", scale.stages[-1], 0.9)
+    if -bound < of.low <= of.high < bound:
         return "level"
-    return "above" if low > bound else "below" if high < -bound else "open"
+    return "above" if of.low > bound else "below" if of.high < -bound else "open"
 
 
-def tabulate_scales(cells):
+def every_scale(cells):
+    """Return the scales by measure, group of families and content of memory."""
+    return {
+        (measure, group, keep): Scale(cells, measure, keep, families)
+        for measure in MEASURES
+        for group, families in groups_of(cells, measure).items()
+        for keep in KEEPS
+    }
+
+
+def tabulate_scales(scales):
     """Tabulate for each family, content of memory and measure: the trend, the least number of
     stages at the level, and the learner's place."""
     rows = {}
-    for measure, bound in BOUNDS.items():
-        for group, families in groups_of(cells, measure).items():
-            for keep in KEEPS:
-                scale = Scale(cells, measure, keep, families)
-                row = {"group": group, "keep": keep, "measure": measure, "tasks": len(scale)}
-                for name, value in {
-                    "rise": scale.difference(MOST, 1),
-                    "place": scale.place(),
-                    "beyond_one": scale.difference("learner", 1),
-                    "beyond_level": scale.difference("learner", MOST),
-                }.items():
-                    row |= dict(zip([name, f"{name}_low", f"{name}_high"], value, strict=True))
-                row |= {"level": scale.level(bound), "where": where(scale, bound)}
-                rows[f"{group} {keep} {measure}"] = row
+    for (measure, group, keep), scale in scales.items():
+        row = {"group": group, "keep": keep, "measure": measure, "tasks": len(scale.table)}
+        for name, value in {
+            "rise": scale.difference(MOST, 1),
+            "place": scale.place(),
+            "beyond_one": scale.difference("learner", 1),
+            "beyond_level": scale.difference("learner", MOST),
+        }.items():
+            row |= value.columns(name)
+        row |= {"level": scale.level(BOUNDS[measure]), "where": where(scale, BOUNDS[measure])}
+        rows[f"{group} {keep} {measure}"] = row
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
 
-def tabulate(cells):
+def tabulate(scales):
     """Tabulate both scales and the learner: means over tasks, and by how much they exceed random
     search in one part, by family and over all."""
     rows = {}
-    for measure in MEASURES:
-        for group, families in groups_of(cells, measure).items():
-            for keep in KEEPS:
-                scale = Scale(cells, measure, keep, families)
-                for column in scale.means:
-                    name = "learner" if column == "learner" else keep
-                    row = rows.setdefault(f"{group} {name} {column}".removesuffix(" learner"), {})
-                    row |= {"group": group, "name": name}
-                    row |= {"stages": np.nan if name == "learner" else column}
-                    row |= {"tasks": row.get("tasks", len(scale))}
-                    value = scale.difference(column, 1)
-                    names = [f"{measure}_more{end}" for end in ("", "_low", "_high")]
-                    row |= {measure: scale.means[column]} | dict(zip(names, value, strict=True))
+    for (measure, group, keep), scale in scales.items():
+        for column, mean in scale.means.items():
+            name = "learner" if column == "learner" else keep
+            row = rows.setdefault(f"{group} {name} {column}".removesuffix(" learner"), {})
+            row |= {"group": group, "name": name}
+            row |= {"stages": np.nan if name == "learner" else column}
+            row |= {"tasks": row.get("tasks", len(scale.table)), measure: mean}
+            row |= scale.difference(column, 1).columns(f"{measure}_more")
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
 
@@ -170,12 +166,8 @@ def tabulate_keeping(cells):
             of = cells[cells.group.isin(families) & (cells.stages == MOST)]
             table = of.pivot_table(measure, ["group", "task"], "name").dropna()
             more = (table.targets - table.postures).sort_index()
-            low, high = np.quantile(
-                more.to_numpy()[drawn(more.index.get_level_values(0).to_series())].mean(axis=1),
-                [0.025, 0.975],
-            )
-            rows[f"{group} {measure}"] = {
-                "group": group, "measure": measure, "tasks": len(more),
-                "more": more.mean(), "more_low": low, "more_high": high,
-            }  # fmt: skip
+            places = drawn(more.index.get_level_values(0).to_series())
+            ends = np.quantile(more.to_numpy()[places].mean(axis=1), [0.025, 0.975])
+            key = {"group": group, "measure": measure, "tasks": len(more)}
+            rows[f"{group} {measure}"] = key | Estimate(more.mean(), *ends).columns("more")
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")

@@ -13,30 +13,71 @@ weight it. All tests and intervals resample tasks within families, which weigh t
 """
 
 import sys
+import tomllib
+from dataclasses import replace
 from pathlib import Path
 
-import pandas as pd
-from cells import KEEPS, MEASURES, measure_cells, measure_contexts, measure_runs
+from cells import KEEPS, MEASURES, groups_of, measure_cells, measure_contexts, measure_runs
 from equal_gain import tabulate_equal
-from predictions import judge_claims
-from scales import tabulate, tabulate_keeping, tabulate_scales
+from scales import BOUNDS, MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
 
-from coartic.analysis import figures, load, write_study
+from coartic.analysis import all_of, figures, judge, load, mean_beyond, write_study
+
+HERE = Path(__file__).parent
+CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 
 
-def tabulate_methods(cells):
-    """Tabulate means over tasks of each method by family, over all, and on the paper's tasks."""
-    drawn_tasks = cells[cells.task.str.contains("/")]
-    every = pd.concat([drawn_tasks.assign(group="all"), cells])
-    keys = ["group", "name", "trials", "stages"]
-    table = every.groupby(keys, sort=False)[[*MEASURES]].mean()
-    table.insert(0, "tasks", every.groupby(keys, sort=False).size())
-    table = table.reset_index()
-    table.index = [
-        f"{row.group} {row.name_} {row.trials:g} {row.stages}"
-        for row in table.rename(columns={"name": "name_"}).itertuples()
-    ]
-    return table.rename_axis("row")
+def judge_claims(cells, scales):
+    """The predictions, as they were registered before any test instance was run."""
+    postures, targets = ({measure: scales[measure, "all", keep] for measure in MEASURES}
+                         for keep in KEEPS)  # fmt: skip
+    signatures = [measure for measure in MEASURES if measure != "gain"]
+    words = {measure: label.partition(" (")[0] for measure, label in MEASURES.items()}
+
+    def rises(kept):
+        return all_of(*(
+            mean_beyond(f"{words[measure]} by {{}} for each factor of ten", scale.slopes())
+            for measure, scale in kept.items()
+        ))  # fmt: skip
+
+    def within(values, measure):
+        bound = BOUNDS[measure]
+        above = mean_beyond(f"{words[measure]} {{}}", values, -bound)
+        both = all_of(above, mean_beyond("{}", values, bound, "less"))
+        return replace(both, evidence=above.evidence)
+
+    def same(first, second, measures, which=postures):
+        return all_of(*(
+            within(which[measure].more(first, second), measure) for measure in measures
+        ))  # fmt: skip
+
+    families = [name for name in groups_of(cells, "gain")["all"] if name != "long"]
+    but_long = {"gain": Scale(cells, "gain", "postures", families)}
+    both = {measure: targets[measure].by_task(
+        (targets[measure].table[MOST] - postures[measure].table[MOST]).dropna()
+    ) for measure in MEASURES}  # fmt: skip
+    findings = {
+        "rises-with-postures": rises(postures),
+        "rises-with-targets": rises(targets),
+        "level-from-a-hundred": same(100, MOST, MEASURES),
+        "learner-at-the-level": same("learner", MOST, signatures),
+        "learner-gains-the-level": same("learner", MOST, ["gain"], but_long),
+        "targets-gain-more": mean_beyond("gain {} ticks", both["gain"], BOUNDS["gain"]),
+        "targets-slow-more": mean_beyond(
+            "first movement slower by {} ticks", both["first"], BOUNDS["first"]
+        ),
+        "targets-pass-the-learner": mean_beyond(
+            "gain {} ticks", targets["gain"].more(30, "learner")
+        ),
+        "one-place": all_of(*(
+            finding for measure in MEASURES for finding in (
+                mean_beyond(f"{words[measure]} {{}} above ten",
+                            targets[measure].more("learner", 10)),
+                mean_beyond("{} below a hundred", targets[measure].more(100, "learner")),
+            )
+        )),
+    }  # fmt: skip
+    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
 
 
 @figures.styled
@@ -69,17 +110,17 @@ def draw(results):
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
     cells = measure_cells(measure_runs(study))
+    scales = every_scale(cells)
     return {
         "cells": cells,
-        "results": tabulate(cells),
-        "scales": tabulate_scales(cells),
+        "results": tabulate(scales),
+        "scales": tabulate_scales(scales),
         "keeping": tabulate_keeping(cells),
         "equal": tabulate_equal(cells),
-        "methods": tabulate_methods(cells),
         "contexts": measure_contexts(study),
-        "claims": judge_claims(cells),
+        "claims": judge_claims(cells, scales),
     }
 
 
 if __name__ == "__main__":
-    write_study(Path(__file__).parent, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)
+    write_study(HERE, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)

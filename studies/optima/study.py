@@ -18,20 +18,20 @@ BOUNDS = {
     "within_20": "within 20 %", "instances": "farther",
 }  # fmt: skip
 """Columns of the table that the figure shows, each with its label."""
-EFFORT = ["seconds", "nodes"]
 
 
 def distances(folder):
     """Return the distance of each bound from the best known reward, per cent of it, by task, with
-    the effort that a folder has on it."""
+    the seconds that a folder has on it."""
     entries = [entry for key, entry in shipped.read().items() if key[1:] == shipped.FREE]
     bounds = pd.DataFrame(entries).set_index("task")[["hands", "reward", "bound"]]
     bounds["distance"] = 100 * (bounds.bound - bounds.reward) / -bounds.reward
     bounds["family"] = bounds.index.str.extract("(.*)/", expand=False)
-    log = pd.DataFrame(shipped.read_log(folder), columns=["task", *EFFORT, "base", "other_arm"])
+    log = pd.DataFrame(shipped.read_log(folder), columns=["task", "seconds", "base", "other_arm"])
     log = log.query("base == 'task' and other_arm == 'free'")
-    effort = log.groupby("task")[EFFORT].sum()
-    return bounds.assign(goals=bounds.pop("hands").str.len()).join(effort)
+    return bounds.assign(
+        goals=bounds.pop("hands").str.len(), seconds=log.groupby("task").seconds.sum()
+    )
 
 
 def count(bounds):
@@ -46,9 +46,7 @@ def count(bounds):
         "instances": len(group),
         "proven": (group.distance == 0).sum(),
         **{f"within_{most}": (group.distance <= most).sum() for most in (1, 5, 20)},
-        "median": group.distance.median(),
         "seconds": group.seconds.sum(),
-        "per_second": group.nodes.sum() / max(group.seconds.sum(), 1.0),
     }) for name, group in groups.items()}).T  # fmt: skip
     return table.rename_axis("row")
 
@@ -56,7 +54,10 @@ def count(bounds):
 def tabulate(folder):
     """Return the tables: counts, and the tasks that are open."""
     bounds = distances(folder)
-    return {"results": count(bounds), "open": bounds[~(bounds.distance <= 5)].drop(columns=EFFORT)}
+    return {
+        "results": count(bounds),
+        "open": bounds[~(bounds.distance <= 5)].drop(columns="seconds"),
+    }
 
 
 @figures.styled

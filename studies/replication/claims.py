@@ -15,7 +15,6 @@ import performance
 import postures
 from reader import MissingError, Reader
 
-from coartic import load_task
 from coartic.analysis import judge
 from coartic.analysis.judging import Finding
 
@@ -24,6 +23,8 @@ CLAIMS = pd.DataFrame.from_dict(
     tomllib.loads((HERE / "claims.toml").read_text("utf-8")), orient="index"
 ).fillna({"fitted": False, "short": ""})
 """A row for each claim, as ``claims.toml`` explains."""
+SETS = pd.read_csv(HERE / "sets.csv")
+"""Number of sets of goals, consistent with the paper's text, that support and refute a claim."""
 RULES = postures.RULES | hands.RULES | performance.RULES | families.RULES
 """Rules that say whether claims replicate, by id."""
 BEYOND = postures.BEYOND | hands.BEYOND | families.BEYOND
@@ -31,7 +32,7 @@ BEYOND = postures.BEYOND | hands.BEYOND | families.BEYOND
 COLUMNS = [
     *("statement", "replicates", "evidence", "test", "p_holm", "opposite_p_holm"),
     *("more_than_one_selection", "evidence_beyond", "test_beyond", "p_beyond", "opposite_p_beyond"),
-    *("sets", "place", "quote", "suite", "run_ids"),
+    *("place", "quote", "suite", "run_ids"),
 ]
 
 
@@ -39,9 +40,8 @@ def judge_claims(study, names):
     """Judge claims by a folder: whether each *replicates*, and is *more than one selection* among
     as many trials (empty for claims that need no comparison with random search).
 
-    P-values are corrected over the claims of a group among ``names``. ``sets``: the number of sets
-    of goals that support and refute the claim; ``suite``: empty for a claim for which the folder
-    lacks runs or tasks; ``run_ids`` of the runs that both verdicts read.
+    P-values are corrected over the claims of a group among ``names``. ``suite``: empty for a claim
+    for which the folder lacks runs or tasks; ``run_ids`` of the runs that both verdicts read.
     """
     names, claims = [*names], CLAIMS.loc[[*names]]
     judged, read = judge_rules(study, names, RULES, claims.test)
@@ -57,7 +57,6 @@ def judge_claims(study, names):
     return judged.assign(
         statement=judged.statement + claims.fitted.map({True: " †", False: ""}),
         replicates=judged.verdict.mask(goals, "depends on the goals"),
-        sets=[*map(sets_in_words, names)],
         place=claims.place,
         quote=claims.quote,
         suite=[study.suite if name in read else "" for name in names],
@@ -80,17 +79,3 @@ def judge_rules(study, names, rules, tests):
         for _, group in CLAIMS.loc[names].groupby("group", sort=False)
     ]
     return pd.concat([judge({}), *judged]).loc[names], run_ids
-
-
-SETS = pd.read_csv(HERE / "sets.csv")
-"""Number of sets of goals, consistent with the paper's text, that support and refute a claim."""
-
-
-def sets_in_words(name):
-    """Say how many sets of goals support a claim; empty for a claim on published goals."""
-    words = [
-        f"{row.supported} of {row.members} ({load_task(row.task).label}"
-        f"{f', refuted in {row.refuted}' * (row.refuted > 0)})"
-        for row in SETS[SETS.claim == name].itertuples()
-    ]
-    return "; ".join(words) or "not counted" * CLAIMS.fitted[name]

@@ -5,8 +5,8 @@
 
 The folder of suite ``comparison`` comes first; claims for which it has no runs are judged by the
 folders that follow, of suites ``ablations`` and ``families``. Writes tables, figures and page.html
-into the folder ``--out``; without it, the tables without ids of runs, the figures and README.md
-into this folder. Without folders: figures and page, of the stored tables.
+into the folder ``--out``; without it, which needs all three, the tables without ids of runs, the
+figures and README.md into this folder. Without folders: figures and page, of the stored tables.
 """
 
 import argparse
@@ -46,13 +46,6 @@ def judge_by_first(studies):
     return first
 
 
-def with_stored(claims):
-    """Return claims with the stored ones in place of claims for which there were no runs."""
-    lacking = claims.index[claims.suite == ""]
-    stored = pd.read_csv(HERE / "claims.csv", index_col=0).reindex(lacking)
-    return pd.concat([claims.drop(lacking), stored]).reindex(CLAIMS.index)
-
-
 def rank(verdicts):
     """Return the places of a column of verdicts in :data:`VERDICTS`."""
     return verdicts.map(VERDICTS.index)
@@ -87,11 +80,9 @@ def main():
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
     tables = measure(asked.folders) if asked.folders else {}
-    if tables and asked.out == HERE:
-        tables["claims"] = with_stored(tables["claims"])
-        tables = {name: table.drop(columns="run_ids", errors="ignore")
-                  for name, table in tables.items()}  # fmt: skip
     for name, table in tables.items():
+        if asked.out == HERE:
+            table = table.drop(columns="run_ids", errors="ignore")
         table.to_csv(asked.out / f"{name}.csv", float_format="%.6g", lineterminator="\n")
     write(asked.out)
 

@@ -5,17 +5,19 @@ python studies/tell-apart/study.py results/tell-apart
 """
 
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from announced import HALF, with_shares
-from changes import AFTER
-from people import NOISE
+from announced import DISTANCES, HALF, with_shares
+from protocols import AFTER, NOISE
 from scipy import stats
 
 from coartic.analysis import all_of, figures, judge, mean_beyond, means, write_study
 
+HERE = Path(__file__).parent
+CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 EXPERIMENTS = 2000
 
 
@@ -65,72 +67,42 @@ def judge_claims(shares, starts, steps):
     shares = shares[shares.distance == 0.5].pivot(index="task", columns="model")  # noqa: PD010
     ratio = starts.pivot_table("ratio", "task", ["model", "trials"])
     same, kept = (steps.pivot_table(name, "task", "model") for name in ("same", "kept"))
-    rule = "one-tailed bootstrap test over test tasks, goals moved by half a link: "
-    return judge({
-        "learner-takes-hundreds-of-trials": (
-            "The learner needs more than 100 trials for half of the shift.",
-            rule + "mean of the logarithm of the trials above 2",
-            mean_beyond("The logarithm is {}", shares["half"]["learner"], 2),
+    at_once = shares["share_1"]["learner, informed"]
+    findings = {
+        "learner-takes-hundreds-of-trials": mean_beyond(
+            "The logarithm is {}", shares["half"]["learner"], 2
         ),
-        "shift-is-of-the-change": (
-            "Less than half of the learner's shift is there without a change.",
-            rule + "the shift of as much practice without a change, projected, below 0.5",
-            mean_beyond("The share is {}", shares["drift"]["learner"], HALF, "less"),
+        "shift-is-of-the-change": mean_beyond(
+            "The share is {}", shares["drift"]["learner"], HALF, "less"
         ),
-        "informed-learner-between": (
-            "A learner whose corrective process uses the next goal shifts in part at once.",
-            rule + "share at once above 0.1 and below 0.9",
-            all_of(
-                mean_beyond("The share is {}", shares["share_1"]["learner, informed"], 0.1),
-                mean_beyond("it is {}", shares["share_1"]["learner, informed"], 0.9, "less"),
-            ),
+        "informed-learner-between": all_of(
+            mean_beyond("The share is {}", at_once, 0.1),
+            mean_beyond("it is {}", at_once, 0.9, "less"),
         ),
-        "planner-shift-is-seen": (
-            "The shift of a planner is larger than the noise of a trial.",
-            rule + "root mean square shift of the planner with all goals in view above 0.1, twice "
-            "the noise of a joint",
-            mean_beyond("The shift is {}", shares["shift"]["planner, all goals"], 2 * NOISE),
+        "planner-shift-is-seen": mean_beyond(
+            "The shift is {}", shares["shift"]["planner, all goals"], 2 * NOISE
         ),
-        "learner-ends-where-learning-anew-ends": (
-            "After the change the learner ends where learners of the changed task end.",
-            rule + "logarithm of its distance to them over that between them below 0.1",
-            mean_beyond("The logarithm is {}", shares["from_anew"]["learner"], 0.1, "less"),
+        "learner-ends-where-learning-anew-ends": mean_beyond(
+            "The logarithm is {}", shares["from_anew"]["learner"], 0.1, "less"
         ),
-        "learner-ends-as-well": (
-            "The learner's final number of ticks is as good.",
-            rule + "less than 2 % more ticks than learning anew",
-            mean_beyond("It needs {} % more", shares["gap"]["learner"], 2, "less"),
+        "learner-ends-as-well": mean_beyond(
+            "It needs {} % more", shares["gap"]["learner"], 2, "less"
         ),
-        "starts-keep-learners-apart": (
-            "Learners from different starts stay apart when tested from a third, and after as much "
-            "practice from there.",
-            "one-tailed bootstrap test over test tasks: mean logarithm of the distance between "
-            "groups over that within above 0.1 (a ratio of 1.26), at once and after 10,000 trials",
-            all_of(
-                mean_beyond("At once the logarithm is {}", ratio["learner", 1], 0.1),
-                mean_beyond("after practice it is {}", ratio["learner", 10_000], 0.1),
-            ),
+        "starts-keep-learners-apart": all_of(
+            mean_beyond("At once the logarithm is {}", ratio["learner", 1], 0.1),
+            mean_beyond("after practice it is {}", ratio["learner", 10_000], 0.1),
         ),
-        "signs-tell-no-planner": (
-            "Step directions separate the learner from a random walk, not from a noisy planner.",
-            "one-tailed bootstrap tests over test tasks: the learner's share of equal signs "
-            "is above the planner's by less than 0.02, and below the walk's by more than 0.1",
-            all_of(
-                mean_beyond("The learner has {} more than the planner",
-                            same.learner - same.planner, 0.02, "less"),
-                mean_beyond("the walk {} more than the learner", same.walk - same.learner, 0.1),
-            ),
+        "signs-tell-no-planner": all_of(
+            mean_beyond("The learner has {} more than the planner",
+                        same.learner - same.planner, 0.02, "less"),
+            mean_beyond("the walk {} more than the learner", same.walk - same.learner, 0.1),
         ),
-        "best-trials-are-kept": (
-            "After its best trial so far the learner stays there, the planner does not.",
-            "one-tailed bootstrap tests over test tasks: of the deviation of the best trial so far "
-            "the next keeps more than 0.5, and less than 0.3 (less what it keeps of others)",
-            all_of(
-                mean_beyond("The learner keeps {}", kept.learner, 0.5),
-                mean_beyond("the planner {}", kept.planner, 0.3, "less"),
-            ),
+        "best-trials-are-kept": all_of(
+            mean_beyond("The learner keeps {}", kept.learner, 0.5),
+            mean_beyond("the planner {}", kept.planner, 0.3, "less"),
         ),
-    })  # fmt: skip
+    }  # fmt: skip
+    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
 
 
 def people_needed(learner, planner, noise, items, planned, rng):
@@ -167,19 +139,21 @@ def find_power(shares, starts, steps):
     ratio = starts[(starts.model == "learner") & (starts.trials == 1)]
     apart = np.sqrt(np.median(ratio.between / ratio.within) - 1)  # of groups, in RMS within pairs
     person = steps.groupby("model")[["same", "kept"]].agg(["mean", "std"])
-    cases = {}
-    for distance in (0.25, 0.5, 1.0):
-        planned = shares[(shares.distance == distance) & (shares.model == "planner, all goals")]
+
+    def of_change(distance, model, words=""):
+        planned = shares[(shares.distance == distance) & (shares.model == model)]
         noise = NOISE * np.sqrt(1.05) / planned["shift"].quantile(0.25)
-        cases |= {f"change {distance:g}, {k} goals": (0, 1, noise, k) for k in (1, 4)}
+        return {f"change {distance:g}, {k} goals{words}": (0, 1, noise, k) for k in (1, 4)}
+
+    cases = {}
+    for distance in DISTANCES:
+        cases |= of_change(distance, "planner, all goals")
     cases["start"] = 1, 0, np.sqrt(2) / apart, 1
     records = round(steps.records[steps.model == "learner"].mean())
     for name, items in (("same", 400), ("kept", records)):
         (a, spread), (b, other) = person.loc["learner", name], person.loc["planner", name]
         cases[f"step {name}"] = a, b, max(spread, other) * np.sqrt(items), items
-    ahead = shares[(shares.distance == 0.5) & (shares.model == "planner, next goal")]
-    noise = NOISE * np.sqrt(1.05) / ahead["shift"].quantile(0.25)
-    cases |= {f"change 0.5, {k} goals, one goal ahead": (0, 1, noise, k) for k in (1, 4)}
+    cases |= of_change(0.5, "planner, next goal", ", one goal ahead")
     rows = {
         name: {"learner": case[0], "planner": case[1], "noise": case[2] / np.sqrt(case[3]),
                **{f"people_{kind}": people_needed(*case, planned, rng) for kind, planned in
@@ -226,4 +200,4 @@ def measure(folder):
 
 
 if __name__ == "__main__":
-    write_study(Path(__file__).parent, measure(sys.argv[1]) if sys.argv[1:] else {}, draw)
+    write_study(HERE, measure(sys.argv[1]) if sys.argv[1:] else {}, draw)

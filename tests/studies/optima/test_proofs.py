@@ -15,12 +15,11 @@ from scipy.spatial import KDTree
 from coartic import PAPER, corrective_trial, execute, load_task
 from coartic.motion.solution import Movement, hand_sequences
 from coartic.robot import directions
-from coartic.tasks.task import hands_of, letters_of
+from coartic.tasks.task import hands_of
 from tests.support.processes import programs
 from tests.support.strategies import (
     UNEVEN,
     changed,
-    make_trials,
     steps_from,
     tiny_task,
     uneven_task,
@@ -309,40 +308,3 @@ def test_no_hand_is_faster_than_the_fastest(locked):
     for hand in task.hands:
         norms = np.linalg.norm(UNEVEN.jacobian(q, hand) * moving, ord=2, axis=(1, 2))
         assert SPEED.fastest_hand(task, hand) == pytest.approx(norms.max(), rel=1e-12)
-
-
-def on_a_circle(start, angles):
-    """Both hands on one circle about a locked base, which each follows with a joint of its own."""
-    links, shoulder = [1.0], [0.0, 0.0]
-    return tiny_task(
-        robot={"left_links": links, "right_links": links,
-               "left_shoulder": shoulder, "right_shoulder": shoulder},
-        locked_base=["x", "y"],
-        start={"left": [start], "right": [0.0]},
-        goals=directions(angles).round(6).tolist(),
-        radius=0.02,
-        initial_hands="best-of-all",
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_nothing_takes_fewer_ticks_than_the_distances_say(seed):
-    """All hand sequences, and the idle arm anywhere between where it was and will be."""
-    rng = np.random.default_rng(seed)
-    angles, start = rng.uniform(-1, 1, 3), rng.uniform(-1, 1)
-    task, ratios = on_a_circle(start, angles), []
-    for hands in itertools.product(task.hands, repeat=3):
-        targets = np.tile(task.q0, (500, 3, 1))
-        for hand, joint in (("left", 2), ("right", 3)):
-            used = [g for g in range(3) if hands[g] == hand]
-            targets[:, used, joint] = angles[used]
-            for g in set(range(3)) - set(used):
-                before = targets[:, g - 1, joint] if g else task.q0[joint]
-                after = angles[min((u for u in used if u > g), default=g)]
-                ahead = rng.random(500) * any(u > g for u in used)
-                targets[:, g, joint] = before + ahead * (after - before)
-        trials = make_trials(task, letters_of(hands), targets)
-        best = trials.ticks[trials.completed].min()
-        ratios.append(SPEED.least_ticks(task, hands) / best)
-        assert ratios[-1] <= 1.0
-    assert max(ratios) > 0.8  # one hand goes as fast as it can; a chord is shorter than its arc

@@ -601,9 +601,6 @@ def test_every_sentence_is_accounted_for():
 
 
 def test_sets_of_goals_are_of_claims_that_rest_on_them():
-    words = [claims.sets_in_words(claim) for claim in ("arm-coarticulation", "context", "rail")]
-    assert words[0].startswith("224 of 242 (Two-armed 1, refuted in 6); ")
-    assert words[1:] == ["", "not counted"]
     judged = {*claims.SETS.claim} & {*claims.CLAIMS.index}
     assert len(judged) > 8
     assert claims.CLAIMS.fitted[[*judged]].all()

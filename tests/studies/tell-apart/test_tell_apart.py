@@ -10,7 +10,7 @@ from coartic.tasks.task import hands_of
 from tests.support.processes import ROOT, programs
 from tests.support.reference import correct, execute
 
-study, changes, steps = programs("tell-apart", "study", "changes", "steps")
+study, protocols = programs("tell-apart", "study", "protocols")
 
 
 def test_tables_and_figure_of_some_of_the_tasks(monkeypatch, tmp_path):
@@ -35,7 +35,7 @@ def test_tables_and_figure_of_some_of_the_tasks(monkeypatch, tmp_path):
 
 
 def test_learner_that_is_logged_is_the_papers():
-    postures, rewards = steps.series(load_task("one-armed/v1/d000"), "learner", 7)
+    postures, rewards = protocols.series(load_task("one-armed/v1/d000"), "learner", 7)
     run = learn("one-armed/v1/d000", "EC1", seed=7, trials=len(rewards))
     assert rewards.tolist() == run.rewards.tolist()
     best = postures[run.best_trial]
@@ -49,12 +49,12 @@ def corrected(task, q, hand, goal):
 @pytest.mark.parametrize("name", ["one-armed/v1/i002", "two-armed/v1/i001"])
 def test_share_at_once_by_other_code(monkeypatch, name):
     """By the step-by-step reference, one movement after the other."""
-    monkeypatch.setattr(changes, "AFTER", [1, 100])
-    monkeypatch.setattr(changes, "PLANNERS", {})
-    task, practised = load_task(name), learn(name, changes.condition(load_task(name)), seed=0)
-    cases = [case for case in changes.moves(task, 0) if case[1] == 0.5]
+    monkeypatch.setattr(protocols, "AFTER", [1, 100])
+    monkeypatch.setattr(protocols, "PLANNERS", {})
+    task, practised = load_task(name), learn(name, protocols.condition(load_task(name)), seed=0)
+    cases = [case for case in protocols.moves(task, 0) if case[1] == 0.5]
     hands = hands_of(practised.hands)
-    rows = [row for row in changes.change_goals(task, 0) if row["distance"] == 0.5]
+    rows = [row for row in protocols.change_goals(task, 0) if row["distance"] == 0.5]
     for n, (g, _, after) in enumerate(cases):
         run = learn(after, practised.condition, seed=1, trials=100, start=practised.solution)
         before, first, end = (
