@@ -87,7 +87,7 @@ class OptimumSearch(Method):
             },
             "solves": plans.solves,
             "failed_solves": plans.failed,
-            "sequences_planned": len(plans.by_hands),
+            "sequences_planned": len(plans.ranked),
         }
         return Result(best.movements, details)
 

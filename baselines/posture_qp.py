@@ -184,7 +184,6 @@ class GoalsAhead(CurrentGoal):
     title = "Posture QP, goals ahead"
     citation = Control.citation + CITATION_AHEAD
     information = CurrentGoal.information | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("coarticulation: posture at the next goal",)
     goals_ahead = 2
 
 

@@ -215,7 +215,6 @@ class SquaredDisplacement(TrajectoryOptimisation):
         "approach."
     )
     information = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("sum of squared joint displacements",)
     cost = "squared-displacement"
 
 
@@ -229,7 +228,6 @@ class Acceleration(TrajectoryOptimisation):
         "confirmed mathematical model. Journal of Neuroscience (there: jerk)."
     )
     information = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("minimum joint acceleration",)
     cost: ClassVar[Cost] = "acceleration"
     Parameters = SmoothParameters
 
@@ -243,7 +241,6 @@ class Jerk(Acceleration):
         "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
         "confirmed mathematical model. Journal of Neuroscience."
     )
-    secondary = ("minimum joint jerk",)
     cost: ClassVar[Cost] = "jerk"
     Parameters = JerkParameters
 
@@ -257,7 +254,6 @@ class HandJerk(Jerk):
         "two-armed-2: least time between goals, and weight of joint jerk, where weights from 0.001 "
         "to 10 end at -349 to -399 (shipped: -393); else random tasks"
     )
-    secondary = ("minimum jerk of the hand",)
     cost = "hand-jerk"
     Parameters = HandJerkParameters
 

@@ -353,16 +353,14 @@ def _hand_jerks(
     return casadi.vertcat(*integrals)
 
 
+@lru_cache(maxsize=32)
 def trajectory_problem(
     robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
 ) -> TrajectoryProblem:
     """Return the compiled problem for a robot, hands to choose from, a number of goals and a cost;
     a process keeps the 32 problems used last."""
     with _ONE_AT_A_TIME:
-        return _built(robot, hands, goals, cost)
-
-
-_built = lru_cache(maxsize=32)(TrajectoryProblem)
+        return TrajectoryProblem(robot, hands, goals, cost)
 
 
 def segment_lengths(configurations: Array) -> Array:

@@ -93,8 +93,10 @@ def test_every_sequence_keeps_the_best(method):
     rewards = {}
     for hands in itertools.product(task.hands, repeat=2):
         session = Session(task, 0, method.information, trusted=True)
-        alone = method().search(PostureController(session, task, 20), [hands])
-        rewards[hands] = execute(task, alone.solution).reward
+        alone, aims = PostureController(session, task, 20), (Aim(hands[0], 0), Aim(hands[1], 1))
+        first = alone.leg(None, aims[: 1 + method.goals_ahead])
+        solution = first.movement, alone.leg(first, aims[1:]).movement
+        rewards[hands] = execute(task, solution).reward
     result, execution, _ = solve(method, task, period=20)
     chosen = tuple(movement.hand for movement in result.solution)
     assert execution.reward == max(rewards.values()) == rewards[chosen]
