@@ -28,7 +28,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.internal.limits import brief_value, check_limits, real_array
-from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
 from coartic.motion.batch import (
@@ -77,9 +76,6 @@ class MoveResult(NamedTuple):
     evaluations: int
     """Forward-kinematics evaluations: on a path (:func:`follow`) as many as ticks."""
 
-    def __repr__(self) -> str:
-        return short_repr(self, ticks=self.ticks, hit=self.hit, q=self.q)
-
 
 class Correction(NamedTuple):
     """Result of the corrective process (:func:`correct`)."""
@@ -91,9 +87,6 @@ class Correction(NamedTuple):
     """True if the hand is at the goal, as near as ``MotionModel.correction_tolerance``."""
     iterations: int
     """Iterations made, each with one Jacobian."""
-
-    def __repr__(self) -> str:
-        return short_repr(self, converged=self.converged, iterations=self.iterations, q=self.q)
 
 
 @inner
@@ -590,18 +583,12 @@ def explain_failure(
     square = float(reaches @ reaches)
     if np.abs(slopes).max() <= 1e-12 * math.sqrt(square) * math.hypot(*error):
         return ": the arm is straight and points at the goal; bend it"
-    arm_alone = model.gain * square
-    if _SLOW <= (largest := arm_alone + model.gain * bool(free)) < 2.0:
+    if _SLOW <= (largest := model.gain * (square + bool(free))) < 2.0:
         return ""
-    if largest < _SLOW:
-        factor = float(math.ceil(math.sqrt(1.0 / arm_alone)))
-        what = f"below {_SLOW:g} the descent is slow; multiply all lengths by {factor:g}"
-    else:
-        factor = math.ceil(10.0 * math.sqrt(arm_alone / (2.0 - model.gain * bool(free)))) / 10
-        what = f"above 2 the descent can be unstable; divide all lengths by {factor:g}"
     return (
-        f": gain × |J|² of the stretched arm is {largest:.3g}, and {what}, those of links, goals "
-        "and radius"
+        f": gain × |J|² of the stretched arm is {largest:.3g}; below {_SLOW:g} the descent is slow "
+        "and above 2 it can be unstable: multiply all lengths, those of links, goals and radius, "
+        f"by {1.0 / math.sqrt(model.gain * square):.2g}"
     )
 
 
@@ -687,11 +674,6 @@ def _check_arm(robot: Any, hand: Any) -> None:
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
     """Return the centre of a goal, x and y, as two floats. Raises ValueError if it is not two
     finite numbers within ±100,000, or if ``radius`` is not from 0 to 100,000, length unit."""
-    place = real_array("goal", centre)
-    if place.shape != (2,):
-        raise ValueError(f"goal is {brief_value(centre)}; it must be two numbers, x and y")
-    x, y = place.tolist()
-    if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):
-        raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST_ENTRY:g}")
+    x, y = finite_array("goal", centre, (2,)).tolist()
     check_limits("radius", radius, 0.0, LARGEST_ENTRY)
     return x, y
