@@ -11,13 +11,20 @@ Hand sequences are planned from the cheapest chains of posture graphs; the plan 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.posture_graph import BEAM_WIDTH, Count, HandSequence, Nodes, cheapest_chains
+from coartic.baselines.posture_graph import (
+    BEAM_WIDTH,
+    QUICK,
+    Count,
+    HandSequence,
+    Nodes,
+    cheapest_chains,
+)
 from coartic.baselines.trajectory_problem import (
     MODEL_BASED,
     Cost,
@@ -29,7 +36,7 @@ from coartic.baselines.trajectory_problem import (
 )
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.motion.movement import follow
+from coartic.motion.movement import follow, segment_lengths
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
@@ -106,7 +113,7 @@ class TrajectoryOptimisation(Method):
     stochastic = False
     tuned_on = "random tasks"
     Parameters = TrajectoryParameters
-    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 1}
+    quick = QUICK | {"most_sequences": 1}
 
     def solve(self, session: Session) -> Result:
         """Plan for each hand sequence of :meth:`starts`, and return the movements of the plan with
@@ -279,8 +286,7 @@ def path_movements(
         )
         session.spend(forward_kinematics=followed.evaluations)
         paths.append(Movement(goal + 1, hand, "path", ahead[-1], waypoints=ahead))
-        steps = np.diff(np.vstack([here, ahead]), axis=0)
-        ends = np.cumsum(np.sqrt((steps**2).sum(axis=1)))
+        ends = np.cumsum(segment_lengths(np.vstack([here, ahead])))
         steps_made = followed.ticks - 1
         here, rest = followed.q, ahead[ends > steps_made * session.model.step]
     return tuple(paths)

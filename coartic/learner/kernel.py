@@ -25,7 +25,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.learner.conditions import ExplorationCondition
-from coartic.motion.batch import Batch, RobotRecord, RunRecord, arm_of, batch_for, load, width_of
+from coartic.motion.batch import (
+    Batch,
+    RobotRecord,
+    RunRecord,
+    arm_of,
+    batch_for,
+    load,
+    squared_distance,
+    width_of,
+)
 from coartic.motion.compile import (
     entry,
     fill_row,
@@ -237,9 +246,7 @@ def _nearest_posture(
         load(batch.at[0], 0, n, run, arm_of(robot, hand))
         correct_slots(batch, 1, robot)
         workspace.counts[n, ITERATIONS] += run.iterations
-        square = 0.0
-        for j in range(len(run.q)):
-            square += (run.target[j] - run.q[j]) ** 2
+        square = squared_distance(run)
         if run.converged and square < least:
             nearest, least = hand, square
     fill_row(run.target, run.q)
