@@ -124,7 +124,7 @@ def test_postures_make_the_way_through_all_discs_shortest(name):
     """A local minimum of the reward's own metric: a general solver finds nothing shorter near."""
     task = load_task(name)
     aims = tuple(Aim("right", goal) for goal in range(len(task.goals)))
-    postures = controller(task).find_postures(task.q0, aims, {})
+    postures = [*controller(task).begin(task.q0, aims, None).values()]
     steps = steps_from(task.q0, postures)
     hands, every = ["right"] * len(aims), np.ones(steps.shape, bool)
     shortest = least_cost(task, hands, every, [steps.ravel()], radius=task.radius)

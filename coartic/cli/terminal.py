@@ -37,13 +37,12 @@ codecs.register_error("replaced", _replaced)
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
     """Print lines on ``stream``, by default standard output, and then ``end``; characters that do
-    not print, such as line breaks in names, and characters that the terminal lacks are replaced.
-    Raises CoarticError if standard output cannot be written, BrokenPipeError if the reader of
-    ``stream`` has ended; if another stream cannot be written, the lines are lost."""
+    not print, such as line breaks in names, are replaced; streams replace characters that the
+    terminal lacks (:func:`coartic.cli.main`). Raises CoarticError if standard output cannot be
+    written, BrokenPipeError if the reader of ``stream`` has ended; if another stream cannot be
+    written, the lines are lost."""
     stream = stream or sys.stdout
-    encoding = getattr(stream, "encoding", None) or "utf-8"
     text = "\n".join(map(one_line, lines)).replace("\u202f", " ")
-    text = text.encode(encoding, "replaced").decode(encoding)
     try:
         print(text, file=stream, end=end, flush=True)
     except BrokenPipeError:
