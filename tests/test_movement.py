@@ -24,9 +24,9 @@ from coartic import (
 )
 from coartic.baselines.corrective_alone import BestHands
 from coartic.method import MethodError, Session
-from coartic.motion.compile import entry, joint_lever
+from coartic.motion.compile import chain_by, entry, joint_lever
 from coartic.motion.movement import clear_steps, largest_square
-from coartic.motion.trigonometry import joint_chain
+from coartic.motion.trigonometry import cosine, sine
 from coartic.robot import HANDS
 from tests.support import reference
 from tests.support.strategies import TIED, UNEVEN, configurations
@@ -178,7 +178,7 @@ def _by_steps(q, arm, goal, gain, tolerance, most, xs, ys):
     """The descent with the cosine that knows any angle, one evaluation after the other."""
     tip = len(arm.links)
     for iteration in range(most):
-        joint_chain(q, arm, xs, ys)
+        chain_by(q, arm, xs, ys, cosine, sine)
         error_x, error_y = goal[0] - xs[tip], goal[1] - ys[tip]
         if math.sqrt(error_x * error_x + error_y * error_y) <= tolerance:
             return iteration

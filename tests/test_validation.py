@@ -548,7 +548,6 @@ def test_only_findings_are_joined(wrong):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: mean([1.0, 2.0], resamples=-1), "resamples is -1; it should be at least 1"),
         (
             lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)),
             "goal is .*; it .* without True",

@@ -109,13 +109,13 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """Return a sentence that no ``kind``, such as ``task``, is called ``name``, with the nearest of
     ``names`` (:func:`did_you_mean`), or, if no name is near, with all names, or the first 12 of
-    more than 13; for a file of another program return a sentence that coartic does not read it."""
+    more; for a file of another program return a sentence that coartic does not read it."""
     if isinstance(name, str) and (words := foreign_file(name)):
         return f"{words}."
     several = list(names)
-    shown = len(several) if len(several) <= _MOST_NAMED + 1 else _MOST_NAMED
-    more = f" and {counted(len(several) - shown, 'other')}" if len(several) > shown else ""
-    known = f". Known: {', '.join(several[:shown])}{more}."
+    others = len(several) - _MOST_NAMED
+    more = f" and {counted(others, 'other')}" if others > 0 else ""
+    known = f". Known: {', '.join(several[:_MOST_NAMED])}{more}."
     hint = (did_you_mean(name, several) if isinstance(name, str) else "") or known
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 

@@ -36,6 +36,7 @@ from coartic.motion.batch import (
     width_of,
 )
 from coartic.motion.compile import (
+    chain_by,
     entry,
     fill_row,
     generator_at,
@@ -63,7 +64,7 @@ from coartic.motion.trial import (
     set_off,
 )
 from coartic.motion.trial import aim as aim_at
-from coartic.motion.trigonometry import joint_chain
+from coartic.motion.trigonometry import cosine, sine
 from coartic.robot import HANDS, Array, Configs, Hands, Points
 from coartic.tasks.task import Task
 
@@ -222,7 +223,7 @@ def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _
     """Return the distance of a hand (0 left, 1 right) of a run from the centre of its goal, length
     unit; add 1 to the run's ``evaluations``."""
     arm = arm_of(robot, hand)
-    joint_chain(run.q, arm, workspace.xs, workspace.ys)
+    chain_by(run.q, arm, workspace.xs, workspace.ys, cosine, sine)
     run.evaluations += 1
     tip = len(arm.links)
     dx = run.goal[0] - workspace.xs[tip]
@@ -322,7 +323,7 @@ def drift(
     x, y, v = workspace.jacobian
     arm = arm_of(robot, run.hand)
     tip = len(arm.links)
-    joint_chain(run.target, arm, workspace.xs, workspace.ys)
+    chain_by(run.target, arm, workspace.xs, workspace.ys, cosine, sine)
     for j in range(len(run.q)):
         x[j], y[j], v[j] = 0.0, 0.0, 0.0
         k = j - arm.first
