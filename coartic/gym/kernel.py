@@ -16,8 +16,8 @@ from coartic.motion.trial import (
     MOVE,
     account,
     begin,
-    correct_runs,
     find_corrections,
+    make_corrections,
     move_runs,
     set_off,
 )
@@ -120,7 +120,8 @@ def _step_lot(count: int, robot: RobotRecord, state: VectorState) -> None:
     move_runs(count, robot, batch)
     for i in range(count):
         state.accounts[i].moved = batch.runs[i].ticks
-    correct_runs(count, robot, batch)
+    find_corrections(count, robot, batch)
+    make_corrections(count, robot, batch)
     for i in range(count):
         n, goal = state.indices[i], state.accounts[i]
         account(batch.runs[i], goal.moved, goal)

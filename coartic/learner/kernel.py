@@ -56,8 +56,8 @@ from coartic.motion.trial import (
     CompiledTask,
     account,
     begin,
-    correct_runs,
     count_goal,
+    find_corrections,
     find_pulled_corrections,
     make_corrections,
     move_runs,
@@ -416,10 +416,10 @@ def make_trial(
             if batch.runs[n].action == MOVE:
                 fill_row(trial[n, number].target, batch.runs[n].target)
         if first or learner.pull == 0.0:
-            correct_runs(runs, robot, batch)
+            find_corrections(runs, robot, batch)
         else:
             find_pulled_corrections(runs, robot, batch)
-            make_corrections(runs, robot, batch)
+        make_corrections(runs, robot, batch)
         for n in range(runs):
             account(batch.runs[n], trial[n, number].moved, trial[n, number])
             count_goal(trial[n, number], counts[n])

@@ -143,19 +143,11 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 
 
 @inlined
-def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Correct missed goals of the first ``count`` runs of a batch, in place: phase 4, *correct*.
-    ``target`` of a run for which **A** acts becomes the configuration in which **A** ends;
-    ``ticks`` of each run become the ticks of its corrective movement, 0 if none is made."""
-    find_corrections(count, robot, batch)
-    make_corrections(count, robot, batch)
-
-
-@inlined
 def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Move each of the first ``count`` runs of a batch for which **A** converged, in place, towards
-    its ``target``, the configuration that **A** found. The movement ends as soon as the hand is in
-    the goal, or at the target."""
+    """Move each of the first ``count`` runs of a batch for which **A** converged
+    (:func:`find_corrections`), in place, towards its ``target``, the configuration that **A**
+    found: phase 4, *correct*. The movement ends as soon as the hand is in the goal, or at the
+    target. ``ticks`` of each run become the ticks of this movement, 0 if none is made."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -320,7 +312,8 @@ def _reach_lot(
             move_runs(count, robot, batch)
             for i in range(count):
                 goals[first + i, g, m].moved = batch.runs[i].ticks
-        correct_runs(count, robot, batch)
+        find_corrections(count, robot, batch)
+        make_corrections(count, robot, batch)
         for i in range(count):
             n, moved = first + i, 0
             for m in range(goals.shape[2]):
