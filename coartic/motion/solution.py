@@ -105,7 +105,9 @@ class Execution:
     def __repr__(self) -> str:
         names = ("hands", "reward", "ticks", "corrections")
         facts = {name: getattr(self, name) for name in names}
-        return short_repr(self, **facts | ({"reason": self.reason} if self.reason else {}))
+        facts |= {"reason": self.reason} if self.reason else {}
+        alone = goals_without_target(self.movements)
+        return short_repr(self, **facts | ({"goals_without_target": alone} if alone else {}))
 
     @property
     def completed(self) -> bool:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from coartic.errors import TaskError
 from coartic.internal.limits import brief_value
-from coartic.internal.text import unknown
+from coartic.internal.text import foreign_file, unknown
 from coartic.tasks.families import instance, is_family, shipped_families
 from coartic.tasks.task import Task, read_task, shipped_tasks
 
@@ -52,6 +52,8 @@ def load_task(name_or_path: str | Path) -> Task:
             f"task is {brief_value(name_or_path)}; it must be a task, the name of one, such as "
             "'ascending', or the path of a task file"
         )
+    if words := foreign_file(str(name_or_path)):
+        raise TaskError(words)
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
         if is_family(str(name_or_path)):
             raise TaskError(
