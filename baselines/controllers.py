@@ -19,7 +19,7 @@ from pydantic import Field
 
 from coartic import Movement, Task
 from coartic.baselines.cascade import Solution, solve_cascade
-from coartic.baselines.posture_graph import KINEMATICS, HandSequence
+from coartic.baselines.posture_graph import KINEMATICS
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
 from coartic.motion.movement import follow
 from coartic.motion.trial import changes_of_hand
@@ -199,21 +199,15 @@ class Control(Method):
 
     def solve(self, session: Session) -> Result:
         """Simulate the control of all hand sequences as far as they can be best; return the paths,
-        a movement for each goal, of the sequence that hits every goal in the fewest ticks. Raises
-        MethodError if the hand gets stuck in all sequences, or the solver fails."""
+        a movement for each goal, of the sequence that hits every goal in the fewest ticks, with
+        counts of the search as details; of equal sequences the one with the fewest changes of hand,
+        then the first. The sequence with the fewest ticks so far is extended by the path to its
+        next goal until such a sequence is complete. Raises MethodError if the hand gets stuck in
+        all sequences, or the solver fails."""
         task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = self.controller(session, task, self.parameters.period)
         ordered = [hand for hand in HANDS if hand in task.hands]
-        with session.solving():
-            candidates = list(itertools.product(ordered, repeat=len(task.goals)))
-            return self.search(controller, candidates)
-
-    def search(self, controller: Controller, candidates: list[HandSequence]) -> Result:
-        """Return the paths, a movement for each goal, of the candidate (hand sequence) that takes
-        the fewest ticks under ``controller``, with counts of the search as details; of equal
-        candidates the candidate with the fewest changes of hand, then the first. The candidate with
-        the fewest ticks so far is extended by the path to its next goal until such a candidate is
-        complete. Raises MethodError if the hand gets stuck in all, or if the solver fails."""
+        candidates = list(itertools.product(ordered, repeat=len(task.goals)))
         heap: list[tuple[int, int, int, tuple[Leg, ...]]] = [
             (0, changes_of_hand(letters_of(hands)), index, ())
             for index, hands in enumerate(candidates)
@@ -221,31 +215,32 @@ class Control(Method):
         heapq.heapify(heap)
         legs: dict[Any, Leg | _StuckError] = {}  # sequences share their beginnings
         stuck: list[_StuckError] = []
-        while heap:
-            ticks, changes, index, path = heapq.heappop(heap)
-            hands, goal = candidates[index], len(path)
-            if goal == len(hands):
-                steps, level_1, level_2 = np.sum([leg.steps for leg in path], axis=0).tolist()
-                details = {
-                    "sequences": len(candidates),
-                    "stuck_sequences": len(stuck),
-                    "simulated_movements": len(legs),
-                    "solves": controller.solves,
-                    "control_steps": steps,
-                    "level_1_binds": level_1,
-                    "level_2_binds": level_2,
-                }
-                return Result(tuple(leg.movement for leg in path), details)
-            aims = tuple(Aim(hand, g) for g, hand in enumerate(hands))
-            plan = tuple(aims[g : g + 1 + self.goals_ahead] for g in range(goal + 1))
-            if plan not in legs:
-                try:
-                    legs[plan] = controller.leg(path[-1] if path else None, plan[-1])
-                except _StuckError as error:
-                    legs[plan] = error
-            leg = legs[plan]
-            if isinstance(leg, _StuckError):
-                stuck.append(leg)
-            else:
-                heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*path, leg)))
+        with session.solving():
+            while heap:
+                ticks, changes, index, path = heapq.heappop(heap)
+                hands, goal = candidates[index], len(path)
+                if goal == len(hands):
+                    steps, level_1, level_2 = np.sum([leg.steps for leg in path], axis=0).tolist()
+                    details = {
+                        "sequences": len(candidates),
+                        "stuck_sequences": len(stuck),
+                        "simulated_movements": len(legs),
+                        "solves": controller.solves,
+                        "control_steps": steps,
+                        "level_1_binds": level_1,
+                        "level_2_binds": level_2,
+                    }
+                    return Result(tuple(leg.movement for leg in path), details)
+                aims = tuple(Aim(hand, g) for g, hand in enumerate(hands))
+                plan = tuple(aims[g : g + 1 + self.goals_ahead] for g in range(goal + 1))
+                if plan not in legs:
+                    try:
+                        legs[plan] = controller.leg(path[-1] if path else None, plan[-1])
+                    except _StuckError as error:
+                        legs[plan] = error
+                leg = legs[plan]
+                if isinstance(leg, _StuckError):
+                    stuck.append(leg)
+                else:
+                    heapq.heappush(heap, (ticks + leg.ticks, changes, index, (*path, leg)))
         raise MethodError("infeasible", str(stuck[0]))

@@ -38,15 +38,11 @@ class GivenHands(Method):
         return Result(execution.movements)
 
 
-class BestHands(Method):
+class BestHands(GivenHands):
     """The corrective process with every hand sequence; the best sequence is kept."""
 
     name = "corrective-alone/best-hands"
-    tuned_on = GivenHands.tuned_on
     title = "Corrective process alone, best hands"
-    citation = GivenHands.citation
-    information = GivenHands.information
-    stochastic = False
 
     def why_not(self, task: Outline) -> str | None:
         """Return a sentence that a task has more than 4096 hand sequences; else None."""

@@ -94,7 +94,6 @@ class LeastMotion(Control):
     version = 2
     tuned_on = "nothing"
     title = "Prioritised null-space QP, least motion"
-    secondary = ("least joint changes",)
     controller = HandController
 
 
@@ -108,7 +107,6 @@ class NextGoalPosture(LeastMotion):
         Information.SECONDARY_OBJECTIVES,
         Information.CORRECTIVE_PROCESS,
     }
-    secondary = ("coarticulation: posture at the next goal",)
     controller = NextGoalController
     goals_ahead = 1
 

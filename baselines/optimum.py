@@ -12,12 +12,12 @@ of its own.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from coartic import Task, TaskError, parse_task
-from coartic.baselines.posture_graph import Count, Nodes, cheapest_chains
+from coartic.baselines.posture_graph import QUICK, Count, Nodes, cheapest_chains
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Method, MethodError, Parameters, Result, Session
@@ -57,7 +57,7 @@ class OptimumSearch(Method):
     information = REWARD_INFORMATION
     stochastic = False
     Parameters = OptimumParameters
-    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
+    quick = QUICK
 
     def solve(self, session: Session) -> Result:
         """Search for the shortest path over hand sequences (at most 64 a graph), round plans to
@@ -87,7 +87,7 @@ class OptimumSearch(Method):
             },
             "solves": plans.solves,
             "failed_solves": plans.failed,
-            "sequences_planned": len(plans.by_hands),
+            "sequences_planned": len(plans.ranked),
         }
         return Result(best.movements, details)
 

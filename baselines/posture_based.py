@@ -99,7 +99,6 @@ class OneGoal(PostureBased):
 
     name = "posture-based/one-goal"
     title = "Posture-based planning, one goal at a time"
-    secondary = ("least cost of travel to the posture",)
     horizon = 1
 
 
@@ -108,7 +107,6 @@ class TwoGoals(PostureBased):
 
     name = "posture-based/two-goals"
     title = "Posture-based planning, one goal ahead"
-    secondary = ("least cost of travel to the posture and on to the next one",)
     horizon = 2
 
 

@@ -36,6 +36,8 @@ Count = Annotated[int, Field(ge=1)]
 BEAM_WIDTH = 64
 """Most hand sequences that are planned for each graph: all sequences of two hands for up to six
 goals; of more sequences those with which a beam search of this width over the goals ends."""
+QUICK = {"nodes": 40, "graphs": 1, "chains": 1}
+"""Parameters of a planner for a check in seconds."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
 _NEAR = 2.0  # length unit: from farther away the base carries the hand there first

@@ -78,9 +78,23 @@ class PostureController(Controller):
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
         """Return a posture ``(dof,)``, sought to hit the goal, for each of ``aims`` (hand and
-        goal), by aim, for the movement from configuration ``q``; a posture that ``memory`` has for
-        an aim is taken over, and moved on if there are several aims (:meth:`find_postures`)."""
-        return dict(zip(aims, self.find_postures(q, aims, memory or {}), strict=True))
+        goal), by aim, for the movement from configuration ``q``. A posture that ``memory`` has for
+        an aim is taken over; any other is sought by descent from the posture of the aim before, the
+        first from ``q``. With several aims all are then moved to shorten the path from ``q``
+        through them. A search that does not converge ends after 400 steps."""
+        earlier, postures = memory or {}, list[Array]()
+        for aim in aims:
+            before = postures[-1] if postures else q
+            posture, change = earlier.get(aim, before), np.inf
+            for _ in range(_POSTURE_STEPS if aim not in earlier else 0):
+                posture, change = self.step_nearer(posture, before, aim)
+                if change <= _POSTURE_TOLERANCE:
+                    break
+            postures.append(posture)
+        for _ in range(_POSTURE_STEPS if len(aims) > 1 else 0):
+            if self.sweep(q, aims, postures) <= _POSTURE_TOLERANCE:
+                break
+        return dict(zip(aims, postures, strict=True))
 
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array], first: bool
@@ -99,27 +113,6 @@ class PostureController(Controller):
         preferred = path / (steps * self.length)
         solution = self.solve(self.length * rows, outside - shrunk, preferred)
         return solution, preferred, dict(zip(aims, postures, strict=True))
-
-    def find_postures(
-        self, q: Array, aims: tuple[Aim, ...], earlier: dict[Aim, Array]
-    ) -> list[Array]:
-        """Return a posture ``(dof,)``, sought to hit its goal, for each aim, in their order. A
-        posture in ``earlier`` is taken over; any other is sought by descent from the posture of the
-        aim before, the first from ``q``. With several aims all are then moved to shorten the path
-        from ``q`` through them. A search that does not converge ends after 400 steps."""
-        postures: list[Array] = []
-        for aim in aims:
-            before = postures[-1] if postures else q
-            posture, change = earlier.get(aim, before), np.inf
-            for _ in range(_POSTURE_STEPS if aim not in earlier else 0):
-                posture, change = self.step_nearer(posture, before, aim)
-                if change <= _POSTURE_TOLERANCE:
-                    break
-            postures.append(posture)
-        for _ in range(_POSTURE_STEPS if len(aims) > 1 else 0):
-            if self.sweep(q, aims, postures) <= _POSTURE_TOLERANCE:
-                break
-        return postures
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
         """Replace each of ``postures``, one for each aim (hand and goal), in place, by a posture a
@@ -184,7 +177,6 @@ class GoalsAhead(CurrentGoal):
     title = "Posture QP, goals ahead"
     citation = Control.citation + CITATION_AHEAD
     information = CurrentGoal.information | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("coarticulation: posture at the next goal",)
     goals_ahead = 2
 
 

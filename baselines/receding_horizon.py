@@ -18,21 +18,22 @@ no such loss: it adds up the plans before the rounding, from where the robot sto
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
 from coartic import Movement
-from coartic.baselines.posture_graph import Count, Nodes, cheapest_chains
+from coartic.baselines.posture_graph import QUICK, Count, Nodes, cheapest_chains
 from coartic.baselines.shortest_paths import (
     REWARD_INFORMATION,
     ShortestPlans,
     fewest_ticks,
     shortest_plans,
 )
-from coartic.baselines.trajectory_problem import segment_lengths, trajectory_problem
+from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Method, Parameters, Result, Session
+from coartic.motion.movement import segment_lengths
 from coartic.robot import BASE_DOF, HANDS
 from coartic.tasks.task import MOST_GOALS, Start
 
@@ -70,7 +71,7 @@ class RecedingHorizon(Method):
     information = REWARD_INFORMATION
     stochastic = False
     Parameters = RecedingHorizonParameters
-    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1}
+    quick = QUICK
 
     def solve(self, session: Session) -> Result:
         """Plan the movements to the goals in view, keep the first, and plan again from its end;

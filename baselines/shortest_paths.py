@@ -25,15 +25,10 @@ REWARD_INFORMATION = MODEL_BASED | {Information.REWARD_FORMULA}
 class ShortestPlans(NamedTuple):
     """The plans found from many starts."""
 
-    by_hands: dict[HandSequence, PathPlan]
-    """The shortest plan of each hand sequence for which a solve converged."""
+    ranked: list[PathPlan]
+    """The shortest plan of each hand sequence for which a solve converged, the shortest first."""
     solves: int  # one for each start
     failed: int  # solves that did not converge
-
-    @property
-    def ranked(self) -> list[PathPlan]:
-        """The shortest plan of each hand sequence in a new list, the shortest first."""
-        return sorted(self.by_hands.values(), key=lambda plan: plan.cost)
 
 
 class PlanInTicks(NamedTuple):
@@ -74,7 +69,8 @@ def shortest_plans(
         raise MethodError(
             "infeasible", f"none of {solves} solves found a path that hits every goal"
         )
-    return ShortestPlans(best, solves, failed)
+    ranked = sorted(best.values(), key=lambda plan: plan.cost)
+    return ShortestPlans(ranked, solves, failed)
 
 
 def fewest_ticks(

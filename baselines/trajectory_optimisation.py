@@ -11,13 +11,20 @@ Hand sequences are planned from the cheapest chains of posture graphs; the plan 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from coartic import Movement, Task
-from coartic.baselines.posture_graph import BEAM_WIDTH, Count, HandSequence, Nodes, cheapest_chains
+from coartic.baselines.posture_graph import (
+    BEAM_WIDTH,
+    QUICK,
+    Count,
+    HandSequence,
+    Nodes,
+    cheapest_chains,
+)
 from coartic.baselines.trajectory_problem import (
     MODEL_BASED,
     Cost,
@@ -29,7 +36,7 @@ from coartic.baselines.trajectory_problem import (
 )
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, Method, MethodError, Parameters, Result, Session
-from coartic.motion.movement import follow
+from coartic.motion.movement import follow, segment_lengths
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
@@ -106,7 +113,7 @@ class TrajectoryOptimisation(Method):
     stochastic = False
     tuned_on = "random tasks"
     Parameters = TrajectoryParameters
-    quick: ClassVar[dict[str, Any]] = {"nodes": 40, "graphs": 1, "chains": 1, "most_sequences": 1}
+    quick = QUICK | {"most_sequences": 1}
 
     def solve(self, session: Session) -> Result:
         """Plan for each hand sequence of :meth:`starts`, and return the movements of the plan with
@@ -215,7 +222,6 @@ class SquaredDisplacement(TrajectoryOptimisation):
         "approach."
     )
     information = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("sum of squared joint displacements",)
     cost = "squared-displacement"
 
 
@@ -229,7 +235,6 @@ class Acceleration(TrajectoryOptimisation):
         "confirmed mathematical model. Journal of Neuroscience (there: jerk)."
     )
     information = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
-    secondary = ("minimum joint acceleration",)
     cost: ClassVar[Cost] = "acceleration"
     Parameters = SmoothParameters
 
@@ -243,7 +248,6 @@ class Jerk(Acceleration):
         "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
         "confirmed mathematical model. Journal of Neuroscience."
     )
-    secondary = ("minimum joint jerk",)
     cost: ClassVar[Cost] = "jerk"
     Parameters = JerkParameters
 
@@ -257,7 +261,6 @@ class HandJerk(Jerk):
         "two-armed-2: least time between goals, and weight of joint jerk, where weights from 0.001 "
         "to 10 end at -349 to -399 (shipped: -393); else random tasks"
     )
-    secondary = ("minimum jerk of the hand",)
     cost = "hand-jerk"
     Parameters = HandJerkParameters
 
@@ -283,8 +286,7 @@ def path_movements(
         )
         session.spend(forward_kinematics=followed.evaluations)
         paths.append(Movement(goal + 1, hand, "path", ahead[-1], waypoints=ahead))
-        steps = np.diff(np.vstack([here, ahead]), axis=0)
-        ends = np.cumsum(np.sqrt((steps**2).sum(axis=1)))
+        ends = np.cumsum(segment_lengths(np.vstack([here, ahead])))
         steps_made = followed.ticks - 1
         here, rest = followed.q, ahead[ends > steps_made * session.model.step]
     return tuple(paths)

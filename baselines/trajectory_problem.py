@@ -42,6 +42,7 @@ from numpy.typing import NDArray
 
 from coartic.baselines.posture_graph import KINEMATICS
 from coartic.method import Information
+from coartic.motion.movement import segment_lengths
 from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
 
@@ -353,22 +354,14 @@ def _hand_jerks(
     return casadi.vertcat(*integrals)
 
 
+@lru_cache(maxsize=32)
 def trajectory_problem(
     robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
 ) -> TrajectoryProblem:
     """Return the compiled problem for a robot, hands to choose from, a number of goals and a cost;
     a process keeps the 32 problems used last."""
     with _ONE_AT_A_TIME:
-        return _built(robot, hands, goals, cost)
-
-
-_built = lru_cache(maxsize=32)(TrajectoryProblem)
-
-
-def segment_lengths(configurations: Array) -> Array:
-    """Return the joint-space distance from each of k configurations ``(k, dof)`` to the next, shape
-    ``(k - 1,)``, length unit and rad together."""
-    return np.asarray(np.sqrt((np.diff(configurations, axis=0) ** 2).sum(axis=1)))
+        return TrajectoryProblem(robot, hands, goals, cost)
 
 
 def spline(plan: PathPlan, samples: int) -> list[Array]:

@@ -108,26 +108,24 @@ def centred(values: Array) -> Array:
 
 
 @checked_arguments
-def mean(values: Numbers, *, resamples: Resamples = RESAMPLES) -> Estimate:
+def mean(values: Numbers) -> Estimate:
     """Return the mean of a sample ``(n,)`` with its 95 % interval (:func:`mean_of_means`), whose
     ends are NaN for fewer than three values. Raises ValueError for a sample that is
     empty or not finite."""
-    return _mean_of(tuple(vector(values).tolist()), resamples)
+    return _mean_of(tuple(vector(values).tolist()))
 
 
 @lru_cache(maxsize=500)  # claims state the same means
-def _mean_of(values: tuple[float, ...], resamples: int) -> Estimate:
-    return mean_of_means([np.array(values)], [1.0], resamples)
+def _mean_of(values: tuple[float, ...]) -> Estimate:
+    return mean_of_means([np.array(values)], [1.0])
 
 
 @checked_arguments
-def difference_of_means(
-    first: Numbers, second: Numbers, *, resamples: Resamples = RESAMPLES
-) -> Estimate:
+def difference_of_means(first: Numbers, second: Numbers) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
     and ``(m,)``, with its 95 % interval (:func:`mean_of_means`), whose ends are NaN for fewer than
     three values in a sample. Raises ValueError for a sample that is empty or not finite."""
-    return mean_of_means([first, second], [1.0, -1.0], resamples)
+    return mean_of_means([first, second], [1.0, -1.0])
 
 
 def mean_of_means(

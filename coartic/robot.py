@@ -23,8 +23,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.text import short_repr
-from coartic.internal.validation import changed_values, in_sentences
+from coartic.internal.validation import in_sentences
 
 Hand = Literal["left", "right"]
 """Name of a hand: ``"left"`` or ``"right"``."""
@@ -58,9 +57,6 @@ class Arm(NamedTuple):
     """Place of the shoulder in x from the centre of the base, length unit."""
     shoulder_y: float
     """Place of the shoulder in y from the centre of the base, length unit."""
-
-    def __repr__(self) -> str:
-        return short_repr(self, **self._asdict())
 
 
 def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
@@ -120,10 +116,6 @@ class Robot:
     base_size: tuple[Length, Length] = (1.0, 0.2)
     """Width and height of the base, length unit, for drawings only. The default is for arms of
     length 4 and is drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
-
-    def __repr__(self) -> str:
-        links = {"left_links": self.left_links, "right_links": self.right_links}
-        return short_repr(self, **links | changed_values(self))
 
     @cached_property
     def scale(self) -> float:

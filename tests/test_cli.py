@@ -134,7 +134,7 @@ def test_no_command_is_silent_for_long(coartic, tmp_path, monkeypatch):
     [("ascii", "-3 ? 1 -"), ("latin-1", "-3 ± 1 -"), ("utf-8", "−3 ± 1 –")],
 )
 def test_a_terminal_without_a_sign_shows_one_like_it(encoding, printed):
-    terminal = io.TextIOWrapper(io.BytesIO(), encoding)
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding, "replaced")
     say("−3 ± 1 –", stream=terminal)
     assert terminal.buffer.getvalue().decode(encoding) == f"{printed}{os.linesep}"
 

@@ -185,7 +185,7 @@ def test_shipped_tasks_keep_every_law(methods, path):
             "[robot]\nright_links = [20, 20]\nleft_links = [1]\n"
             "[start]\nright = [0.5, 0.5]\nleft = [0]\n",
             "solvable",
-            "divide all lengths by 7.1",
+            "multiply all lengths",
         ),
         (
             # Beyond what the corrective process can do with the only hand there is.

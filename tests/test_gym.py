@@ -14,7 +14,6 @@ import pytest
 import coartic
 from coartic import (
     MotionModel,
-    Robot,
     correct,
     corrective_trial,
     execute,
@@ -35,7 +34,6 @@ from tests.support.strategies import tiny_task
 gymnasium = pytest.importorskip("gymnasium")
 
 from gymnasium import wrappers  # noqa: E402
-from gymnasium.envs.registration import EnvSpec  # noqa: E402
 
 import coartic.gym  # noqa: E402
 from coartic.gym import TaskEnv, TaskVectorEnv, compare, sb3, score, scoring  # noqa: E402
@@ -197,7 +195,6 @@ def test_where_the_corrective_process_fails_the_posture_takes_its_place():
         ({"ahead": -1}, ValueError, "ahead is -1; it must be a whole number from 0"),
         ({"model": None}, TypeError, "model is None; it must be a MotionModel"),
         ({"task": "ascending", "count": 3}, ValueError, "are for families, not 'ascending'"),
-        ({"task": {"goals": 3}}, coartic.TaskError, "goals is 3; it should be a list of points"),
         ({"render_mode": "human"}, ValueError, "it must be 'rgb_array'"),
     ],
 )
@@ -252,27 +249,6 @@ def test_robots_side_by_side_have_the_pictures_of_each(monkeypatch):
         assert first.shape == (400, 600, 3)
         assert (one.render() == first).all(), hit
         one.step(action), many.step(np.tile(action, (2, 1)))
-
-
-@pytest.mark.parametrize("number", [None, 3])
-def test_a_specification_is_kept_as_json(number, tmp_path):
-    """From which the same environment is made; of a task, its file and its name."""
-    task = tiny_task(
-        name="own",
-        robot=Robot((1.0, 0.9), (1.0,) * 3),
-        start={"left": [0.3, 0], "right": [0, 0.1, 0]},
-    )
-    task.save(tmp_path / "own.toml")
-    make = gymnasium.make if number is None else partial(gymnasium.make_vec, num_envs=number)
-    again = gymnasium.make if number is None else gymnasium.make_vec
-    for given in (task, tmp_path / "own.toml"):
-        options = {"task": given, "ahead": 2, "model": MotionModel(gain=0.04)}
-        spec = EnvSpec.from_json(make("coartic/Task-v2", **options).spec.to_json())
-        env = again(spec).unwrapped
-        robots = env if number else env.robots
-        assert (robots.num_envs, robots.model) == (number or 1, MotionModel(gain=0.04))
-        assert robots.task_at(0) == task
-        assert robots.single_observation_space == TaskEnv(**options).observation_space
 
 
 def names_of_program(title):

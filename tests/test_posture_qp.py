@@ -80,8 +80,10 @@ def test_every_sequence_keeps_the_best(method):
     rewards = {}
     for hands in itertools.product(task.hands, repeat=2):
         session = Session(task, 0, method.information, trusted=True)
-        alone = method().search(PostureController(session, task, 20), [hands])
-        rewards[hands] = execute(task, alone.solution).reward
+        alone, aims = PostureController(session, task, 20), (Aim(hands[0], 0), Aim(hands[1], 1))
+        first = alone.leg(None, aims[: 1 + method.goals_ahead])
+        solution = first.movement, alone.leg(first, aims[1:]).movement
+        rewards[hands] = execute(task, solution).reward
     result, execution, _ = solve(method, task, period=20)
     chosen = tuple(movement.hand for movement in result.solution)
     assert execution.reward == max(rewards.values()) == rewards[chosen]
@@ -109,7 +111,7 @@ def test_postures_make_the_way_through_all_discs_shortest(name):
     """A local minimum of the reward's own metric: a general solver finds nothing shorter near."""
     task = load_task(name)
     aims = tuple(Aim("right", goal) for goal in range(len(task.goals)))
-    postures = controller(task).find_postures(task.q0, aims, {})
+    postures = [*controller(task).begin(task.q0, aims, None).values()]
     steps = steps_from(task.q0, postures)
     hands, every = ["right"] * len(aims), np.ones(steps.shape, bool)
     shortest = least_cost(task, hands, every, [steps.ravel()], radius=task.radius)

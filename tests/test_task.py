@@ -1,6 +1,5 @@
 """Task files: the shipped ones, and what is refused with what words."""
 
-import ast
 import math
 import re
 from pathlib import Path
@@ -71,7 +70,7 @@ def test_a_saved_task_is_read_as_it_was(task, tmp_path):
     [
         ({"robot": {"right_links": [0]}}, "robot.right_links[0] is 0; it should be greater than 0"),
         ({"q0": [0, 0, 0, 0, 0, 0, 30, 40, 20, 0]}, "Did you mean 40° = 0.698?"),
-        ({"start": {"right": "x"}}, "start.right is 'x'; it should be a list of numbers"),
+        ({"start": {"right": "x"}}, "start.right is 'x'; it should be a list, in square"),
         ({"q0": [0] * 3}, "Task: q0 has shape (3,); it must be (10,)"),
         ({"q0": {"base": [0, 0]}}, "Task: q0 is {'base': [0, 0]}; it should be real numbers"),
         ({"q0": [0] * 10, "start": {"left": [0] * 4, "right": [0] * 4}}, "give one of them"),
@@ -92,12 +91,10 @@ LISTS = {
 
 @pytest.mark.parametrize(("kind", "key"), [(kind, key) for kind in LISTS for key in LISTS[kind]])
 @pytest.mark.parametrize("text", ["right", "1, 2"])
-def test_advice_on_a_list_can_be_followed(kind, key, text):
+def test_a_text_in_place_of_a_list_is_refused(kind, key, text):
     given = {Task: {"goals": [(3, 2)]}, Start: {"left": [0] * 4, "right": [0] * 4}}.get(kind, {})
-    with pytest.raises(ValueError, match=f"{key} is '{text}'; it should be a list") as caught:
+    with pytest.raises(ValueError, match=f"{key} is '{text}'; it should be a list"):
         kind(**given | {key: text})
-    for advice in re.findall(r"such as (\[.*\])", str(caught.value)):
-        kind(**given | {key: ast.literal_eval(advice)})
 
 
 def test_a_file_that_is_not_text(tmp_path):

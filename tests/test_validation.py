@@ -47,9 +47,9 @@ from coartic.analysis.statistics.hypotheses import (
     share_test,
 )
 from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.registry import built_in, registry
+from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform, run_suite
-from coartic.internal.text import RENAMED, did_you_mean, plain
+from coartic.internal.text import did_you_mean, plain
 from coartic.method import Information, Session
 from coartic.motion.trial import reach_goals
 from coartic.tasks.families import FAMILY_FOLDER, instance_names, read_family
@@ -110,7 +110,7 @@ TASKS = [
     ("start = 1\n" + GOOD.partition("[start]")[0], "start is 1; it should be a table"),
     ('title = "a\\nb"' + GOOD, "it should be one line of printable text"),
     (task("goals = [[", "goals = [[["), "line"),
-    (f"{GOOD}[penalty]\njoints = 1.0\n", "version 1.1.0 of coartic reads tasks with a penalty"),
+    (f"{GOOD}[penalty]\njoints = 1.0\n", "penalty is an unknown key"),
 ]
 FAMILIES = [
     (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be at least 2"),
@@ -271,16 +271,6 @@ def test_tables_and_figures_are_of_a_study(what):
 def test_a_name_as_tables_and_figures_have_it_is_understood(name, meant):
     hint = f"; did you mean {meant!r}?" if meant else ""
     assert did_you_mean(name, [*builtin_tasks(), *KNOWN]) == hint
-
-
-def test_a_renamed_method_is_known_by_its_present_id():
-    present = set(built_in())
-    assert set(RENAMED.values()) < present
-    assert not set(RENAMED) & present
-    meant = did_you_mean("nullspace-qp/next-goal", present)
-    assert meant == "; its present id is 'posture-qp/goals-ahead'"
-    assert did_you_mean("optimum/branch-and-bound", present).endswith("'optimum/search'")
-    assert did_you_mean("guesses", ["guessing"]) == "; did you mean 'guessing'?"
 
 
 def test_blanks_before_a_text_do_not_hide_it():
@@ -523,7 +513,6 @@ def test_no_wrong_question_to_a_study_gets_an_error_of_python(name, traced):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: mean([1.0, 2.0], resamples=-1), "resamples is -1; it should be at least 1"),
         (
             lambda: correct(ROBOT, TASK.q0, "right", (True, 1.0)),
             "goal is .*; it .* without True",
@@ -591,9 +580,7 @@ def test_no_wrong_movement_gets_an_error_of_python(field):
 @pytest.mark.parametrize(
     ("call", "usual", "name", "value"),
     [
-        (plan_suite, {"suite": "paper"}, "tasks", "ascending"),
         (plan_suite, {"suite": "paper"}, "runs", "3"),
-        (plan_suite, {"suite": "paper", "tasks": ["two-armed/v1/i000"]}, "methods", "EC4"),
         (ecdf, {"frame": FRAME}, "targets", "x"),
         (learn, {"task": "two-armed-1", "trials": 1, "seed": 0}, "condition", 3),
         (instance_names, {"family": "long/v1", "split": "fresh"}, "year", None),

@@ -58,7 +58,8 @@ class _Command(TyperCommand):
         """Write the command's arguments and options, without types, into the help,
         ``formatter``."""
         for parameter in self.params:
-            vars(parameter)["display_type_rich"] = lambda *_, **__: ""
+            if parameter.param_type_name == "argument":
+                vars(parameter)["display_type_rich"] = lambda *_, **__: ""
         super().format_options(ctx, formatter)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:

@@ -37,13 +37,12 @@ codecs.register_error("replaced", _replaced)
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
     """Print lines on ``stream``, by default standard output, and then ``end``; characters that do
-    not print, such as line breaks in names, and characters that the terminal lacks are replaced.
-    Raises CoarticError if standard output cannot be written, BrokenPipeError if the reader of
-    ``stream`` has ended; if another stream cannot be written, the lines are lost."""
+    not print, such as line breaks in names, are replaced; streams replace characters that the
+    terminal lacks (:func:`coartic.cli.main`). Raises CoarticError if standard output cannot be
+    written, BrokenPipeError if the reader of ``stream`` has ended; if another stream cannot be
+    written, the lines are lost."""
     stream = stream or sys.stdout
-    encoding = getattr(stream, "encoding", None) or "utf-8"
     text = "\n".join(map(one_line, lines)).replace("\u202f", " ")
-    text = text.encode(encoding, "replaced").decode(encoding)
     try:
         print(text, file=stream, end=end, flush=True)
     except BrokenPipeError:
@@ -57,12 +56,9 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
 
 
 def complain(kind: str, text: str) -> None:
-    """Print each line of ``text`` on stderr after ``kind``, ``Error`` or ``Warning``, and a colon;
-    on a terminal lines are broken between words."""
-    width = shutil.get_terminal_size().columns if sys.stderr.isatty() else sys.maxsize
-    wrap = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False).wrap
-    for line in text.splitlines():
-        say(*wrap(f"{kind}: {line}"), stream=sys.stderr)
+    """Print each line of ``text`` on stderr after ``kind``, ``Error`` or ``Warning``, and a
+    colon."""
+    say(*(f"{kind}: {line}" for line in text.splitlines()), stream=sys.stderr)
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:

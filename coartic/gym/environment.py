@@ -12,7 +12,7 @@ from gymnasium.vector import VectorWrapper
 from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import CoarticError
-from coartic.gym.vector import Recorded, TaskVectorEnv, check_no_options, whole_seed
+from coartic.gym.vector import TaskVectorEnv, check_no_options, whole_seed
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.text import unknown
 from coartic.tasks.task import Task
@@ -32,7 +32,7 @@ ADDED = ("OrderEnforcing", "PassiveEnvChecker", "Monitor", "VecMonitor")
 """Wrappers that the libraries add by themselves, which change no observations and no actions."""
 
 
-class TaskEnv(Recorded, gymnasium.Env):
+class TaskEnv(gymnasium.Env):
     """Environment of one robot, with the options (except ``num_envs``), observations, actions and
     rewards of :class:`TaskVectorEnv`; a trial begins with a reset only."""
 

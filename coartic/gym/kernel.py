@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.method.optimisers import FAILED
-from coartic.motion.batch import SLOTS, Batch, RobotRecord, RunRecord
-from coartic.motion.compile import entry, fill_row, inlined, inner
+from coartic.motion.batch import SLOTS, Batch, RobotRecord, RunRecord, squared_distance
+from coartic.motion.compile import entry, fill_row, inlined
 from coartic.motion.trial import (
     MOVE,
     account,
     begin,
-    correct_runs,
     find_corrections,
+    make_corrections,
     move_runs,
     set_off,
 )
@@ -76,16 +76,6 @@ class VectorState(NamedTuple):
     """Numbers, from 0, of the robots of a lot, shape ``(SLOTS,)``."""
 
 
-@inner
-def _squared_distance(run: RunRecord) -> float:
-    """Return the squared joint-space distance from a run's configuration to its target, which the
-    corrective process found; infinite if the process did not converge."""
-    square = 0.0 if run.converged else math.inf
-    for j in range(len(run.q)):
-        square += (run.target[j] - run.q[j]) ** 2
-    return square
-
-
 @inlined
 def _aim_by_action(
     run: RunRecord, other: RunRecord, movable: Any, action: Any, state: VectorState
@@ -94,8 +84,8 @@ def _aim_by_action(
     action ``(A,)``, as :class:`.TaskVectorEnv` says. ``run`` and, with two hands, ``other`` have
     the solutions of the corrective process; ``movable``, ``(E,)``, is True for joints that move."""
     if len(state.sides) > 1:
-        is_nearer = _squared_distance(other) < _squared_distance(run)
-        if is_nearer != (action[0] > 0.5):
+        is_farther = not run.converged or squared_distance(other) < squared_distance(run)
+        if (other.converged and is_farther) != (action[0] > 0.5):
             run.hand, run.converged = other.hand, other.converged
             fill_row(run.target, other.target)
     if not run.converged:
@@ -130,7 +120,8 @@ def _step_lot(count: int, robot: RobotRecord, state: VectorState) -> None:
     move_runs(count, robot, batch)
     for i in range(count):
         state.accounts[i].moved = batch.runs[i].ticks
-    correct_runs(count, robot, batch)
+    find_corrections(count, robot, batch)
+    make_corrections(count, robot, batch)
     for i in range(count):
         n, goal = state.indices[i], state.accounts[i]
         account(batch.runs[i], goal.moved, goal)

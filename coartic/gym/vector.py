@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
 from gymnasium.utils import seeding
@@ -25,35 +23,14 @@ from coartic.motion.trial import count_trials, empty_accounts
 from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Robot
 from coartic.tasks.catalogue import as_task
 from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
-from coartic.tasks.task import MOST_GOALS, Split, Task, parse_task
+from coartic.tasks.task import MOST_GOALS, Split, Task
 
 REACH = 0.5
 """Half the width of the box of targets, length unit (base) and rad (angles)."""
 RowIndex = NDArray[np.int64] | slice
 
 
-class Recorded:
-    """An environment whose specification is plain data for JSON, as recorders of episodes need."""
-
-    _spec: EnvSpec | None = None
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """Specification of the environment, in which ``task`` and ``model`` are kept as plain data:
-        a name, a path or a dictionary; None if none was set."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        plain = dict(spec.kwargs) if spec else {}
-        if isinstance(task := plain.get("task"), Task | Path):
-            plain["task"] = str(task) if isinstance(task, Path) else task.model_dump(mode="json")
-        if isinstance(model := plain.get("model"), MotionModel):
-            plain["model"] = model._asdict()
-        self._spec = spec and replace(spec, kwargs=plain)
-
-
-class TaskVectorEnv(Recorded, VectorEnv):
+class TaskVectorEnv(VectorEnv):
     """Vector environment: N robots act side by side, each in a trial of its own.
 
     An episode is a trial, of at most as many steps as there are goals. The reward of a step is
@@ -138,9 +115,6 @@ class TaskVectorEnv(Recorded, VectorEnv):
             )
         check_limits("num_envs", num_envs, 1, 1_000_000)
         check_limits("ahead", ahead, 0, MOST_GOALS)
-        # As a specification has them.
-        task = parse_task(task, "task") if isinstance(task, dict) else task
-        model = MotionModel(**model) if isinstance(model, dict) else model
         self.num_envs, self.model = num_envs, check_model(model)
         self.render_mode = render_mode
         self.options = {"task": task, "ahead": ahead, "model": model}
@@ -257,13 +231,15 @@ class TaskVectorEnv(Recorded, VectorEnv):
             raise ValueError(f"the action{which} is not finite; it must be numbers")
         count_trials(begun)
 
-    def infos(self) -> dict[str, Any]:
+    def infos(self, there: NDArray[np.bool_] | bool = True) -> dict[str, Any]:
         """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
-        with a family's file for the family, and ``is_success``, True where the robot has hit all
-        goals of its trial; before the first reset it means nothing. After :meth:`step` a trial that
+        with a family's file for the family, ``is_success``, True where the robot has hit all goals
+        of its trial, and ``_task`` and ``_is_success``, True where the robot has this entry, as
+        ``there`` says; before the first reset they mean nothing. After :meth:`step` a trial that
         ended has started again: its last infos are in ``final_info`` of the step."""
         task = self.state.task
-        return {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
+        infos = {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
+        return infos | {f"_{name}": np.full(self.num_envs, there) for name in infos}
 
     def reset(
         self,
@@ -290,7 +266,7 @@ class TaskVectorEnv(Recorded, VectorEnv):
             if each is not None or self._rngs[row] is None:
                 self._rngs[row] = seeding.np_random(each)[0]
         self._begin_anew(np.ones(self.num_envs, np.bool_))
-        return self.state.seen.copy(), self._masked_infos()
+        return self.state.seen.copy(), self.infos()
 
     def step(
         self, actions: ArrayLike
@@ -313,10 +289,10 @@ class TaskVectorEnv(Recorded, VectorEnv):
             last = np.full(self.num_envs, None, dtype=object)
             for row in np.flatnonzero(ended).tolist():
                 last[row] = state.seen[row].copy()
-            final = {"final_obs": last, "final_info": self._masked_infos(ended)}
+            final = {"final_obs": last, "final_info": self.infos(ended)}
             final |= {f"_{name}": ended.copy() for name in ("final_obs", "final_info")}
             self._begin_anew(ended)
-        infos = self._masked_infos() | final
+        infos = self.infos() | final
         return state.seen.copy(), state.rewards.copy(), ended, np.zeros_like(ended), infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
@@ -349,14 +325,10 @@ class TaskVectorEnv(Recorded, VectorEnv):
         drawn = [self._rngs[row].integers(number) for row in rows.tolist()] if number > 1 else 0
         self._begin(rows, drawn)
 
-    def _masked_infos(self, there: NDArray[np.bool_] | bool = True) -> dict[str, Any]:
-        infos = self.infos()
-        return infos | {f"_{name}": np.full(self.num_envs, there) for name in infos}
-
 
 def check_no_options(options: Mapping[str, Any] | None) -> None:
     """Raise ValueError if a reset has options; None and an empty mapping pass."""
-    if options is not None and not (isinstance(options, Mapping) and not options):
+    if options:
         raise ValueError(f"reset takes no options, but {brief_value(options)} are given")
 
 

@@ -12,7 +12,7 @@ from pydantic import ConfigDict, PlainValidator, ValidationError, validate_call
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import plain_values, real_numbers
-from coartic.internal.validation import explain_call
+from coartic.internal.validation import explain_inline
 
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
@@ -41,7 +41,7 @@ def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Co
         try:
             return checked()(*places, **given)
         except ValidationError as error:
-            sentences = explain_call(error, names, given | dict(enumerate(places)))
+            sentences = explain_inline(error, names, given | dict(enumerate(places)))
             raise ArgumentError(f"{function.__name__}: {sentences}") from None
 
     return call

@@ -21,7 +21,6 @@ LONGEST_LINE = 500
 LONGEST_REASON = 2000
 """Most characters of a reason that is kept."""
 _MOST_NAMED = 12  # in a sentence
-_MOST_FIGURES = 12  # of an array in a repr
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
@@ -67,43 +66,17 @@ def counted(count: int, thing: str) -> str:
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
-def short_repr(thing: object, /, *texts: str, **facts: Any) -> str:
-    """Return ``Class(text, fact=value)`` for an object, in one line, cut to :data:`LONGEST_LINE`
-    characters: ``texts``, then each of ``facts`` by name: its ``repr``, cut to 80 characters, or of
-    a value of NumPy the entries, if they are one row of at most 12, else the shape."""
-    parts = list(texts)
-    for name, value in facts.items():
-        if not hasattr(value, "shape"):
-            shown = plain(repr(value), 80)
-        elif len(value.shape) == 1 and value.size <= _MOST_FIGURES:
-            figures = (f"{x:.4g}" if isinstance(x, float) else repr(x) for x in value.tolist())
-            shown = plain(f"[{', '.join(figures)}]", 100)
-        else:
-            shown = f"<array of shape {value.shape}>"
-        parts.append(f"{name}={shown}")
+def short_repr(thing: object, /, **facts: Any) -> str:
+    """Return ``Class(fact=value)`` for an object, in one line, cut to :data:`LONGEST_LINE`
+    characters, with the ``repr`` of each of ``facts`` cut to 80 characters."""
+    parts = (f"{name}={plain(repr(value), 80)}" for name, value in facts.items())
     return plain(f"{type(thing).__name__}({', '.join(parts)})", LONGEST_LINE)
-
-
-RENAMED = {
-    "guesses": "random-search",
-    "guesses/hands": "random-search/hands",
-    "random-search/climbing": "hill-climbing",
-    "corrective-alone/every": "corrective-alone/best-hands",
-    "nullspace-qp/none": "posture-qp/current-goal",
-    "nullspace-qp/next-goal": "posture-qp/goals-ahead",
-    "trajectory-optimisation/squared-changes": "trajectory-optimisation/squared-displacement",
-    "optimum/branch-and-bound": "optimum/search",
-}
-"""Present ids of methods that were renamed, by their earlier ids."""
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return ``; did you mean 'a'?`` with the nearest of ``names`` to ``name``; an empty text if no
     name is near. Nearest are names that begin with ``name``, capitals and punctuation aside,
-    then names that are spelt alike, then names that end in the same word. For the earlier id of a
-    renamed method among ``names`` the text is ``; its present id is 'a'``."""
-    if RENAMED.get(name) in (names := list(names)):
-        return f"; its present id is {RENAMED[name]!r}"
+    then names that are spelt alike, then names that end in the same word."""
     words = {each: re.findall(r"[^\W_]+", each.lower()) for each in (name, *names)}
     meant = words.pop(name)
     if not meant:
@@ -136,13 +109,13 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """Return a sentence that no ``kind``, such as ``task``, is called ``name``, with the nearest of
     ``names`` (:func:`did_you_mean`), or, if no name is near, with all names, or the first 12 of
-    more than 13; for a file of another program return a sentence that coartic does not read it."""
+    more; for a file of another program return a sentence that coartic does not read it."""
     if isinstance(name, str) and (words := foreign_file(name)):
         return f"{words}."
     several = list(names)
-    shown = len(several) if len(several) <= _MOST_NAMED + 1 else _MOST_NAMED
-    more = f" and {counted(len(several) - shown, 'other')}" if len(several) > shown else ""
-    known = f". Known: {', '.join(several[:shown])}{more}."
+    others = len(several) - _MOST_NAMED
+    more = f" and {counted(others, 'other')}" if others > 0 else ""
+    known = f". Known: {', '.join(several[:_MOST_NAMED])}{more}."
     hint = (did_you_mean(name, several) if isinstance(name, str) else "") or known
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 

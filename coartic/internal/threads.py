@@ -65,12 +65,8 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
     most = int(allowed) if allowed.isdigit() else threads_for(-1)
     threads = max(1, min(count // least, most))
     edges = [count * part // threads for part in range(threads + 1)]
-    first, *others = itertools.starmap(slice, itertools.pairwise(edges))
-    with ThreadPoolExecutor(max(len(others), 1)) as pool:
-        waited_for = [pool.submit(work, part) for part in others]
-        work(first)
-        for each in waited_for:
-            each.result()
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, itertools.starmap(slice, itertools.pairwise(edges))))
 
 
 @contextlib.contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -32,21 +32,10 @@ _PLAINER = {
     "valid number": "number",
     "valid string": "text",
     "a valid boolean": "true or false",
-    "valid (list|tuple)": "list",
+    "valid (list|tuple)": "list, in square brackets",
     r"(valid )?dictionary( or (an )?instance of \w+)?": "table",
 }
 """Wordings of pydantic, and what they say to a person."""
-_OF_NUMBERS = (
-    *("q0", "base", "left", "right", "left_links", "right_links"),
-    *("left_shoulder", "right_shoulder", "base_size", "links", "x", "y"),
-)
-_OF_TEXTS = ("tasks", "methods", "method_files", "family_files")
-_LISTS = {
-    **dict.fromkeys(_OF_NUMBERS, " of numbers"),
-    **dict.fromkeys(_OF_TEXTS, ", such as [{!r}]"),
-    **{"hands": ", such as ['left', 'right']", "locked_base": ", such as ['y']"},
-}
-"""Advice on a text in the place of a list, by key."""
 
 
 def in_sentences(kind: type[T]) -> type[T]:
@@ -67,17 +56,6 @@ def in_sentences(kind: type[T]) -> type[T]:
 
     kind.__init__ = call  # type: ignore[method-assign]
     return kind
-
-
-def changed_values(thing: Any) -> dict[str, Any]:
-    """Return, by name, the values of a pydantic object's fields that have no default, or whose
-    value differs from the default."""
-    return {
-        name: getattr(thing, name)
-        for name, field in type(thing).__pydantic_fields__.items()
-        if field.is_required()
-        or getattr(thing, name) != field.get_default(call_default_factory=True)
-    }
 
 
 def equal_contents(a: Any, b: Any) -> Any:
@@ -111,7 +89,13 @@ class FileData(BaseModel):
 
     def __repr__(self) -> str:
         """Return, in one line, the class with the values that are not defaults."""
-        return short_repr(self, **changed_values(self))
+        changed = {
+            name: getattr(self, name)
+            for name, field in type(self).model_fields.items()
+            if field.is_required()
+            or getattr(self, name) != field.get_default(call_default_factory=True)
+        }
+        return short_repr(self, **changed)
 
     def __str__(self) -> str:
         return repr(self)
@@ -128,21 +112,17 @@ def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) 
     return "\n".join(lines)
 
 
-def explain_inline(error: ValidationError, keys: Sequence[str]) -> str:
-    """Return sentences on the first 20 problems of an object's arguments (:func:`_explain_first`),
-    joined by semicolons. ``keys`` are the names of the arguments of its class, in order, or empty.
-    """
-    return "; ".join(_explain_first(error.errors(include_url=False), keys)[0])
-
-
-def explain_call(error: ValidationError, keys: Sequence[str], given: dict[int | str, Any]) -> str:
-    """Return sentences on the first 20 problems of a call's arguments (:func:`_explain_first`),
-    joined by semicolons; an argument of none of several kinds has one sentence. ``keys`` are the
-    names of the arguments in order, ``given`` the arguments, by place from 0 or by name."""
+def explain_inline(
+    error: ValidationError, keys: Sequence[str], given: Mapping[int | str, Any] | None = None
+) -> str:
+    """Return sentences on the first 20 problems of an object's or a call's arguments
+    (:func:`_explain_first`), joined by semicolons; an argument of none of several kinds has one
+    sentence. ``keys`` are the names of the arguments, in order, or empty; ``given`` are the
+    arguments of a call, by place from 0 or by name."""
     problems: dict[tuple[int | str, ...], ErrorDetails] = {}
     for detail in error.errors(include_url=False):
         place = detail["loc"]
-        if detail["input"] is given.get(place[0]):
+        if given and detail["input"] is given.get(place[0]):
             place = place[:1]  # what follows is the name of a kind
         if place in problems:
             problems[place]["msg"] += f" or {detail['msg'].removeprefix('Input should be ')}"
@@ -190,11 +170,6 @@ def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
             if len(detail["loc"]) > 1 and name in keys:
                 return f"{key} is an unknown key; {name!r} belongs above the line [{table}]"
             return f"{key} is an unknown key{did_you_mean(name, keys)}"
-        case "list_type" | "tuple_type" if key == "goals":
-            message = "should be a list of points, such as [[3.0, 2.0]]"
-        case "list_type" | "tuple_type" if isinstance(detail["input"], str):
-            advice = _LISTS.get(key.rpartition(".")[2], "").format(detail["input"])
-            message = f"should be a list{advice}"
         case "string_pattern_mismatch" if key == "name":
             message = "begins with a letter or digit and may have '.', '_' and '-' besides"
     if isinstance(detail["input"], float) and math.isnan(detail["input"]):

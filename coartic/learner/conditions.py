@@ -31,8 +31,8 @@ from pydantic.dataclasses import dataclass
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
-from coartic.internal.text import short_repr, unknown
-from coartic.internal.validation import changed_values, in_sentences, sentence_error
+from coartic.internal.text import unknown
+from coartic.internal.validation import in_sentences, sentence_error
 from coartic.robot import HANDS, Hand
 
 if TYPE_CHECKING:
@@ -152,12 +152,6 @@ class ExplorationCondition:
         """True if a preferred posture informs exploration (a drift is not 0) or correction
         (``pull`` is not 0)."""
         return any(self.drifts) or self.pull > 0
-
-    def __repr__(self) -> str:
-        facts = changed_values(self)
-        required = ("hands", "modify_chosen", "modify_other", "hand_exploration")
-        positional = [repr(facts.pop(name)) for name in required]
-        return short_repr(self, brief_value(facts.pop("id")), *positional, **facts)
 
     def why_not(self, task: Task | Outline) -> str | None:
         """Return a sentence on the hands for which the condition does not apply to a task; None if

@@ -25,8 +25,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.learner.conditions import ExplorationCondition
-from coartic.motion.batch import Batch, RobotRecord, RunRecord, arm_of, batch_for, load, width_of
+from coartic.motion.batch import (
+    Batch,
+    RobotRecord,
+    RunRecord,
+    arm_of,
+    batch_for,
+    load,
+    squared_distance,
+    width_of,
+)
 from coartic.motion.compile import (
+    chain_by,
     entry,
     fill_row,
     generator_at,
@@ -46,15 +56,15 @@ from coartic.motion.trial import (
     CompiledTask,
     account,
     begin,
-    correct_runs,
     count_goal,
+    find_corrections,
     find_pulled_corrections,
     make_corrections,
     move_runs,
     set_off,
 )
 from coartic.motion.trial import aim as aim_at
-from coartic.motion.trigonometry import joint_chain
+from coartic.motion.trigonometry import cosine, sine
 from coartic.robot import HANDS, Array, Configs, Hands, Points
 from coartic.tasks.task import Task
 
@@ -213,7 +223,7 @@ def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _
     """Return the distance of a hand (0 left, 1 right) of a run from the centre of its goal, length
     unit; add 1 to the run's ``evaluations``."""
     arm = arm_of(robot, hand)
-    joint_chain(run.q, arm, workspace.xs, workspace.ys)
+    chain_by(run.q, arm, workspace.xs, workspace.ys, cosine, sine)
     run.evaluations += 1
     tip = len(arm.links)
     dx = run.goal[0] - workspace.xs[tip]
@@ -237,9 +247,7 @@ def _nearest_posture(
         load(batch.at[0], 0, n, run, arm_of(robot, hand))
         correct_slots(batch, 1, robot)
         workspace.counts[n, ITERATIONS] += run.iterations
-        square = 0.0
-        for j in range(len(run.q)):
-            square += (run.target[j] - run.q[j]) ** 2
+        square = squared_distance(run)
         if run.converged and square < least:
             nearest, least = hand, square
     fill_row(run.target, run.q)
@@ -315,7 +323,7 @@ def drift(
     x, y, v = workspace.jacobian
     arm = arm_of(robot, run.hand)
     tip = len(arm.links)
-    joint_chain(run.target, arm, workspace.xs, workspace.ys)
+    chain_by(run.target, arm, workspace.xs, workspace.ys, cosine, sine)
     for j in range(len(run.q)):
         x[j], y[j], v[j] = 0.0, 0.0, 0.0
         k = j - arm.first
@@ -408,10 +416,10 @@ def make_trial(
             if batch.runs[n].action == MOVE:
                 fill_row(trial[n, number].target, batch.runs[n].target)
         if first or learner.pull == 0.0:
-            correct_runs(runs, robot, batch)
+            find_corrections(runs, robot, batch)
         else:
             find_pulled_corrections(runs, robot, batch)
-            make_corrections(runs, robot, batch)
+        make_corrections(runs, robot, batch)
         for n in range(runs):
             account(batch.runs[n], trial[n, number].moved, trial[n, number])
             count_goal(trial[n, number], counts[n])

@@ -33,7 +33,7 @@ from coartic.learner.kernel import (
 )
 from coartic.learner.learning_run import LearningRun
 from coartic.method import Meter
-from coartic.model import PAPER, MotionModel, check_model
+from coartic.model import PAPER, MotionModel
 from coartic.motion.batch import SLOTS
 from coartic.motion.compile import addresses
 from coartic.motion.movement import correct, move
@@ -196,7 +196,6 @@ def learn_many(
     for seed in ordered:
         check_limits("seed", seed, 0, MOST_RUN_SEED)
     ordered = [int(seed) for seed in ordered]
-    check_model(model, radius=task.radius)
     if start:
         first = [movements[0] for movements in movements_by_goal(task, start)]
         if hint := hint_of(first):

@@ -83,8 +83,6 @@ class Method(ABC):
     title: ClassVar[str]
     citation: ClassVar[str]
     information: ClassVar[frozenset[Information]]
-    secondary: ClassVar[tuple[str, ...]] = ()
-    """Objectives beyond hitting the goals, such as smoothness, in words."""
     tuned_on: ClassVar[str] = ""
     """Tasks on which its parameters were chosen, and among how many; empty: not said. Readers judge
     by it whether results are of new tasks; the identity of a run leaves it out."""

@@ -10,15 +10,15 @@ import math
 import os
 import warnings
 from abc import abstractmethod
-from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from coartic.errors import CoarticError
+from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_TRIALS, WIDTHS, brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.learner.learning import TRIALS
@@ -64,9 +64,6 @@ OPTIMISER_INFORMATION = frozenset({Information.CORRECTIVE_PROCESS, Information.R
 FAILED = 1_000_000
 """Cost of a trial that fails, ticks, and of a trial that takes longer."""
 HALF_WIDTH = 1.0
-# For type checkers, which take an array of unknown shape for one point.
-Vector = np.ndarray[tuple[int], np.dtype[Any]]
-Matrix = np.ndarray[tuple[int, int], np.dtype[Any]]
 CHUNK = 8192
 """Points that are evaluated at a time, so that many take no more memory."""
 NO_COPIES = (
@@ -345,14 +342,6 @@ class Objective:
 
     # Evaluation.
 
-    @overload
-    def __call__(self, x: Sequence[float] | Vector, hands: str | None = None) -> float: ...
-
-    @overload
-    def __call__(
-        self, x: Sequence[Sequence[float]] | Matrix, hands: str | None = None
-    ) -> Array: ...
-
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
         """Return the cost, ticks, of a point ``(dim,)``, or costs ``(N,)`` of points ``(dim, N)``,
         columns as scipy has them. Raises ValueError for shape ``(dim, dim)``, in which points may
@@ -540,6 +529,7 @@ def objective(
     return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)
 
 
+@checked_arguments
 def problems(
     family: str,
     split: Literal["test", "development"] = "test",
@@ -580,8 +570,6 @@ def problems(
     MethodError
         The corrective process completes no sequence of an instance, or there are more than 4096.
     """
-    if not isinstance(split, str) or split not in ("test", "development"):
-        raise ValueError(f"split is {brief_value(split)}; it must be 'test' or 'development'")
     return [
         objective(name, half_width=half_width, model=model, budget=budget)
         for name in instance_names(family, split, count)

@@ -28,6 +28,7 @@ from coartic.motion.trial import (
     HandSequences,
     Trials,
     compiled_task,
+    count_trials,
     hand_codes,
     make_trials,
     search_initial_hands,
@@ -353,9 +354,10 @@ class Session:
         self.check_solution(solution)
         with self.lock:
             self._affordable(1)
-            (execution,) = execute_many(self._compiled, [solution], outside=not self._of_run)
+            (execution,) = execute_many(self._compiled, [solution])
             if isinstance(execution, Exception):
                 raise execution
+            count_trials(-self._of_run)
             self._count(
                 _pack_rewards([execution.reward]),
                 execution.ticks,
@@ -436,7 +438,8 @@ class Session:
         """Make and count N trials, or fewer by ``until`` (:meth:`trials`), which may be longer,
         with hands 0 (left) or 1 (right), ``(N, G)``; return their accounts. The caller checks
         arguments and budget, and holds ``lock``."""
-        accounts = make_trials(self._compiled, codes, targets[:, :, None], outside=not self._of_run)
+        accounts = make_trials(self._compiled, codes, targets[:, :, None])
+        count_trials(-len(targets) * self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > until[: len(targets)]
             if better.any():
@@ -457,9 +460,8 @@ class Session:
         ``Information.CORRECTIVE_PROCESS`` and ``REWARD_BY_TRIAL`` are both declared.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
-        chosen, spent = search_initial_hands(
-            self._task, hands, model=self.model, outside=not self._of_run
-        )
+        chosen, spent = search_initial_hands(self._task, hands, model=self.model)
+        count_trials(-spent.get("initial_trials", 0) * self._of_run)
         self._meter.add(**spent)
         return chosen
 

@@ -213,17 +213,23 @@ def load(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> No
 
 
 @inlined
+def squared_distance(run: RunRecord) -> float:
+    """Return the squared joint-space distance from a run's configuration to its target."""
+    square = 0.0
+    for j in range(len(run.q)):
+        delta = run.target[j] - run.q[j]
+        square += delta * delta
+    return square
+
+
+@inlined
 def start(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
     """Copy a run into column ``slot`` of ``at`` (:func:`load`), with start, target and squared
     joint-space length of the movement to its target, which :func:`move_slots` can then make."""
     load(at, slot, number, run, arm)
     _copy_arm(at.start, slot, run.q, arm)
     _copy_arm(at.target, slot, run.target, arm)
-    square = 0.0
-    for j in range(len(run.q)):
-        delta = run.target[j] - run.q[j]
-        square += delta * delta
-    at.distance[slot] = square
+    at.distance[slot] = squared_distance(run)
 
 
 @inlined

@@ -25,10 +25,9 @@ from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from coartic.internal.limits import brief_value, check_limits, real_array
-from coartic.internal.text import short_repr
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion import trigonometry
 from coartic.motion.batch import (
@@ -77,9 +76,6 @@ class MoveResult(NamedTuple):
     evaluations: int
     """Forward-kinematics evaluations: on a path (:func:`follow`) as many as ticks."""
 
-    def __repr__(self) -> str:
-        return short_repr(self, ticks=self.ticks, hit=self.hit, q=self.q)
-
 
 class Correction(NamedTuple):
     """Result of the corrective process (:func:`correct`)."""
@@ -91,9 +87,6 @@ class Correction(NamedTuple):
     """True if the hand is at the goal, as near as ``MotionModel.correction_tolerance``."""
     iterations: int
     """Iterations made, each with one Jacobian."""
-
-    def __repr__(self) -> str:
-        return short_repr(self, converged=self.converged, iterations=self.iterations, q=self.q)
 
 
 @inner
@@ -325,14 +318,11 @@ def move(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
-    _check_arm(robot, hand)
     if not isinstance(stop_on_arrival, bool | np.bool_):
         raise TypeError(f"stop_on_arrival is {brief_value(stop_on_arrival)}; it must be a bool")
-    batch = batch_for(robot, 1)
+    batch = _one_run(robot, q, hand, goal, radius)
     run, figures = batch.runs[0], slice(robot.dof)
-    run["q"][figures] = configuration(robot, q)
     run["target"][figures] = configuration(robot, target)
-    run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal, radius)
     parameters = robot_parameters(robot, radius, model=check_model(model))
     _move_kernel(stop_on_arrival, parameters, batch)
     return MoveResult(
@@ -556,11 +546,8 @@ def correct(
     -----
     Source: paper, Figure 2 (Whitney 1969; Craig 2004).
     """
-    _check_arm(robot, hand)
-    batch = batch_for(robot, 1)
+    batch = _one_run(robot, q, hand, goal)
     run, figures = batch.runs[0], slice(robot.dof)
-    run["q"][figures] = run["target"][figures] = configuration(robot, q)
-    run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal)
     locked = tuple(map(str, locked_base if isinstance(locked_base, Collection) else [locked_base]))
     _correct_kernel(robot_parameters(robot, locked_base=locked, model=check_model(model)), batch)
     return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))
@@ -590,18 +577,12 @@ def explain_failure(
     square = float(reaches @ reaches)
     if np.abs(slopes).max() <= 1e-12 * math.sqrt(square) * math.hypot(*error):
         return ": the arm is straight and points at the goal; bend it"
-    arm_alone = model.gain * square
-    if _SLOW <= (largest := arm_alone + model.gain * bool(free)) < 2.0:
+    if _SLOW <= (largest := model.gain * (square + bool(free))) < 2.0:
         return ""
-    if largest < _SLOW:
-        factor = float(math.ceil(math.sqrt(1.0 / arm_alone)))
-        what = f"below {_SLOW:g} the descent is slow; multiply all lengths by {factor:g}"
-    else:
-        factor = math.ceil(10.0 * math.sqrt(arm_alone / (2.0 - model.gain * bool(free)))) / 10
-        what = f"above 2 the descent can be unstable; divide all lengths by {factor:g}"
     return (
-        f": gain × |J|² of the stretched arm is {largest:.3g}, and {what}, those of links, goals "
-        "and radius"
+        f": gain × |J|² of the stretched arm is {largest:.3g}; below {_SLOW:g} the descent is slow "
+        "and above 2 it can be unstable: multiply all lengths, those of links, goals and radius, "
+        f"by {1.0 / math.sqrt(model.gain * square):.2g}"
     )
 
 
@@ -640,14 +621,19 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
     return np.vstack([q + k * model.step / (distance or 1.0) * difference, target])
 
 
+def segment_lengths(configurations: ArrayLike) -> Array:
+    """Return the joint-space distance from each of k configurations ``(k, dof)`` to the next, shape
+    ``(k - 1,)``, length unit and rad together."""
+    return np.asarray(np.sqrt((np.diff(configurations, axis=0) ** 2).sum(axis=1)))
+
+
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
     """Return the points of the n steps of a path from ``q`` straight through W > 0 ``waypoints``,
     ``(W, dof)``, in joint space, as an array ``(n + 1, dof)``, length unit and rad. Point k < n
     lies k times ``model.step`` along the path; point n is the last waypoint. Raises ValueError for
     a wrong shape or a figure that is not finite or beyond 100,000."""
     corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
-    lengths = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))
-    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    ends = np.concatenate([[0.0], np.cumsum(segment_lengths(corners))])
     at = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
     points = np.stack([np.interp(at, ends, joint) for joint in corners.T], axis=1)
     points[-1] = corners[-1]
@@ -677,21 +663,23 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     return array
 
 
-def _check_arm(robot: Any, hand: Any) -> None:
-    """Raise TypeError if ``robot`` is no Robot, and ValueError if ``hand`` is no hand."""
+def _one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
+    """Return a batch of one run, which stands at ``q``, its target, with a hand that is to hit a
+    goal. Raises TypeError if ``robot`` is no Robot, and ValueError for any other argument that does
+    not fit."""
     if not isinstance(robot, Robot):
         raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
     robot.arm(hand)
+    batch = batch_for(robot, 1)
+    run = batch.runs[0]
+    run["q"][: robot.dof] = run["target"][: robot.dof] = configuration(robot, q)
+    run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal, radius)
+    return batch
 
 
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
     """Return the centre of a goal, x and y, as two floats. Raises ValueError if it is not two
     finite numbers within ±100,000, or if ``radius`` is not from 0 to 100,000, length unit."""
-    place = real_array("goal", centre)
-    if place.shape != (2,):
-        raise ValueError(f"goal is {brief_value(centre)}; it must be two numbers, x and y")
-    x, y = place.tolist()
-    if not (abs(x) <= LARGEST_ENTRY and abs(y) <= LARGEST_ENTRY):
-        raise ValueError(f"goal ({x}, {y}) is not finite or lies beyond {LARGEST_ENTRY:g}")
+    x, y = finite_array("goal", centre, (2,)).tolist()
     check_limits("radius", radius, 0.0, LARGEST_ENTRY)
     return x, y

@@ -76,11 +76,6 @@ class Movement:
     dof)``, length unit and rad; None for the other kinds."""
     __eq__ = equal_contents
 
-    def __post_init__(self) -> None:
-        for name, given in (("target", self.target), ("waypoints", self.waypoints)):
-            if given is not None:
-                real_array(name, given)
-
     def __repr__(self) -> str:
         return short_repr(self, **{k: v for k, v in vars(self).items() if v is not None})
 
@@ -213,12 +208,11 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 
 
 def execute_many(
-    compiled: CompiledTask, solutions: Iterable[Iterable[Movement]], *, outside: bool = True
+    compiled: CompiledTask, solutions: Iterable[Iterable[Movement]]
 ) -> list[Execution | Refused]:
     """Execute and score solutions of one task: solutions without paths side by side, solutions with
     a path one by one. Return a list with, for each solution in order, its execution, or, in its
-    place, the error that :func:`execute` would raise for the solution. Trials are counted as made
-    outside the session of a run if ``outside``."""
+    place, the error that :func:`execute` would raise for the solution."""
     executions: list[Execution | Plan | Refused] = []
     for solution in solutions:
         try:
@@ -227,11 +221,9 @@ def execute_many(
             executions.append(error)
         else:
             kinds = {movement.kind for movements in plan for movement in movements}
-            executions.append(
-                _make_one_by_one(compiled, plan, outside) if "path" in kinds else plan
-            )
+            executions.append(_make_one_by_one(compiled, plan) if "path" in kinds else plan)
     plans = [each for each in executions if isinstance(each, list)]
-    straight = iter(_make_straight(compiled, plans, outside))
+    straight = iter(_make_straight(compiled, plans))
     return [next(straight) if isinstance(x, list) else x for x in executions]
 
 
@@ -250,9 +242,8 @@ def _with_targets(movements: list[Movement]) -> list[Movement | None]:
     return given
 
 
-def _make_straight(compiled: CompiledTask, plans: Sequence[Plan], outside: bool) -> list[Execution]:
-    """Execute plans without paths side by side, and return the executions in their order;
-    ``outside`` as in :func:`make_trials`."""
+def _make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execution]:
+    """Execute plans without paths side by side, and return the executions in their order."""
     if not plans:
         return []
     given = [[_with_targets(movements) for movements in plan] for plan in plans]
@@ -265,7 +256,6 @@ def _make_straight(compiled: CompiledTask, plans: Sequence[Plan], outside: bool)
         np.array(hands).reshape(shape[:2]),
         np.array([stay if m is None else m.target for m in rows]).reshape(*shape, len(stay)),
         np.array([m is None or m.kind != "corrective" for m in rows]).reshape(shape),
-        outside=outside,
     ).goals
     made = movements_in(accounts, compiled.task.robot.dof, given)
     goals = accounts[..., 0]
@@ -307,11 +297,9 @@ def movements_in(
     return trials
 
 
-def _make_one_by_one(compiled: CompiledTask, plan: Plan, outside: bool) -> Execution:
-    """Execute a plan with paths, one movement after the other, and return the execution;
-    ``outside`` as in :func:`make_trials`."""
-    if outside:
-        count_trials(1)
+def _make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
+    """Execute a plan with paths, one movement after the other, and return the execution."""
+    count_trials(1)
     task, q = compiled.task, compiled.starts[0]
     model = compiled.model.for_radius(task.radius)
     made, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))

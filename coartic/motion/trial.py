@@ -143,19 +143,11 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 
 
 @inlined
-def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Correct missed goals of the first ``count`` runs of a batch, in place: phase 4, *correct*.
-    ``target`` of a run for which **A** acts becomes the configuration in which **A** ends;
-    ``ticks`` of each run become the ticks of its corrective movement, 0 if none is made."""
-    find_corrections(count, robot, batch)
-    make_corrections(count, robot, batch)
-
-
-@inlined
 def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Move each of the first ``count`` runs of a batch for which **A** converged, in place, towards
-    its ``target``, the configuration that **A** found. The movement ends as soon as the hand is in
-    the goal, or at the target."""
+    """Move each of the first ``count`` runs of a batch for which **A** converged
+    (:func:`find_corrections`), in place, towards its ``target``, the configuration that **A**
+    found: phase 4, *correct*. The movement ends as soon as the hand is in the goal, or at the
+    target. ``ticks`` of each run become the ticks of this movement, 0 if none is made."""
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -320,7 +312,8 @@ def _reach_lot(
             move_runs(count, robot, batch)
             for i in range(count):
                 goals[first + i, g, m].moved = batch.runs[i].ticks
-        correct_runs(count, robot, batch)
+        find_corrections(count, robot, batch)
+        make_corrections(count, robot, batch)
         for i in range(count):
             n, moved = first + i, 0
             for m in range(goals.shape[2]):
@@ -528,7 +521,7 @@ _outside = 0
 
 def count_trials(count: int) -> None:
     """Add ``count`` to the number of trials made outside the sessions of runs
-    (:func:`trials_outside`)."""
+    (:func:`trials_outside`); the session of a run takes its trials off again."""
     global _outside
     _outside += count
 
@@ -543,13 +536,10 @@ def make_trials(
     hands: Hands,
     targets: Configs,
     stops: NDArray[np.bool_] = ALL_STOP,
-    *,
-    outside: bool = True,
 ) -> Accounts:
     """Make N trials of a task and return their accounts; ``hands``, ``targets`` and ``stops`` as in
-    :class:`Requests`. Trials are counted as made outside the session of a run if ``outside``."""
-    if outside:
-        count_trials(len(targets))
+    :class:`Requests`. They are counted (:func:`count_trials`)."""
+    count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
     return reach(compiled.task.robot, arms, compiled.parameters)
 
@@ -643,17 +633,16 @@ MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
 
 
 def ranked_sequences(
-    task: Task, sequences: Collection[str], *, model: MotionModel = PAPER, outside: bool = True
+    task: Task, sequences: Collection[str], *, model: MotionModel = PAPER
 ) -> list[tuple[str, int | None, str, dict[str, int]]]:
     """Make a trial by the corrective process alone with each hand sequence; return a list, the
     highest reward first and failed trials last, of equals the sequence with the fewest changes of
     hand first, then the sequence given first. An entry has the sequence, the reward (None if the
     trial failed), the reason of the failure (or an empty text), and the counts of the trial by name
-    (:data:`COUNTED`), with a further evaluation for each goal tried. ``outside`` as in
-    :func:`make_trials`."""
+    (:data:`COUNTED`), with a further evaluation for each goal tried."""
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
-    accounts = make_trials(compiled, codes, targets, outside=outside)
+    accounts = make_trials(compiled, codes, targets)
     trials = []
     for hands, goals, counts in zip(
         sequences, accounts.goals[..., 0], accounts.counts, strict=True
@@ -716,7 +705,6 @@ def search_initial_hands(
     hands: tuple[Hand, ...] | None = None,
     *,
     model: MotionModel = PAPER,
-    outside: bool = True,
 ) -> tuple[str, Mapping[str, int]]:
     """Return the hand sequence of trial 0, such as ``"RRRR"``, and the counts of the search for it,
     by counters of :class:`~coartic.method.Meter`.
@@ -724,7 +712,8 @@ def search_initial_hands(
     If the task names a sequence, this is returned, and no counts. If it names a policy, the
     corrective process alone tries sequences of ``hands`` (None: the task's): under
     ``"best-single-hand"`` sequences of one hand, else all; the first of :func:`ranked_sequences` is
-    returned. ``outside`` as in :func:`make_trials`; a search that fails counts no trials.
+    returned. Trials are counted (:func:`count_trials`), also where the result was kept, but not of
+    a search that fails.
 
     Raises NotApplicableError if no sequence tried completes the task, or more than 4096 would have
     to be tried, and ValueError for no hand or a hand that is not among the task's hands.
@@ -734,8 +723,7 @@ def search_initial_hands(
         return task.initial_hands, {}
     ordered = tuple(hand for hand in HANDS if hand in allowed)
     chosen, spent = _search_by_policy(task.model_dump_json(), ordered, model)
-    if outside:
-        count_trials(spent["initial_trials"])
+    count_trials(spent["initial_trials"])
     return chosen, spent
 
 
@@ -751,7 +739,8 @@ def _search_by_policy(
         candidates = [letters_of([hand] * goals) for hand in hands]
     else:
         candidates = sequences_with(hands, goals, task.name)
-    ranked = ranked_sequences(task, candidates, model=model, outside=False)
+    ranked = ranked_sequences(task, candidates, model=model)
+    count_trials(-len(ranked))  # the caller counts them, each time
     best, reward, reason, _ = ranked[0]
     if reward is None:
         raise NotApplicableError(

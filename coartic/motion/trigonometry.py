@@ -13,11 +13,10 @@ the C library answers.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from coartic.motion.compile import chain_by, inner, scalar
+from coartic.motion.compile import scalar
 
 LARGEST = 1e5  # rad; up to here k * _HIGH and k * _MIDDLE below are exact
 
@@ -78,10 +77,3 @@ def cosine(angle: float) -> float:
 def sine(angle: float) -> float:
     """Return sin(angle), angle in rad; the same bits on every system for |angle| < 1e5 rad."""
     return near_sine(angle) if abs(angle) < LARGEST else math.sin(angle)
-
-
-@inner
-def joint_chain(q: Any, arm: Any, xs: Any, ys: Any) -> None:
-    """Fill ``xs`` and ``ys``, in place, with x and y of an arm's shoulder, joints and hand in
-    configuration ``q``: :func:`coartic.robot.chain` with :func:`cosine` and :func:`sine`."""
-    chain_by(q, arm, xs, ys, cosine, sine)

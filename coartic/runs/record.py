@@ -20,6 +20,7 @@ from coartic.internal.limits import real_array
 from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
 from coartic.method import MOST_COUNT, Meter
 from coartic.model import PAPER
+from coartic.motion.movement import segment_lengths
 from coartic.motion.solution import Execution, Movement, execute_many
 from coartic.motion.trial import compiled_task
 from coartic.runs.plan import Cell, Job
@@ -378,7 +379,7 @@ def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     shapes = {np.shape(corner) for corner in corners}
     if len(shapes) == 1:  # otherwise the solution breaks the rules
         with np.errstate(over="ignore"):
-            steps = np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1)).sum() / PAPER.step
+            steps = segment_lengths(corners).sum() / PAPER.step
         if steps > MOST_STEPS:
             return SolutionError(
                 f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"

@@ -49,7 +49,7 @@ def load_task(name_or_path: str | Path) -> Task:
     """
     if not isinstance(name_or_path, str | Path):
         raise TypeError(
-            f"task is {brief_value(name_or_path)}; it must be the name of a task, such as "
+            f"task is {brief_value(name_or_path)}; it must be a task, the name of one, such as "
             "'ascending', or the path of a task file"
         )
     if words := foreign_file(str(name_or_path)):
@@ -81,11 +81,4 @@ def load_task(name_or_path: str | Path) -> Task:
 def as_task(task: TaskLike) -> Task:
     """Return the task itself, or load it by its name or from its file (:func:`load_task`). Raises
     TaskError for a task that cannot be loaded, and TypeError for anything else."""
-    if isinstance(task, Task):
-        return task
-    if not isinstance(task, str | Path):
-        raise TypeError(
-            f"task is {brief_value(task)}; it must be a Task, the name of one, such as "
-            "'ascending', or the path of a task file"
-        )
-    return load_task(task)
+    return task if isinstance(task, Task) else load_task(task)

@@ -297,32 +297,22 @@ def broken_rule(family: Family, task: Task) -> str | None:
     return "corrective" if None in rewards else None
 
 
-def first_good(
-    family: Family, address: Address, most: int = MOST_ATTEMPTS
-) -> tuple[Task, tuple[str, ...]]:
-    """Return the first draft (task drawn for the instance at ``address``) that breaks no rule, and
-    for each earlier draft, in order, the name of the rule that it broke, such as ``"overlap"``
-    (:func:`broken_rule`). Raises TaskError if each of the first ``most`` drafts breaks a rule.
-    """
-    rejected: list[str] = []
-    while len(rejected) < most:
-        task = draft(family, address, len(rejected))
-        rule = broken_rule(family, task)
-        if rule is None:
-            return task, tuple(rejected)
-        rejected.append(rule)
-    rule, times = Counter(rejected).most_common(1)[0]
-    raise TaskError(
-        f"{address}: {most:,} draws of family {family.name!r} broke a rule, {times:,} of "
-        f"them {rule!r}"
-    )
-
-
 def instance_of(family: Family, address: Address) -> Task:
-    """Draw the instance of a family at an address, and return it as a task with a title, initial
-    hands and provenance. Raises TaskError if each of the first 10,000 drafts (random tasks) breaks
-    a rule of the family."""
-    task, _ = first_good(family, address)
+    """Return the instance of a family at an address, the first draft (task drawn for it) that
+    breaks no rule, as a task with a title, initial hands and provenance. Raises TaskError if each
+    of the first 10,000 drafts breaks a rule of the family."""
+    broken = Counter[str]()
+    for attempt in range(MOST_ATTEMPTS):
+        task = draft(family, address, attempt)
+        if (rule := broken_rule(family, task)) is None:
+            break
+        broken[rule] += 1
+    else:
+        rule, times = broken.most_common(1)[0]
+        raise TaskError(
+            f"{address}: {MOST_ATTEMPTS:,} draws of family {family.name!r} broke a rule, {times:,} "
+            f"of them {rule!r}"
+        )
     name = str(address)
     short = name.rpartition("/")[2]
     source = f"drawn: family {family.name}, instance {short}"
@@ -458,9 +448,7 @@ def instance_names(
     instances without a year from 1000 to 9999, and for others with a year; TaskError for a family
     that is unknown or cannot be used.
     """
-    load_family(str(family))
-    if split not in COUNTS:
-        raise ValueError(f"split is {split!r}; it is one of {', '.join(map(repr, COUNTS))}")
+    load_family(family)
     if (year is None) == (split == "fresh"):
         raise ValueError(f"year is {year!r}; fresh instances need one, such as 2027, others none")
     if year is not None:

@@ -22,7 +22,7 @@ from coartic.errors import CoarticError, TaskError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import folder_named, write_output
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.text import Line, counted, did_you_mean, short_repr
+from coartic.internal.text import Line, counted, did_you_mean
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain_file, sentence_error
 from coartic.model import PAPER, PAPER_RADIUS
@@ -215,12 +215,9 @@ class Task(FileData):
     def _with_start(cls, content: Any) -> Any:
         """Return the content of a task with ``q0``, ``(dof,)``, as ``start``, or, without either,
         with the base at (0, 0) and both arms along +x; what is no dictionary comes back unchanged.
-        Raises a validation error for both keys, a wrong ``q0`` and the key ``penalty``."""
+        Raises a validation error for both keys and a wrong ``q0``."""
         if not isinstance(content, dict):
             return content
-        if "penalty" in content:
-            reads = "version 1.1.0 of coartic reads tasks with a penalty"
-            raise sentence_error(f"{reads}; here a reward is minus the ticks")
         if {"start", "q0"} <= content.keys():
             raise sentence_error("q0 and start both say where a trial begins: give one of them")
         if "start" in content:
@@ -285,17 +282,6 @@ class Task(FileData):
         if file.suffix != ".toml":
             raise CoarticError(f"cannot write {file}: the name of a task's file ends in .toml")
         write_output(file, task_text(self).encode(), replace=replace)
-
-    def __repr__(self) -> str:
-        """Return name, number of goals, hands and initial hands of the task, in one line, each
-        value cut to 80 characters."""
-        return short_repr(
-            self,
-            repr(self.name),
-            counted(len(self.goals), "goal"),
-            hands=self.hands,
-            initial_hands=self.initial_hands,
-        )
 
     def _repr_html_(self) -> str:
         """Return the HTML that a notebook shows: base, arms and numbered goals at the start."""
@@ -456,11 +442,9 @@ def task_text(task: Task) -> str:
 
 def _toml_value(value: Any) -> str:
     """Return a string of printable characters, a number, or a list or dictionary of these as TOML
-    text: a string as JSON writes it, a dictionary as an inline table, with keys written bare."""
+    text: as JSON writes it, a dictionary as an inline table, with keys written bare."""
     if isinstance(value, dict):
         return (
             "{ " + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + " }"
         )
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml_value, value)) + "]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+    return json.dumps(value, ensure_ascii=False)
