@@ -71,6 +71,10 @@ def report(
         f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
         f"{counted(made['.csv'], 'table')} ({what})."
     )
+    if not for_paper:
+        say_pairs(
+            [("More", "coartic report --for-paper adds figures as SVG and PDF and tables as LaTeX")]
+        )
     for part, reason in failures.items():
         complain("Error", f"{part} could not be made, by a fault of coartic: {reason}")
     if failures:

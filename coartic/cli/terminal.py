@@ -56,9 +56,12 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
 
 
 def complain(kind: str, text: str) -> None:
-    """Print each line of ``text`` on stderr after ``kind``, ``Error`` or ``Warning``, and a
-    colon."""
-    say(*(f"{kind}: {line}" for line in text.splitlines()), stream=sys.stderr)
+    """Print each line of ``text`` on stderr after ``kind``, ``Error`` or ``Warning``, and a colon;
+    on a terminal lines are broken between words."""
+    width = shutil.get_terminal_size().columns if sys.stderr.isatty() else sys.maxsize
+    wrap = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False).wrap
+    for line in text.splitlines():
+        say(*wrap(f"{kind}: {line}"), stream=sys.stderr)
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:

@@ -76,6 +76,11 @@ class Movement:
     dof)``, length unit and rad; None for the other kinds."""
     __eq__ = equal_contents
 
+    def __post_init__(self) -> None:
+        for name, given in (("target", self.target), ("waypoints", self.waypoints)):
+            if given is not None:
+                real_array(name, given)
+
     def __repr__(self) -> str:
         return short_repr(self, **{k: v for k, v in vars(self).items() if v is not None})
 
