@@ -143,8 +143,8 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
 
 
 def selects(study: Study, label: str) -> bool:
-    """Return True if a method may select its solution by rewards of trials, and is not random
-    search."""
+    """Return True if a method, ``label``, declares that it gets the reward of each trial, by which
+    it can select its solution, and is not random search."""
     method = study.methods.loc[label]
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 

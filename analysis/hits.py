@@ -731,9 +731,10 @@ def _odd_groups(frame: pd.DataFrame, task: Task) -> list[str]:
 
 
 def _warn_of_values(hits: pd.DataFrame, joints: Sequence[str], source: str) -> None:
-    """Warn, at most once, of signs that an angle of an arm is rounded or not measured, or that the
-    posture or an angle of many hits of a goal is filled in. ``hits`` are the hits of a subject with
-    this arm, ``joints`` the columns of its angles; ``source`` begins the warning."""
+    """Warn, at most once, if an angle of an arm seems rounded or not measured, or if many hits of a
+    goal have the same posture, or the same value of an angle, as if filled in. ``hits`` are
+    recorded hits of a subject with this arm, ``joints`` the columns of its angles, rad; ``source``
+    begins the warning."""
     postures = len(hits[joints].drop_duplicates())
     for name in joints:
         angles = np.unique(hits[name])

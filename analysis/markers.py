@@ -251,8 +251,8 @@ def _samples_of(
     recording: pd.DataFrame | str | Path, task: Task, hands: Sequence[Hand]
 ) -> _Samples:
     """Return the samples of a recording as of :func:`hits_from_markers`, NaN for a missing place.
-    Raises CoarticError for a missing column, no sample, several people, a number that is none, and
-    trials or times that are in no order."""
+    Raises CoarticError for a missing column, no sample, several people, a value that is no number,
+    and trials or times that are in no order."""
     if isinstance(recording, pd.DataFrame):
         frame, source, names = recording.reset_index(drop=True), "the frame", row_names(recording)
     else:
@@ -301,8 +301,8 @@ def _samples_of(
 
 
 def _check_clock(samples: _Samples) -> None:
-    """Raise CoarticError if samples are not 25 to 2000 in a second, or of another rate in some
-    trials."""
+    """Raise CoarticError if there are fewer than 25 or more than 2000 samples in a second, or if
+    some trials have another number than others."""
     if not 0.0005 <= samples.step <= 0.0401:  # else hands pass goals between samples
         raise CoarticError(
             f"{samples.source}: the time between samples is {samples.step:g} s; needed are 25 to "
@@ -521,9 +521,10 @@ def _unfinished(samples: _Samples, trials: Sequence[_Trial], remedy: str) -> str
 
 
 def _check_starts(samples: _Samples, q: Array, trials: Sequence[_Trial]) -> None:
-    """Raise CoarticError for finished trials that begin far from the task's start, or with a rest;
-    warn if most begin a little away, or if one arm starts later than the other in all. ``q``:
-    postures of samples, ``(n, dof)``."""
+    """Raise CoarticError for finished trials that begin with a rest, or with the hand away from the
+    task's start by over a quarter of the arm's reach. Warn if most begin a little away from it, or
+    if one arm starts later than the other in all trials. ``q``: postures of samples,
+    ``(n, dof)``."""
     task, robot, hands = samples.task, samples.task.robot, [*samples.places]
     largest = 0.25 * max(robot.reach(hand)[1] for hand in hands)
     away, rests = np.zeros((2, len(q)), dtype=bool)

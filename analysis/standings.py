@@ -137,14 +137,15 @@ def common_runs(study: Study) -> pd.DataFrame:
 
 @cached
 def board(study: Study, also: frozenset[str] = frozenset()) -> pd.DataFrame:
-    """Return the standings: a row for each method with a gap, by label, with the columns of
-    :func:`.ranking` and of :attr:`.Study.methods`, and with ``ranked``.
+    """Return the standings: a row for each method that has a gap to the best known reward, by
+    label, with the columns of :func:`.ranking` and of :attr:`.Study.methods`, and with ``ranked``,
+    True or False.
 
-    Ranked are methods of :func:`common_runs` that solved every run there, in at most
-    :func:`equal_trials` unless trials are varied; the smallest gap is first. Below them, not
-    ranked, are methods with more trials, and methods from files or of the labels ``also`` that lack
-    a run or a solution on one of these tasks, over the tasks on which they solved every run. Other
-    methods have no row.
+    Ranked is a method of :func:`common_runs` that solved every run there, with at most
+    :func:`equal_trials` trials (with any number in a study that varies it); the smallest gap is
+    first. Rows that are not ranked follow: of methods with more trials, and of methods from files
+    or in ``also`` that lack a run or a solution on one of these tasks, whose numbers are means over
+    the tasks on which they solved every run. Other methods have no row.
     """
     runs, methods = common_runs(study), study.methods
     parts = [ranking(runs)] if len(runs) else []

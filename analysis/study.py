@@ -87,8 +87,8 @@ def cached(
 ) -> Callable[Concatenate[Study, Asked], Computed]:
     """Make a function of a study keep its result for each study and its other arguments.
 
-    Calls with equal arguments, written alike, return the same object, which callers must not
-    change; arguments must be hashable.
+    Calls with equal arguments return the same object, which callers must not change, if both give
+    an argument by position, or both by name; arguments must be hashable.
     The function raises CoarticError for an object that is no study, and for an argument of another
     kind than its hint says.
     """

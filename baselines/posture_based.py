@@ -145,8 +145,8 @@ class PosturePlanner:
 
     def plan(self) -> tuple[tuple[Movement, ...], list[int]]:
         """Return the movement to each goal, and the ticks that each movement is expected to take.
-        To be called once: ``q`` and ``store`` of the planner change. Raises MethodError if
-        correction brings no posture to a goal (:meth:`retrieve`)."""
+        To be called once: ``q`` and ``store`` of the planner change. Raises MethodError if there is
+        a goal to which correction brings no posture (:meth:`retrieve`)."""
         movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
             ahead = range(goal, min(goal + self.horizon, len(self.goals)))

@@ -336,8 +336,8 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs for workers, and return the parts: parts without a number of trials first, then
-    parts with the most trials."""
+    """Divide jobs for workers, and return the smaller jobs, each with some of the runs: first jobs
+    of methods without a number of trials, then the others, by trials, the most first."""
     # A run among many takes a fraction of its time alone: jobs are as large as methods allow, and
     # each worker has a part. Long jobs come first, so that none is alone at the end; one run of a
     # planner, which has no number of trials, can take as long as thousands of trials: it is first.

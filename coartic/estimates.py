@@ -201,5 +201,5 @@ def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.
 
 def standard_deviation(values: Array) -> float:
     """Return the SD of values ``(n,)``, with n - 1 degrees of freedom: NaN for fewer than two
-    values, else 0 without spread or with NaN or infinity."""
+    values; 0 for two or more without spread, or with NaN or infinity among them."""
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan

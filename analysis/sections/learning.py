@@ -108,12 +108,12 @@ def draw_learning_curves(study: Study) -> Parts | None:
 def learning_curves(study: Study) -> pd.DataFrame:
     """Return the best reward so far, negative ticks, by task, method and number of trials.
 
-    For solved runs with rewards of trials, on tasks of :func:`.one_by_one`, of the
-    :func:`.headline_methods` among :data:`CURVES` and methods from files; EC1 only on tasks without
-    such runs of EC2 to EC4. Columns ``task``, ``method`` (label),
+    Runs count that are solved and have rewards of trials, on tasks of :func:`.one_by_one`. Methods
+    are the :func:`.headline_methods` among :data:`CURVES` and methods from files of users; EC1 has
+    a curve only on tasks without such runs of EC2 to EC4. Columns: ``task``, ``method`` (label),
     ``runs`` (number of runs), ``trial`` (at most 120 numbers, from 1 to the trials of the shortest
     run), ``best`` (mean over runs, NaN until all have a solution), quartiles ``best_low`` and
-    ``best_high``; no columns without a curve.
+    ``best_high``. Without any curve the frame is empty and has no columns.
     """
     learned, curves = improvements(study), [pd.DataFrame()]
     cells = {

@@ -115,8 +115,8 @@ def tasks_meant(names: Sequence[str]) -> list[str]:
 
 
 def method_names(registered: Registry) -> Mapping[str, str]:
-    """Return the names that people use for registered methods, by id; an empty text for a method
-    without such a name, and for conditions such as ``EC4``, which are added."""
+    """Return the name that people use for each registered method, by id, such as ``CMA-ES``, or an
+    empty text if it has none; conditions, such as ``EC4``, are ids, too, without such a name."""
     from coartic.analysis.methods import title_of
     from coartic.learner.conditions import EVERY_CONDITION
 

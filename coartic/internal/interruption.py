@@ -30,9 +30,9 @@ _words = ["Interrupted."]
 
 def catch_signals() -> None:
     """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) raise KeyboardInterrupt from now
-    on, except in the 5 s after a KeyboardInterrupt that Python did not lose
-    (:func:`_interrupt_again`); unblock all signals (not on Windows). A signal ignored, as by
-    ``nohup``, stays so."""
+    on, and unblock all signals (not on Windows). For 5 s after a signal has done so others are
+    ignored, unless Python lost the KeyboardInterrupt (:func:`_interrupt_again`). A signal that was
+    ignored before, as by ``nohup``, stays so."""
 
     def interrupt(number: int, _: object) -> None:
         if not _heard or time.monotonic() > _heard[-1][1] + _CLEANING_S:

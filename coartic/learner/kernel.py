@@ -270,9 +270,10 @@ def choose_hand(
     n: int, entries: Any, explore: bool, robot: Any, learner: Any, rng: Any, workspace: Any
 ) -> int:
     """Return the hand (0 left, 1 right) of run ``n`` for its present goal: the hand of highest
-    value in ``entries`` (value Q and target posture q* by hand); with ``explore``, with probability
-    ε, the hand that the condition explores, if any (random, closest, of equally close hands a
-    random one, or nearest in posture)."""
+    value Q in ``entries``, a record for each hand, the left hand at a tie. With ``explore``, with
+    probability ε, return the hand that the condition explores instead, if it explores hands: a
+    random hand, the hand closest to the goal (a random one if both are), or the hand whose
+    posture at the goal is nearest."""
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
         if learner.exploration == _NEAREST_POSTURE:

@@ -452,9 +452,10 @@ def project(v: Any, x: Any, y: Any) -> None:
 
 @inner
 def _pull_to_preferred(at: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
-    """Set ``pull`` in each of the first ``count`` columns of ``at`` to β N(q) (p − q), 0 for locked
-    base coordinates: the share β of the way to the preferred posture p (``pull`` and ``preferred``
-    of the run), projected by N onto the null space of the hand's Jacobian."""
+    """Set ``at.pull[:, i]``, for each of the first ``count`` columns i, to β N(q) (p − q), 0 for
+    locked base coordinates: β is the ``pull`` and p the preferred posture of the run in that
+    column, ``runs[at.run[i]]``; N projects onto the null space of the hand's Jacobian at the
+    column's configuration q, whose joints are at ``at.x`` and ``at.y`` already."""
     tip = len(at.length)
     for i in range(count):
         run, v = runs[at.run[i]], at.pull[:, i]

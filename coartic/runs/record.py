@@ -227,7 +227,7 @@ class Run:
 
     def movement_data(self, part: str) -> list[list[Any]]:
         """Return the movements of a part (``solution``, ``initial`` or ``replay``), each as a list
-        of goal, hand, kind, ticks and path; an empty list if the run lacks the part."""
+        for JSON (:func:`movement_data`); an empty list if the run lacks the part."""
         return [movement_data(each) for each in self.scores.get(part, Score()).movements]
 
     def to_row(self) -> dict[str, Any]:
@@ -355,9 +355,10 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
-    """Execute solutions of a task under the paper's model; return for each, in order, its
-    execution, or, as an object, the error of a solution that breaks the rules of the task, or is
-    too long (:func:`too_long`). Targets and waypoints are arrays of floats."""
+    """Execute solutions of a task, whose targets and waypoints are arrays of floats, under the
+    paper's model. Return a list with the execution of each solution, in order; in its place the
+    error, not raised, of a solution that breaks the rules of the task or is too long
+    (:func:`too_long`)."""
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
     executions = iter(execute_many(compiled_task(task, PAPER), short))
