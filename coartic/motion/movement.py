@@ -664,9 +664,9 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
 
 
 def _one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
-    """Return a batch of one run, which stands at ``q``, its target, with a hand that is to hit a
-    goal. Raises TypeError if ``robot`` is no Robot, and ValueError for any other argument that does
-    not fit."""
+    """Return a batch of one run, whose configuration and target are ``q``, with the hand and goal
+    of the run; ``radius`` is only checked. Raises TypeError if ``robot`` is no Robot, and
+    ValueError for any other argument that does not fit."""
     if not isinstance(robot, Robot):
         raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
     robot.arm(hand)
