@@ -33,8 +33,8 @@ def _instances(study: Study) -> dict[str, list[str]]:
 def on_instances(study: Study) -> pd.DataFrame:
     """Return the runs of compared methods on those instances with a best known reward on which the
     method solved every run, sorted by family and instance as in :func:`_instances`. Column
-    ``method`` has the label of the method's row; runs of a joined learner are there again under its
-    label. Do not change the frame: it is kept."""
+    ``method`` has the label of the method's row; runs of a condition are there again under the
+    label of a joined learner. Do not change the frame: it is kept."""
     parts = {method: runs[runs.task.isin(solved_tasks(study, method))]
              for method, runs in compared(study).items()}  # fmt: skip
     every = together(study, parts)
@@ -46,8 +46,8 @@ def on_instances(study: Study) -> pd.DataFrame:
 
 def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
     """Return, by family, the gaps of a method's runs on each instance of the family, a list of
-    arrays of shape ``(n,)``. ``runs`` are the method's rows of :func:`on_instances`; families with
-    an instance of which no run is there are left out."""
+    arrays of shape ``(n,)``. ``runs`` are the method's rows of :func:`on_instances`; a family is
+    left out if one of its instances has no run there."""
     return {
         str(family): [
             part.gap.to_numpy(np.float64) for _, part in of_family.groupby("task", sort=False)
