@@ -221,8 +221,9 @@ def _with_values(
 ) -> pd.DataFrame:
     """Return a new frame of recorded hits whose subjects and hands are texts and other values
     numbers, with times in ticks: ``ticks_per_unit`` (None: 1, for hits from no file) times the
-    given ones. Warns of a subject that is spelt in several ways, and raises CoarticError for a
-    value that cannot be, or a hit that is there twice."""
+    given times, whose column was ``duration`` if ``is_timed``. Warns of a subject that is spelt in
+    several ways, and raises CoarticError for a value that cannot be, or a hit that is there twice.
+    """
 
     def refuse(wrong: ArrayLike, column: str, wanted: str | Callable[[object], str]) -> None:
         if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():

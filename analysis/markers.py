@@ -327,8 +327,8 @@ def _bridge_gaps(samples: _Samples) -> pd.DataFrame:
 
     Returns a row for each sample: ``gap``, duration of the longest gap that begins there, s, or 0,
     and its ``marker``, such as ``right_1: ``, empty if whole samples are missing; ``is_held``, True
-    if a marker keeps its place from there for over 50 ms, unlike elsewhere. ``attrs["grid"]`` is
-    the step to which places are rounded, length unit.
+    if a marker keeps its place, or is missing, from there for over 50 ms, unlike elsewhere.
+    ``attrs["grid"]`` is the step to which places are rounded, length unit.
     """
     task, step, n = samples.task, samples.step, len(samples.time)
     longest, of_marker = np.zeros(n), np.full(n, "", dtype=object)

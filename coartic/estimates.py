@@ -111,7 +111,7 @@ def centred(values: Array) -> Array:
 def mean(values: Numbers) -> Estimate:
     """Return the mean of a sample ``(n,)`` with its 95 % interval (:func:`mean_of_means`), whose
     ends are NaN for fewer than three values. Raises ValueError for a sample that is no vector,
-    empty or not finite, or has values beyond 1e100 or nearer to 0 than 1e-100."""
+    empty or not finite, or has values, other than 0, that are not from 1e-100 to 1e100 in size."""
     return _mean_of(tuple(vector(values).tolist()))
 
 

@@ -162,7 +162,7 @@ def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
     match detail["type"]:
         case "sentence":
             return message
-        case "value_error" if not key:  # of the whole
+        case "value_error" if not key:  # of the object itself
             return message.removeprefix("Value error, ")
         case "unexpected_positional_argument":
             if key in keys:

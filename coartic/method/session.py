@@ -435,9 +435,9 @@ class Session:
         return hand_codes(self._task, hands, count)
 
     def _make_trials(self, codes: Hands, targets: Configs, until: Array | None = None) -> Accounts:
-        """Make and count N trials, or fewer by ``until`` (:meth:`trials`), of whose entries the
-        first N count, with hands 0 (left) or 1 (right), ``(N, G)``; return their accounts. The
-        caller checks arguments and budget, and holds ``lock``."""
+        """Make and count N trials, or fewer by the first N entries of ``until`` (:meth:`trials`),
+        with hands 0 (left) or 1 (right), ``(N, G)``; return their accounts. The caller checks
+        arguments and budget, and holds ``lock``."""
         accounts = make_trials(self._compiled, codes, targets[:, :, None])
         count_trials(-len(targets) * self._of_run)
         if until is not None:
