@@ -364,11 +364,11 @@ def _bridge_gaps(samples: _Samples) -> pd.DataFrame:
 
 
 def _find_jumps_of_links(samples: _Samples) -> NDArray[np.object_]:
-    """Return for each sample, ``(n,)``, the marker at which a link begins whose length jumps there,
-    such as ``right_1: ``, empty without a jump: a change by over 10 % of the task's length and nine
-    times the median change. Raises CoarticError if the median length of a link in a trial differs
-    by over 10 % from the task's; warns if over all trials by over 2 %, or between trials by over
-    2.5 %."""
+    """Return for each sample, ``(n,)``, the marker at which a link begins that changes its length
+    from the sample before by over 10 % of the task's length and over nine times the median change,
+    such as ``right_1: ``, or an empty text. Raises CoarticError if the median length of a link in a
+    trial differs by over 10 % from the task's; warns if over all trials by over 2 %, or between
+    trials by over 2.5 %."""
     task, jumps = samples.task, np.full(len(samples.time), "", dtype=object)
     for hand, places in samples.places.items():
         links, lengths = task.robot.arm(hand).links, _lengths(places)

@@ -124,7 +124,7 @@ def explain_inline(
     for detail in error.errors(include_url=False):
         place = detail["loc"]
         if given and (kind := detail.get("ctx", {}).get("class_name")):
-            detail["msg"] = f"Input should be an instance of {kind}"  # which a file has as a table
+            detail["msg"] = f"Input should be an instance of {kind}"  # no table, as in a file
         if given and detail["input"] is given.get(place[0]):
             place = place[:1]  # what follows is the name of a kind
         if place in problems:
