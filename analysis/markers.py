@@ -76,9 +76,9 @@ def hits_from_markers(
     Returns
     -------
     DataFrame
-        A row for each hit, with the columns of :func:`.read_hits`. Trials in which a goal is never
-        reached have no hits, with a warning; ``attrs["unfinished"]``, which :func:`pandas.concat`
-        may lose, is the number of such trials.
+        A row for each hit, with the columns of :func:`.read_hits` (``ticks``: at least 1). Trials
+        in which a goal is never reached have no hits, with a warning; ``attrs["unfinished"]``,
+        which :func:`pandas.concat` may lose, is the number of such trials.
 
     Raises
     ------
@@ -202,8 +202,8 @@ class _Samples:
             raise CoarticError(self.sentence(rows, words))
 
     def sentence(self, rows: Sequence[int], words: str) -> str:
-        """Return ``words`` between the source with the name of the first of ``rows`` (indices of
-        samples) and the names of other rows."""
+        """Return ``words`` after the source and the name of the first of ``rows`` (indices of
+        samples), and before the names of other rows."""
         return f"{self.source}, {self.names[rows[0]]}: {words}{also([self.names[k] for k in rows])}"
 
     def compare_trials(
