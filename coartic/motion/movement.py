@@ -567,7 +567,8 @@ def explain_failure(
     One cause is a hand that no free joint or base coordinate moves nearer. Other causes are a long
     and a short arm: near a goal, errors shrink by the factor ``1 - gain σ²`` an iteration, with the
     singular values σ of the Jacobian J, so that the descent is stable while gain × |J|² of the
-    stretched arm is below 2, and slow where it is small.
+    stretched arm is below 2, and slow where it is small. A free base adds the gain to it, whatever
+    the lengths are.
     """
     free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
     arm = robot.joints(hand)
@@ -579,10 +580,13 @@ def explain_failure(
         return ": the arm is straight and points at the goal; bend it"
     if _SLOW <= (largest := model.gain * (square + bool(free))) < 2.0:
         return ""
+    advice = "take a gain below 1"
+    if model.gain * bool(free) < 1.0:
+        factor = 1.0 / math.sqrt(model.gain * square)
+        advice = f"multiply all lengths, those of links, goals and radius, by {factor:.2g}"
     return (
         f": gain × |J|² of the stretched arm is {largest:.3g}; below {_SLOW:g} the descent is slow "
-        "and above 2 it can be unstable: multiply all lengths, those of links, goals and radius, "
-        f"by {1.0 / math.sqrt(model.gain * square):.2g}"
+        f"and above 2 it can be unstable: {advice}"
     )
 
 
