@@ -187,8 +187,8 @@ class _Samples:
 
     @cached_property
     def leaps(self) -> NDArray[np.bool_]:
-        """Mask, ``(n,)``, of samples before which others are missing: over 1.9 times the mean time,
-        not 2, because clocks may be rounded."""
+        """Mask, ``(n,)``, of samples before which others are missing: their time since the sample
+        before is over 1.9 times :attr:`step` (not 2: clocks may be rounded)."""
         return ~self.begins & (self.steps > 1.9 * self.step)
 
     def by_trial(self, values: Array, statistic: str) -> Array:
