@@ -171,10 +171,11 @@ def checked_hits(
 
 
 def _with_columns(frame: pd.DataFrame, task: Task, source: str, is_timed: bool) -> pd.DataFrame:
-    """Return recorded hits with the columns of :func:`read_hits` alone, angles of joints that the
-    task does not use, and a locked base that is not there, as at the start; ``is_timed``: ticks are
-    in ``duration``. Warns of columns that are left out, and raises CoarticError for a column that
-    is missing or there twice, and for no hits."""
+    """Return recorded hits with only the columns of :func:`read_hits`; joints that the task does
+    not use, and locked base coordinates without a column, are as at the start. ``is_timed``:
+    ``duration`` becomes ``ticks``, still in its unit. Warns of columns that are left out, and
+    raises CoarticError for a column that is missing or there twice, for both ``ticks`` and
+    ``duration``, and for no hits."""
     if twice := [name for n, name in enumerate(frame.columns) if name in frame.columns[:n]]:
         raise CoarticError(f"{source} has two columns {twice[0]!r}")
     joints = [*task.robot.joint_names]
@@ -219,8 +220,10 @@ def _with_values(
     is_timed: bool,
 ) -> pd.DataFrame:
     """Return a new frame of recorded hits whose subjects and hands are texts and other values
-    numbers. Warns of a subject that is spelt in several ways, and raises CoarticError for a value
-    that cannot be, or a hit that is there twice."""
+    numbers, with times in ticks: ``ticks_per_unit`` (None: 1, for hits from no file) times the
+    given times, whose column was ``duration`` if ``is_timed``. Warns of a subject that is spelt in
+    several ways, and raises CoarticError for a value that cannot be, or a hit that is there twice.
+    """
 
     def refuse(wrong: ArrayLike, column: str, wanted: str | Callable[[object], str]) -> None:
         if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():
@@ -275,9 +278,10 @@ def _without_implausible(
     implausible: Implausible,
     unit: float,
 ) -> tuple[pd.DataFrame, Sequence[str]]:
-    """Return sorted hits, and names of their rows, without implausible ones, with a warning that
-    counts them. Raises CoarticError, with advice, if there are some and ``implausible`` is
-    "refuse", or if most of a subject's are; ``unit``: ticks in a unit of the recording."""
+    """Return sorted hits, and names of their rows, without implausible hits, with a warning that
+    counts these. Raises CoarticError, with advice, for implausible hits if ``implausible`` is
+    "refuse", and if most hits of a subject are implausible; ``unit``: ticks in a unit of time of
+    the recording."""
     initial, counts = initial_solution(task), frame.subject.value_counts()
     slowest = max(initial.ticks_by_goal() if initial else [np.pi / PAPER.step * task.robot.dof])
     reasons: list[str] = []
@@ -358,9 +362,10 @@ def _implausible(
     frame: pd.DataFrame, task: Task, source: str, unit: float, slowest: float
 ) -> NDArray[np.object_]:
     """Return why sorted hits of a subject are implausible, a text for each, empty for a plausible
-    hit; warn of odd places and times. Times are not checked where places make most hits
-    implausible. ``source`` begins messages; ``unit``: ticks in a unit of the recording;
-    ``slowest``: ticks of the longest subtask of the corrective process."""
+    hit; warn of odd places and times. Raises CoarticError for times that are wrong as a whole
+    (:func:`_odd_times`). Times are not checked where places make most hits implausible. ``source``
+    begins messages; ``unit``: ticks in a unit of time of the recording; ``slowest``: ticks of the
+    longest subtask of the corrective process."""
     why = _implausible_places(frame, task, source)
     if 2 * (why == "").sum() >= len(why):
         _mark_implausible_times(why, frame, task, source, unit, slowest)
@@ -368,14 +373,15 @@ def _implausible(
 
 
 def _mark(why: NDArray[np.object_], wrong: NDArray[np.bool_], words: str, *values: Array) -> None:
-    """Write why hits in a mask are implausible, unless it is known: ``words`` with their values."""
+    """Write into ``why``, in place, for each hit in the mask ``wrong`` whose text is empty, the
+    format ``words`` with the hit's entries of ``values``."""
     for row in np.flatnonzero(wrong & (why == "")).tolist():
         why[row] = words.format(*(each[row] for each in values))
 
 
 def _implausible_places(frame: pd.DataFrame, task: Task, source: str) -> NDArray[np.object_]:
     """Return why places and postures of a subject's sorted hits are implausible, as of
-    :func:`_implausible`; warn if most hits are near the centres of goals."""
+    :func:`_implausible`; warn if three quarters of the hits are near the centres of goals."""
     q, radius = frame[[*task.robot.joint_names]].to_numpy(np.float64), task.radius
     goal, why = frame.goal.to_numpy(np.int64), np.full(len(frame), "", dtype=object)
     spots = {"the start: is it of the next trial":
@@ -423,8 +429,9 @@ def _mark_implausible_times(
     unit: float,
     slowest: float,
 ) -> None:
-    """Write into ``why`` which plausible places have times that are too short or too long, and
-    check times together (:func:`_odd_times`); parameters as of :func:`_implausible`."""
+    """Write into ``why``, in place, why times of hits at plausible places are too short or too
+    long, after a check of all times together (:func:`_odd_times`); parameters as of
+    :func:`_implausible`."""
     q, whole = frame[[*task.robot.joint_names]].to_numpy(np.float64), why == ""
     trial, goal, ticks = (frame[name].to_numpy(np.float64) for name in ("trial", "goal", "ticks"))
     begins, follows = goal == 1, np.zeros(len(frame), dtype=bool)
@@ -438,7 +445,8 @@ def _mark_implausible_times(
     early = np.where(known, straight - ticks, -1.0) * PAPER.step
     allowed = 0.1 + 5 * max(0.0, float(np.quantile(early, 0.9)))
     words = "it takes {:g} ticks, a straight movement {:.0f}"
-    _mark(why, (early > allowed) | (ticks < 1), words, ticks, straight)
+    _mark(why, early > allowed, words, ticks, straight)
+    _mark(why, ticks < 1, "it takes {:g} ticks, any movement 1 or more", ticks)
     words = f"it takes {{:g}} ticks, the corrective process at most {slowest:.0f} for a goal"
     _mark(why, ticks > _SLOWEST * slowest, words, ticks)
 
@@ -468,14 +476,14 @@ def _odd_times(
 
 
 def _likely_unit(pace: float, unit: float) -> str:
-    """Return the unit, a key of :data:`_UNITS`, in which times are if hits take ``pace`` ticks for
-    each of a straight movement, with ``unit`` ticks per unit."""
+    """Return the unit of time, a key of :data:`_UNITS`, that a recording probably has in which hits
+    take ``pace`` ticks for each tick of a straight movement at ``unit`` ticks per unit."""
     return min(_UNITS, key=lambda name: abs(np.log(_UNITS[name] / unit * pace)))
 
 
 def _refuse_two_units(times: pd.DataFrame, source: str, unit: float) -> None:
-    """Raise CoarticError if some hits are over five times as slow as all others, without hits in
-    between, as if in another unit."""
+    """Raise CoarticError if over a tenth of the hits, of two goals or more, are over five times as
+    slow for their paths as all others, as if in another unit; ``unit``: ticks in a unit."""
     ordered, tenth = np.sort(times.pace), len(times) // 10 + 1
     leaps = (ordered[1:] / ordered[:-1])[tenth - 1 : len(times) - tenth]
     is_slow = times.pace > ordered[tenth - 1 + leaps.argmax()]
@@ -494,8 +502,8 @@ def _refuse_two_units(times: pd.DataFrame, source: str, unit: float) -> None:
 
 
 def _check_steps_of_times(hits: pd.DataFrame, source: str, usual: float) -> None:
-    """Raise CoarticError, or warn, if all times are multiples of a time that is large for the
-    median hit, of ``usual`` ticks, although postures differ."""
+    """Raise CoarticError, or warn, if all times of 20 hits or more are multiples of a time that is
+    large for the median hit, of ``usual`` ticks, although postures differ."""
     ticks = hits.ticks.to_numpy(np.float64)
     least = float(np.diff(np.unique(ticks), prepend=0.0).min())
     postures = hits.drop(columns=["subject", "trial", "goal", "hand", "ticks"]).drop_duplicates()
@@ -508,7 +516,8 @@ def _check_steps_of_times(hits: pd.DataFrame, source: str, usual: float) -> None
 
 
 def _check_unit(times: pd.DataFrame, source: str, unit: float, slowest: float) -> None:
-    """Raise CoarticError, or warn, if the median hit takes times that are those of another unit."""
+    """Raise CoarticError, or warn, if the median time of hits fits another unit; parameters as of
+    :func:`_implausible`."""
     usual, path = float(times.ticks.median()), float(times.straight.median())
     ratio, too_long = usual / max(path, 1.0), usual > _SLOWEST * slowest
     if too_long or not 0.1 < ratio < 8:
@@ -559,9 +568,9 @@ def _warn_of_paces(times: pd.DataFrame, logs: pd.DataFrame, source: str, clocks:
 
 def _clocks(hits: pd.DataFrame, paces: pd.Series, rises: Array, source: str) -> bool:
     """Raise CoarticError if the times of a subject's hits are of a clock that runs on from goal to
-    goal; warn, and return True, if the times of five trials or more, under 80 %, are. Under 20 hits
-    after goal 1 are not judged. ``paces``: ticks of each hit over ticks of a straight movement;
-    ``rises``: ticks less ticks of the row before, ``(n,)``."""
+    goal; warn, and return True, if the clock runs on in five trials or more, but in under 80 % of
+    all. Under 20 hits after goal 1 are not judged. ``paces``: ticks of each hit over ticks of a
+    straight movement; ``rises``: ticks less ticks of the row before, ``(n,)``."""
     later = hits.goal.to_numpy() > 1
     if later.sum() < MANY:
         return False

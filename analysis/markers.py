@@ -47,14 +47,14 @@ def hits_from_markers(
 ) -> pd.DataFrame:
     """Find the hits of a person's trials in the places of markers over time.
 
-    A trial begins with its first sample. A hit is the first sample with a tip within the goal's
-    radius, or after such a place on the straight line between samples, in the order of the goals;
-    its time and posture are interpolated to where the tip enters the goal. Gaps of up to 50 ms
-    (empty, NaN, or, far from the origin, both coordinates 0) are bridged by a straight line, with a
-    warning unless after the last hit. An arm of the task without markers keeps its start, with a
-    warning. Warns, too, of samples that repeat, places that are rounded, frames that seem lost,
-    links whose length follows a joint, an arm that starts later than the other in all trials,
-    trials that begin away from the task's start, rests on the way, and hits of two goals in
+    A trial begins with its first sample. Goals are hit in their order: a hit is where a tip, on the
+    straight line from sample to sample, is first within the goal's radius; its time and posture are
+    interpolated to there. Gaps of up to 50 ms (empty, NaN, or, far from the origin, both
+    coordinates 0) are bridged by a straight line, with a warning unless after the last hit. An arm
+    of the task without markers keeps its start, with a warning. Warns, too, of samples that repeat,
+    places that are rounded or held, frames that seem lost, links whose length is not the task's,
+    changes or follows a joint, an arm that never starts as early as the other, trials that begin
+    away from the task's start, rests and returns to the start on the way, and hits of two goals in
     successive samples.
 
     Parameters
@@ -76,14 +76,15 @@ def hits_from_markers(
     Returns
     -------
     DataFrame
-        A row for each hit, with the columns of :func:`.read_hits`. Trials in which a goal is never
-        reached have no hits, with a warning; ``attrs["unfinished"]``, which :func:`pandas.concat`
-        may lose, is the number of such trials.
+        A row for each hit, with the columns of :func:`.read_hits` (``ticks``: at least 1). Trials
+        in which a goal is never reached have no hits, with a warning; ``attrs["unfinished"]``,
+        which :func:`pandas.concat` may lose, is the number of such trials.
 
     Raises
     ------
     CoarticError
-        The recording is no such table, of several people, or not of 25 to 2000 samples in a second;
+        ``ticks_per_unit`` is not above 0, or the task lacks the hand of ``side``; the recording is
+        no such table, of several people, or not of 25 to 2000 samples in a second;
         the median length of a link in a trial differs from the task's by more than 10 %; trials of
         over 20 samples differ in the time between samples by more than 10 %, or, without a tenth
         at either end, in a locked base by more than two radii; a finished trial begins far from the
@@ -155,18 +156,19 @@ class _Samples:
 
     @cached_property
     def parts(self) -> list[slice]:
-        """Samples of each trial."""
+        """Slice of the samples of each trial."""
         begin = np.flatnonzero(self.begins).tolist()
         return [slice(*ends) for ends in pairwise([*begin, len(self.trial)])]
 
     @cached_property
     def steps(self) -> Array:
-        """Time since the sample before, ``(n,)``, s; 0 at the first."""
+        """Time since the sample before, also of another trial, ``(n,)``, s; 0 at the very first."""
         return np.append(0.0, np.diff(self.time))
 
     @cached_property
     def is_even(self) -> NDArray[np.bool_]:
-        """Mask, ``(n,)``, of samples whose time since the sample before is without a gap."""
+        """Mask, ``(n,)``, of samples whose time since the sample before is at most 2.5 times the
+        median of the trial; False where a trial begins."""
         steps = np.where(self.begins, np.nan, self.steps)
         usual = self.by_trial(steps[:, None], "median")[np.cumsum(self.begins) - 1, 0]
         even: NDArray[np.bool_] = ~self.begins & (self.steps <= 2.5 * usual)
@@ -174,7 +176,7 @@ class _Samples:
 
     @cached_property
     def step(self) -> float:
-        """Mean time between samples without a gap, s; NaN without such samples."""
+        """Mean time between even samples (:attr:`is_even`), s; NaN without such samples."""
         return float(self.steps[self.is_even].mean()) if self.is_even.any() else np.nan
 
     @cached_property
@@ -185,28 +187,32 @@ class _Samples:
 
     @cached_property
     def leaps(self) -> NDArray[np.bool_]:
-        """Mask, ``(n,)``, of samples before which others are missing; clocks may be rounded."""
+        """Mask, ``(n,)``, of samples before which others are missing: their time since the sample
+        before is over 1.9 times :attr:`step` (not 2: clocks may be rounded)."""
         return ~self.begins & (self.steps > 1.9 * self.step)
 
     def by_trial(self, values: Array, statistic: str) -> Array:
-        """Return a statistic of values of samples, ``(n, k)``, in each trial, ``(trials, k)``."""
+        """Return a statistic (its name in pandas) of values of samples, ``(n, k)``, in each trial,
+        without NaN: shape ``(trials, k)``."""
         return pd.DataFrame(values).groupby(np.cumsum(self.begins)).agg(statistic).to_numpy()
 
     def refuse(self, wrong: NDArray[np.bool_], words: str) -> None:
-        """Raise CoarticError with the first samples that are ``wrong``, ``(n,)``, if one is."""
+        """Raise CoarticError, with :meth:`sentence`, if a sample is ``wrong``, a mask ``(n,)``."""
         if rows := np.flatnonzero(wrong).tolist():
             raise CoarticError(self.sentence(rows, words))
 
     def sentence(self, rows: Sequence[int], words: str) -> str:
-        """Return words that begin with the name of the first row, and end with other names."""
+        """Return ``words`` after the source and the name of the first of ``rows`` (indices of
+        samples), and before the names of other rows."""
         return f"{self.source}, {self.names[rows[0]]}: {words}{also([self.names[k] for k in rows])}"
 
     def compare_trials(
         self, name: str, each: Array, share: float, most: float, doubt: float, words: str
     ) -> None:
         """Raise CoarticError if a quantity, ``each`` by trial, differs between trials of over 20
-        samples by over ``most``, and warn if by over ``doubt``; a share ``share`` of trials at
-        either end does not count."""
+        samples by over ``most``, and warn if by over ``doubt``; the share ``share`` of trials with
+        the lowest values, and of trials with the highest, does not count. ``name`` (of the
+        quantity) and ``words`` (advice) are for the message."""
         samples = np.array([self.is_even[part].sum() for part in self.parts])
         long = np.flatnonzero((samples >= MANY) & np.isfinite(each))
         ordered, out = np.sort(each[long]), int(share * len(long))
@@ -251,8 +257,8 @@ def _samples_of(
     recording: pd.DataFrame | str | Path, task: Task, hands: Sequence[Hand]
 ) -> _Samples:
     """Return the samples of a recording as of :func:`hits_from_markers`, NaN for a missing place.
-    Raises CoarticError for a missing column, no sample, several people, a value that is no number,
-    and trials or times that are in no order."""
+    Raises CoarticError for a missing column, no sample, no or several people, text in place of a
+    number, and trials or times that are in no order."""
     if isinstance(recording, pd.DataFrame):
         frame, source, names = recording.reset_index(drop=True), "the frame", row_names(recording)
     else:
@@ -316,12 +322,13 @@ def _check_clock(samples: _Samples) -> None:
 
 
 def _bridge_gaps(samples: _Samples) -> pd.DataFrame:
-    """Fill gaps in the places of markers by straight lines, and warn if places are rounded.
+    """Fill gaps in the places of markers by straight lines, in place, and warn if places are
+    coarsely rounded.
 
     Returns a row for each sample: ``gap``, duration of the longest gap that begins there, s, or 0,
-    and its ``marker``, empty if all are missing; ``is_held``, whether a marker keeps its place from
-    there for over 50 ms, unlike elsewhere. ``attrs["grid"]`` is the step to which places are
-    rounded, length unit.
+    and its ``marker``, such as ``right_1: ``, empty if whole samples are missing; ``is_held``, True
+    if a marker keeps its place, or is missing, from there for over 50 ms, unlike elsewhere.
+    ``attrs["grid"]`` is the step to which places are rounded, length unit.
     """
     task, step, n = samples.task, samples.step, len(samples.time)
     longest, of_marker = np.zeros(n), np.full(n, "", dtype=object)
@@ -357,9 +364,11 @@ def _bridge_gaps(samples: _Samples) -> pd.DataFrame:
 
 
 def _find_jumps_of_links(samples: _Samples) -> NDArray[np.object_]:
-    """Return the marker before which the length of a link jumps by over 10 %, ``(n,)``, empty
-    where none does. Raises CoarticError if the median length of a link in a trial differs by over
-    10 % from the task's; warns if over all trials by over 2 %, or between trials by over 2.5 %."""
+    """Return for each sample, ``(n,)``, the marker at which a link begins that changes its length
+    from the sample before by over 10 % of the task's length and over nine times the median change,
+    such as ``right_1: ``, or an empty text. Raises CoarticError if the median length of a link in a
+    trial differs by over 10 % from the task's; warns if over all trials by over 2 %, or between
+    trials by over 2.5 %."""
     task, jumps = samples.task, np.full(len(samples.time), "", dtype=object)
     for hand, places in samples.places.items():
         links, lengths = task.robot.arm(hand).links, _lengths(places)
@@ -393,8 +402,9 @@ def _find_jumps_of_links(samples: _Samples) -> NDArray[np.object_]:
 
 def _postures(samples: _Samples) -> tuple[Array, NDArray[np.bool_]]:
     """Return the postures of samples, ``(n, dof)``, unwrapped from the task's start on in each
-    trial, and a mask of samples in which two shoulders are of no one base. Raises CoarticError, or
-    warns, if a locked base is elsewhere in some trials."""
+    trial, and a mask, ``(n,)``, of samples whose two shoulders do not fit one base, by over 10 % of
+    their distance (of the shorter arm if that is 0). Raises CoarticError, or warns, if a locked
+    base is elsewhere in some trials."""
     task, robot = samples.task, samples.task.robot
     shoulders = {hand: np.array(robot.arm(hand)[2:]) for hand in samples.places}
     bases = [places[:, 0] - shoulders[hand] for hand, places in samples.places.items()]
@@ -439,8 +449,9 @@ def _trial_of(samples: _Samples, q: Array, part: slice) -> _Trial:
 
 
 def _returns(ways: Array, left: float, back: float, first: int) -> list[int]:
-    """Return the samples from ``first`` on in which all hands are within ``back`` radii of the
-    start, after one was farther than ``left``; ``ways``, ``(hands, n)``, as of a trial."""
+    """Return the indices, from ``first`` on, of samples of a trial in which all hands are within
+    ``back`` radii of the start, after one was farther than ``left`` radii; ``ways`` as of
+    :class:`_Trial`."""
     has_left = np.logical_or.accumulate((ways > left).any(axis=0))
     there = np.flatnonzero(has_left & (ways < back).all(axis=0)).tolist()
     return [sample for sample in there if sample >= first]
@@ -450,8 +461,9 @@ def _refuse_places(
     samples: _Samples, marks: pd.DataFrame, trials: Sequence[_Trial], remedy: str
 ) -> None:
     """Raise CoarticError for a used sample at which a gap of over 50 ms begins, the length of a
-    link jumps, a marker goes much farther than elsewhere, or shoulders are of no one base (not with
-    a ``remedy``), or for a trial with a second start."""
+    link jumps, a marker goes much farther than elsewhere, or two shoulders do not fit one base
+    (unless there is a ``remedy``, :func:`_finished_by`), and for a trial with a second start.
+    ``marks`` gets a column, in place."""
     used = marks.is_used.to_numpy()
 
     def refuse(column: str, wrong: NDArray[np.bool_], words: str) -> None:
@@ -493,8 +505,8 @@ def _refuse_places(
 
 
 def _unfinished(samples: _Samples, trials: Sequence[_Trial], remedy: str) -> str:
-    """Return in words which trials are unfinished, with the ``remedy``; empty if none is. Raises
-    CoarticError if most are."""
+    """Return in words which trials are unfinished, with the ``remedy`` (:func:`_finished_by`);
+    an empty text if all are finished. Raises CoarticError if most are unfinished."""
     task, missed = samples.task, []
     for trial in trials:
         if not trial.is_finished:
@@ -522,8 +534,9 @@ def _unfinished(samples: _Samples, trials: Sequence[_Trial], remedy: str) -> str
 
 def _check_starts(samples: _Samples, q: Array, trials: Sequence[_Trial]) -> None:
     """Raise CoarticError for finished trials that begin with a rest, or with the hand away from the
-    task's start by over a quarter of the arm's reach. Warn if most begin a little away from it, or
-    if one arm starts later than the other in all trials. ``q``: postures of samples,
+    task's start by over a quarter of the arm's reach. Warn if the median trial begins a little away
+    from it, or if both arms move in ten trials or more and the earliest start of one is over 80 ms
+    later than the other's. ``q``: postures of samples,
     ``(n, dof)``."""
     task, robot, hands = samples.task, samples.task.robot, [*samples.places]
     largest = 0.25 * max(robot.reach(hand)[1] for hand in hands)
@@ -556,8 +569,8 @@ def _check_starts(samples: _Samples, q: Array, trials: Sequence[_Trial]) -> None
     earliest, moving = np.min(begun, axis=0), np.isfinite(begun).sum(axis=0)
     if moving.min() >= 10 and (lag := np.ptp(earliest)) > 0.08:
         warn(f"{samples.source}: the {hands[int(earliest.argmax())]} arm rests for at least "
-             f"{1000 * lag:.0f} ms more than the other at the start of all trials: does its system "
-             "lag behind, or is the clock another?")  # fmt: skip
+             f"{1000 * lag:.0f} ms more than the other at its earliest, at the start of all "
+             "trials: does its system lag behind, or is the clock another?")  # fmt: skip
     starts = q[[trial.part.start for trial in trials]] - task.q0
     start = np.median(starts, axis=0)
     same = np.mean(np.sign(starts) == np.sign(start), axis=0) >= 0.9
@@ -576,8 +589,9 @@ def _check_starts(samples: _Samples, q: Array, trials: Sequence[_Trial]) -> None
 
 
 def _warn_of_places(samples: _Samples, q: Array, marks: pd.DataFrame) -> None:
-    """Warn of used samples in which a marker keeps its place, gaps are bridged, samples repeat or
-    frames seem lost, and of links whose length follows a joint; ``q``: postures, ``(n, dof)``."""
+    """Warn of used samples in which a marker keeps its place or a gap is bridged, of samples that
+    repeat, frames that seem lost, links whose length follows a joint or drifts, and an arm without
+    markers; ``q``: postures, ``(n, dof)``."""
     used, gap = marks.is_used.to_numpy(), marks.gap.to_numpy()
     if frozen := np.flatnonzero(used & marks.is_held & (gap == 0)).tolist():
         words = ("a marker keeps its place to the last digit for more than 50 ms, unlike "

@@ -31,9 +31,10 @@ _HYPHENS = str.maketrans(dict.fromkeys("‐‑‒–—−﹣－", "-"))
 
 def read_table(path: str | Path, kind: str) -> tuple[pd.DataFrame, list[str]]:
     """Return a CSV file as a frame of texts and numbers, and a name, such as ``line 2``, for each
-    row. Raises CoarticError for a file that cannot be read, is not in UTF-8, has rows that do not
-    fit its headings, or repeats one or all of these; ``kind``, such as ``recorded hits are``, is
-    for a message."""
+    row. Raises CoarticError for a file of another program, and for a file that cannot be read, is
+    not in UTF-8, is separated by other characters than commas, has rows that do not fit its
+    headings, or repeats one or all headings; ``kind``, such as ``recorded hits are``, is for a
+    message."""
     if words := foreign_file(str(path), f"{kind} a CSV file, see docs/howto/people.md"):
         raise CoarticError(words)
     try:
@@ -153,8 +154,9 @@ def warn(text: str, refuse: bool = False) -> None:
 
 
 def _written(text: str) -> str:
-    """Return text in Unicode's composed form (NFC), with single spaces for blanks of any kind
-    between words, a hyphen for dashes and minus signs, and without format characters (Cf)."""
+    """Return text in Unicode's composed form (NFC), with a single space for blanks of any kind
+    between words, none at the ends, a hyphen for dashes and minus signs, and without format
+    characters (Cf)."""
     shown = "".join(c for c in text.translate(_HYPHENS) if unicodedata.category(c) != "Cf")
     return " ".join(unicodedata.normalize("NFC", shown).split())
 
@@ -194,7 +196,7 @@ def as_numbers(values: pd.Series) -> NDArray[np.float64]:
 
 def why_no_number(value: object) -> str:
     """Return in words why a value is no number: it looks like a date, or a character spoils it; for
-    other values that a number is needed."""
+    other values return that a number is needed."""
     text = _written(str(value))
     if _DATE.fullmatch(text):
         return "it looks like a date that a spreadsheet made of a number: import numbers as text"

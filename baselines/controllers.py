@@ -200,10 +200,10 @@ class Control(Method):
     def solve(self, session: Session) -> Result:
         """Simulate the control of all hand sequences as far as they can be best; return the paths,
         a movement for each goal, of the sequence that hits every goal in the fewest ticks, with
-        counts of the search as details; of equal sequences the one with the fewest changes of hand,
-        then the first. The sequence with the fewest ticks so far is extended by the path to its
-        next goal until such a sequence is complete. Raises MethodError if the hand gets stuck in
-        all sequences, or the solver fails."""
+        counts of the search as details; of equal sequences the sequence with the fewest changes of
+        hand, then the first. The sequence with the fewest ticks so far is extended by the path to
+        its next goal until such a sequence is complete. Raises MethodError if the hand gets stuck
+        in all sequences, or the solver fails."""
         task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = self.controller(session, task, self.parameters.period)
         ordered = [hand for hand in HANDS if hand in task.hands]

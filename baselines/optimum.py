@@ -61,8 +61,8 @@ class OptimumSearch(Method):
 
     def solve(self, session: Session) -> Result:
         """Search for the shortest path over hand sequences (at most 64 a graph), round plans to
-        whole ticks, and return the movements with the fewest ticks found. Raises MethodError if
-        none are found, and if locks of the base make the task invalid."""
+        whole ticks, and return the movements with the fewest ticks found. Raises MethodError if no
+        movements that hit every goal are found, and if locks of the base make the task invalid."""
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
         task = with_locks(session.reveal(*self.information), parameters.base)

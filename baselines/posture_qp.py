@@ -77,11 +77,11 @@ class PostureController(Controller):
     def begin(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
-        """Return a posture ``(dof,)``, sought to hit the goal, for each of ``aims`` (hand and
-        goal), by aim, for the movement from configuration ``q``. A posture that ``memory`` has for
-        an aim is taken over; any other is sought by descent from the posture of the aim before, the
-        first from ``q``. With several aims all are then moved to shorten the path from ``q``
-        through them. A search that does not converge ends after 400 steps."""
+        """Return, by aim, a posture ``(dof,)`` that hits the goal of each of ``aims`` (hand and
+        goal), for the movement from configuration ``q``. A posture that ``memory`` has for an aim
+        is taken over; any other is sought by descent from the posture of the aim before, the first
+        from ``q``. With several aims all are then moved to shorten the path from ``q`` through
+        them. A search that does not converge ends after 400 steps, perhaps outside of the goal."""
         earlier, postures = memory or {}, list[Array]()
         for aim in aims:
             before = postures[-1] if postures else q

@@ -49,7 +49,7 @@ _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError
 
 
 def process_peak_mb() -> float:
-    """Return the most memory of this process so far, MiB."""
+    """Return the largest resident memory of this process so far, MiB."""
     unit = 2**20 if sys.platform == "darwin" else 2**10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 

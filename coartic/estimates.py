@@ -110,8 +110,8 @@ def centred(values: Array) -> Array:
 @checked_arguments
 def mean(values: Numbers) -> Estimate:
     """Return the mean of a sample ``(n,)`` with its 95 % interval (:func:`mean_of_means`), whose
-    ends are NaN for fewer than three values. Raises ValueError for a sample that is
-    empty or not finite."""
+    ends are NaN for fewer than three values. Raises ValueError for a sample that is no vector,
+    empty or not finite, or has values, other than 0, that are not from 1e-100 to 1e100 in size."""
     return _mean_of(tuple(vector(values).tolist()))
 
 
@@ -124,7 +124,7 @@ def _mean_of(values: tuple[float, ...]) -> Estimate:
 def difference_of_means(first: Numbers, second: Numbers) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
     and ``(m,)``, with its 95 % interval (:func:`mean_of_means`), whose ends are NaN for fewer than
-    three values in a sample. Raises ValueError for a sample that is empty or not finite."""
+    three values in a sample. Raises ValueError for samples that :func:`mean` refuses."""
     return mean_of_means([first, second], [1.0, -1.0])
 
 

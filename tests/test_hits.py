@@ -146,6 +146,13 @@ def test_a_hit_that_nobody_can_have_made_is_named_or_left_out(people, read, reas
     assert len(trials.runs) == 20 - 1
 
 
+def test_a_time_below_a_tick_is_refused_also_after_a_hit_that_is_missing(people, read):
+    """The straight movement is unknown: it cannot be named."""
+    frame = put("ticks", 30, 0.5)(people).drop(29).rename(columns={"ticks": "duration"})
+    with pytest.raises(CoarticError, match=r"it takes 0\.5 ticks, any movement 1 or more\."):
+        read(frame, ticks_per_unit=1.0)
+
+
 RIGHT_ARM = [f"right_{joint}" for joint in (1, 2, 3, 4)]
 ANGLES = [*TASK.robot.joint_names[2:]]
 MOSTLY = {

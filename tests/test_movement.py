@@ -267,6 +267,14 @@ def test_a_short_arm_is_named_with_a_factor_that_helps():
     assert corrective_trial(helped, "R").completed
 
 
+def test_a_gain_that_is_too_large_for_the_base_is_named():
+    """The base moves by the gain times the error, whatever the lengths."""
+    model = MotionModel(gain=1.5, max_iterations=500)
+    free, locked = (arm_of(*[1.0] * 3, locked_base=base) for base in ((), ("x", "y")))
+    assert corrective_trial(free, "R", model=model).reason.endswith("take a gain below 1")
+    assert "multiply all lengths" in corrective_trial(locked, "R", model=model).reason
+
+
 def test_a_straight_arm_that_points_at_its_goal_is_named():
     for goal in ((-2.0, 0.1), (2.5, 0.1)):
         task = Task(goals=[goal], hands=["right"], locked_base=("x", "y"))

@@ -68,6 +68,8 @@ def test_the_smallest_p_is_that_of_the_clearest_case():
         second = rng(m).standard_normal((m, 3)) + 1000.0
         p = float(permutation_p(first, second, rng()))
         assert p == pytest.approx(smallest_p(n, m))
+    far = np.arange(8.0)[:, None], 1000 + np.arange(8.0)[:, None]
+    assert min(permutation_p(*far, rng(n)) for n in range(20)) == smallest_p(8, 8)  # drawn
     assert smallest_p(2, 2) > 0.05 > smallest_p(4, 4)
     assert smallest_p(50, 50, resamples=99) == 0.01
 

@@ -114,12 +114,13 @@ def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
 @cached
 def limits(study: Study) -> dict[str, Any]:
     """Return facts that limit conclusions from a study's runs, by name: numbers of ``runs`` and of
-    ``failed`` runs with ``reasons``; of :func:`.one_by_one` ``reconstructed`` tasks, and tasks
-    whose best reward is ``unproven``, ``unknown`` or of this folder's ``own`` methods; ``trials``
-    of the learner (unless as in the paper); ``few``, the fewest runs of the learner on a task, if
-    fewer than the paper's; ``seed``; ``processor`` and ``cores``; True for runs ``side_by_side``
-    and code that is ``dirty``; ``earlier``, methods as of coartic 4.0.0; ``late``, all
-    :attr:`.Study.marks`; ``imports`` by method. 0, False or empty where a limit does not apply."""
+    ``failed`` runs, and the commonest ``reasons``; titles of the tasks of :func:`.one_by_one` that
+    are ``reconstructed``, and whose best reward is ``unproven``, ``unknown`` or known from this
+    folder alone (``own``); numbers of ``trials`` of the learner other than the paper's; ``few``,
+    the fewest runs of the learner on a task, if fewer than the paper's; ``seed``; ``processor`` and
+    ``cores``; True for runs ``side_by_side`` and code that is ``dirty``; ``earlier``, methods with
+    runs by coartic 4.0.0; ``late``, all :attr:`.Study.marks`; ``imports`` by method. 0, False or
+    empty where a limit does not apply."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner

@@ -116,7 +116,7 @@ def _is_end(table: Table, frame: pd.DataFrame, name: str) -> bool:
 
 def _number_text(digits: str, value: float, low: float, high: float, sd: float) -> str:
     """Return a number with its SD and interval, where they are not NaN, as text; ``digits`` as in
-    :class:`.Column`."""
+    :class:`.Column`. An interval of no length is left out (:func:`.in_brackets`)."""
     decimals, is_p = int(digits) if digits.isdigit() else None, digits == "p"
     spread = "" if math.isnan(sd) else f" ± {number(sd, decimals)}"
     text = number(value, 3 if is_p else decimals)
@@ -183,9 +183,9 @@ def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
 
 
 def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence[str] = ()) -> str:
-    """Return a table in LaTeX, with booktabs and longtable, in the columns that :data:`IN_LATEX`
-    has for its id; without settings and ablations (:func:`.is_setting`), except in tables
-    ``contexts`` and ``methods``.
+    """Return a table of :data:`IN_LATEX` in LaTeX, with booktabs and longtable, in the columns
+    named there; without settings and ablations (:func:`.is_setting`), except in tables ``contexts``
+    and ``methods``.
 
     ``notes``, sentences, are below the table, with the meaning of a dagger in table or notes.
     """

@@ -81,8 +81,8 @@ def shared_goal(study: Study) -> TwoContexts | None:
 )
 def list_contexts(study: Study) -> Rows:
     """Yield a row for each method, pair of tasks, goal that both share, and hand: the posture
-    difference between the tasks, its verdict, and random search; p is corrected over a method's
-    rows (Holm)."""
+    difference between the tasks, its verdict, and the posture difference of random search; p is
+    corrected over a method's rows (Holm)."""
     for label in study.methods.index:
         every = list(_shared_goals(study, label))
         spreads = [shared.standardised_posture_difference for shared in every]
@@ -165,8 +165,8 @@ def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
 
     Of stochastic methods, the permutation test distinguishes postures, and the bootstrap test that
     the difference is below :data:`.SAME` shows that postures are the same; of others the difference
-    itself does both. Methods that select their solution from trials are compared with random
-    search, too. ``row``: other columns of :func:`list_contexts`.
+    itself does both. Different postures of methods that select their solution from trials are
+    compared with random search, too. ``row``: other columns of :func:`list_contexts`.
     """
     method: Any = study.methods.loc[shared.method]
     if method.stochastic:

@@ -237,9 +237,9 @@ def draw_runtimes(study: Study) -> Parts | None:
     forward-kinematics evaluations, a panel each, or only one if the other has no curve; None
     without a curve.
 
-    Of :func:`.headline_methods`, without the corrective process alone, curves are of methods that
-    use the reward of each trial, of methods from files, and, of all methods that do not use the
-    reward of each trial, of the method that reaches most targets.
+    Among :func:`.headline_methods`, without the corrective process alone, curves are for methods
+    that use the reward of each trial, for methods from files, and for the method that reaches most
+    targets without using the reward of each trial.
     """
     if not len(tabled := list_runtimes(study)):
         return None

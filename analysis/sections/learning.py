@@ -32,9 +32,10 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
     "after_1000: after 1000 trials .1; after_10000: after 10\u202f000 trials .1",
 )
 def list_learning(study: Study) -> Rows:
-    """Yield a row for each task of :func:`.one_by_one` and each method, except searches, if
-    all its runs there have a solution and made 100 trials or more: the best reward, negative ticks,
-    after each number of trials in :data:`BUDGETS` that all runs made, a mean over runs."""
+    """Yield a row for each task of :func:`.one_by_one` and each method, except searches, if all its
+    runs there have a solution and made 100 trials or more: the best reward, negative ticks, after
+    each number of trials in :data:`BUDGETS` that all runs made, a mean over runs; NaN if a run has
+    no solution by then."""
     learned = improvements(study)
     for (task, label), runs in study.cells.items():
         is_shown = task in one_by_one(study) and not study.methods.is_search[label]

@@ -31,10 +31,10 @@ def _instances(study: Study) -> dict[str, list[str]]:
 
 @cached
 def on_instances(study: Study) -> pd.DataFrame:
-    """Return the runs of compared methods on instances of families that have a best known reward
-    and on which the method solved every run, with the label of the row of the method in column
-    ``method`` (a run stands again in the row of a joined learner), sorted by instance, through all
-    families. Do not change the frame: it is kept."""
+    """Return the runs of compared methods on those instances with a best known reward on which the
+    method solved every run, sorted by family and instance as in :func:`_instances`. Column
+    ``method`` has the label of the method's row; runs of a condition are there again under the
+    label of a joined learner. Do not change the frame: it is kept."""
     parts = {method: runs[runs.task.isin(solved_tasks(study, method))]
              for method, runs in compared(study).items()}  # fmt: skip
     every = together(study, parts)
@@ -45,9 +45,9 @@ def on_instances(study: Study) -> pd.DataFrame:
 
 
 def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
-    """Return, by family, the gaps of a method's runs on each of its instances, a list of arrays of
-    shape ``(n,)``. ``runs`` are the method's rows of :func:`on_instances`; families that lack an
-    instance there are left out."""
+    """Return, by family, the gaps of a method's runs on each instance of the family, a list of
+    arrays of shape ``(n,)``. ``runs`` are the method's rows of :func:`on_instances`; a family is
+    left out if one of its instances has no run there."""
     return {
         str(family): [
             part.gap.to_numpy(np.float64) for _, part in of_family.groupby("task", sort=False)

@@ -137,9 +137,9 @@ def list_ranking(study: Study) -> Rows:
 
 
 def _ranked(study: Study) -> list[str]:
-    """Return the labels of :func:`.board`, then of other compared methods, without joined learners,
-    in the order of :attr:`.Study.methods`; a setting or an ablation stands after its method, if
-    that method is in the list."""
+    """Return the labels of :func:`.board` in its order, then of other compared methods, without
+    joined learners, in the order of :attr:`.Study.methods`; each setting or ablation is moved to
+    after its method, if that method is in the list."""
     single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
     names = [*dict.fromkeys((*board(study).index, *single))]
 

@@ -116,8 +116,9 @@ def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool =
     """Return the smallest p that a test by exchange can give, for samples of ``n`` and ``m`` values
     or runs, two or more each; ``two_tailed``: if the test does not know which sample is which."""
     ways = math.comb(n + m, n)
-    alike = 2 if two_tailed and n == m else 1  # the exchange of both samples is as far apart
-    return max(alike / ways, 1 / (1 + resamples))
+    if ways > resamples:  # exchanges are drawn, perhaps none as far apart as the samples
+        return 1 / (1 + resamples)
+    return (2 if two_tailed and n == m else 1) / ways  # the exchange of both is as far apart
 
 
 def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> float:
@@ -150,8 +151,8 @@ def _p_of(
     *,
     exact: bool = False,
 ) -> float:
-    """Return the p-value of :func:`stratified_test` for an alternative; ``exact``, of all exchanges
-    of the labels of one stratum of two samples."""
+    """Return the p-value of :func:`stratified_test` for an alternative, from ``resamples``; with
+    ``exact`` from all exchanges of the labels of the only stratum, two samples."""
     if exact:
         resamples = math.comb(sum(map(np.size, strata[0])), np.size(strata[0][0]))
     rng = np.random.default_rng(SEED)
@@ -237,8 +238,9 @@ def places(
     runs: int, chosen: int, resamples: int, exact: bool, rng: np.random.Generator
 ) -> Iterator[tuple[slice, NDArray[np.int32]]]:
     """Yield pairs that together cover all resamples: a slice of the resamples, and for each of them
-    a row of ``chosen`` of the indices 0 to ``runs`` - 1: all choices in turn if ``exact``, or else
-    random ones; with replacement if as many are chosen as there are."""
+    a row of ``chosen`` of the indices 0 to ``runs`` - 1: all choices in turn if ``exact``
+    (``resamples`` is their number), or else random ones; with replacement if as many are chosen as
+    there are."""
     every = combinations(range(runs), chosen)
     for part in slices(resamples, max(1, IN_CACHE // runs)):
         size = part.stop - part.start

@@ -55,7 +55,7 @@ class _Command(TyperCommand):
     choice, and without types of Python."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write the command's arguments and options, without types, into the help,
+        """Write the command's arguments, without types, and options into the help,
         ``formatter``."""
         for parameter in self.params:
             if parameter.param_type_name == "argument":

@@ -233,10 +233,11 @@ class TaskVectorEnv(VectorEnv):
 
     def infos(self, there: NDArray[np.bool_] | bool = True) -> dict[str, Any]:
         """Return a dictionary of arrays of shape ``(N,)``: ``task``, the name of each robot's task,
-        with a family's file for the family, ``is_success``, True where the robot has hit all goals
-        of its trial, and ``_task`` and ``_is_success``, True where the robot has this entry, as
-        ``there`` says; before the first reset they mean nothing. After :meth:`step` a trial that
-        ended has started again: its last infos are in ``final_info`` of the step."""
+        such as ``mine.v1.toml/i017`` for an instance of the family of a file; ``is_success``, True
+        where the robot has hit all goals of its trial; ``_task`` and ``_is_success``, both equal to
+        ``there``, True where the entry counts. Before the first reset entries mean nothing. After
+        :meth:`step` a trial that ended has started again: its last infos are in ``final_info`` of
+        the step."""
         task = self.state.task
         infos = {"task": self.names[task], "is_success": self.state.goal == self.state.counts[task]}
         return infos | {f"_{name}": np.full(self.num_envs, there) for name in infos}
@@ -250,8 +251,8 @@ class TaskVectorEnv(VectorEnv):
         """Begin a trial of each of the N robots; return observations ``(N, O)`` and the dictionary
         of infos. ``seed``: a list of a seed for each robot, or one number, with which robot i (from
         0) has ``seed + i``; a robot with None keeps its random generator, which draws the tasks and
-        which the system seeds at first. Raises ValueError for any option, and for seeds that are
-        not whole numbers from 0.
+        which the system seeds at first. Raises ValueError for any option, for a list of another
+        length, and for seeds that are not whole numbers from 0 to 2^128 - 1.
         """
         check_no_options(options)
         if isinstance(seed, Iterable):
@@ -276,9 +277,9 @@ class TaskVectorEnv(VectorEnv):
         Returns observations ``(N, O)``, rewards ``(N,)``, True where the trial has ended, ``(N,)``,
         False for each (none is truncated), ``(N,)``, and a dictionary of infos. A trial that has
         ended starts again in this step: its observation is the first of the next trial;
-        ``final_obs`` of the infos has the last observation of the trial that ended. Raises
-        ResetNeeded before the first reset, and ValueError for actions of another shape or that are
-        not finite.
+        ``final_obs`` and ``final_info`` of the infos are the last observation and infos of the
+        trial that ended. Raises ResetNeeded before the first reset, and ValueError for actions of
+        another shape or that are not finite.
         """
         state = self.state
         if not state.going.all():

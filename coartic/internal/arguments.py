@@ -27,8 +27,8 @@ class ArgumentError(CoarticError, ValueError, TypeError):
 
 def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:
     """Return a wrapper of the function that raises ArgumentError, before the call, for an argument
-    that its type hint excludes. NumPy's scalars count as Python's, its times and spans of time as
-    texts; text, True and False are no numbers."""
+    that its type hint excludes, that is missing or that the function does not have. NumPy's scalars
+    count as Python's, its times and spans of time as texts; text, True and False are no numbers."""
     names = [*inspect.signature(function).parameters]
 
     @cache  # hints are read at the first call: most commands make none

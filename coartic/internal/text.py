@@ -108,8 +108,8 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """Return a sentence that no ``kind``, such as ``task``, is called ``name``, with the nearest of
-    ``names`` (:func:`did_you_mean`), or, if no name is near, with all names, or the first 12 of
-    more; for a file of another program return a sentence that coartic does not read it."""
+    ``names`` (:func:`did_you_mean`), or, if no name is near, with all names, of more than 12 the
+    first 12; for a file of another program return a sentence that coartic does not read it."""
     if isinstance(name, str) and (words := foreign_file(name)):
         return f"{words}."
     several = list(names)

@@ -88,7 +88,8 @@ class FileData(BaseModel):
     __eq__ = equal_contents
 
     def __repr__(self) -> str:
-        """Return, in one line, the class with the values that are not defaults."""
+        """Return, in one line (:func:`.short_repr`), the class with the values that are not
+        defaults."""
         changed = {
             name: getattr(self, name)
             for name, field in type(self).model_fields.items()
@@ -116,12 +117,14 @@ def explain_inline(
     error: ValidationError, keys: Sequence[str], given: Mapping[int | str, Any] | None = None
 ) -> str:
     """Return sentences on the first 20 problems of an object's or a call's arguments
-    (:func:`_explain_first`), joined by semicolons; an argument of none of several kinds has one
-    sentence. ``keys`` are the names of the arguments, in order, or empty; ``given`` are the
+    (:func:`_explain_first`), joined by semicolons; an argument that fits none of several types has
+    one sentence. ``keys`` are the names of the arguments, in order, or empty; ``given`` are the
     arguments of a call, by place from 0 or by name."""
     problems: dict[tuple[int | str, ...], ErrorDetails] = {}
     for detail in error.errors(include_url=False):
         place = detail["loc"]
+        if given and (kind := detail.get("ctx", {}).get("class_name")):
+            detail["msg"] = f"Input should be an instance of {kind}"  # no table, as in a file
         if given and detail["input"] is given.get(place[0]):
             place = place[:1]  # what follows is the name of a kind
         if place in problems:
@@ -159,10 +162,12 @@ def _explain_problem(detail: ErrorDetails, keys: Sequence[str]) -> str:
     match detail["type"]:
         case "sentence":
             return message
-        case "value_error" if not key:  # of the whole
+        case "value_error" if not key:  # of the object itself
             return message.removeprefix("Value error, ")
         case "unexpected_positional_argument":
-            return f"it takes {len(keys)} arguments"
+            if key in keys:
+                return f"{key} is given without its name; write {key}=..."
+            return f"it takes {counted(len(keys), 'argument')}"
         case "missing" | "missing_argument" | "missing_keyword_only_argument":
             return f"{key} is missing"
         case "extra_forbidden" | "unexpected_keyword_argument":

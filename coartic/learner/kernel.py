@@ -235,10 +235,10 @@ def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _
 def _nearest_posture(
     n: int, robot: RobotRecord, learner: LearnerParameters, workspace: _Workspace
 ) -> int:
-    """Return the hand, 0 left or 1 right, with which the corrective process **A** finds the posture
-    nearest in joint space for the goal of run ``n``; of equal hands, and if **A** fails with all,
-    the first. Iterations and evaluations are counted; the run does not move, but its ``hand`` is
-    changed in place."""
+    """Return the hand, 0 left or 1 right, with which the posture that the corrective process **A**
+    finds for the goal of run ``n`` is nearest in joint space to the present posture; of equal
+    hands, and if **A** fails with all, the first. Iterations and evaluations are counted; the run
+    does not move, but its ``hand``, ``converged`` and ``iterations`` change in place."""
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
     for hand in learner.hands:
@@ -318,7 +318,8 @@ def drift(
 ) -> None:
     """Move the mean t of exploration, the run's ``target``, in place, by κ N(t) (p − t), and an
     idle arm that is explored by κ (p − t); p is the preferred posture, N projects onto the null
-    space of the hand's Jacobian. Entries not explored do not change, without a drift κ none."""
+    space of the hand's Jacobian. Entries that are not explored do not change, and no entry changes
+    if the run's drift κ is 0."""
     if run.drift == 0.0:
         return
     x, y, v = workspace.jacobian
@@ -388,8 +389,8 @@ def make_trial(
 ) -> None:
     """Make one trial in each of N runs, up to the first goal missed; fill in ``trial``, the
     accounts of the goals, shape ``(N, G)``, and the counts in ``workspace``. ``first`` makes trial
-    0, with hands and targets of ``learner``; without ``explore`` a trial is greedy and has no
-    noise. Other arguments as in :func:`learn_kernel`."""
+    0, with hands and targets of ``learner``; without ``explore`` a trial is greedy, without drift
+    and noise. Other arguments as in :func:`learn_kernel`."""
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):
         set_off(batch.runs[n], learner.start)

@@ -341,8 +341,8 @@ class Session:
         return correction
 
     def trial(self, solution: Sequence[Movement]) -> Execution:
-        """Make one physical trial of a solution; count the trial, its ticks and its evaluations;
-        return the execution.
+        """Make one physical trial of a solution; count the trial, its ticks, evaluations,
+        iterations and corrections; return the execution.
 
         The corrective process acts where a goal is missed; its ticks count. Where this process is
         not declared, the execution has the movements as given and no configurations. Raises
@@ -435,7 +435,7 @@ class Session:
         return hand_codes(self._task, hands, count)
 
     def _make_trials(self, codes: Hands, targets: Configs, until: Array | None = None) -> Accounts:
-        """Make and count N trials, or fewer by ``until`` (:meth:`trials`), which may be longer,
+        """Make and count N trials, or fewer by the first N entries of ``until`` (:meth:`trials`),
         with hands 0 (left) or 1 (right), ``(N, G)``; return their accounts. The caller checks
         arguments and budget, and holds ``lock``."""
         accounts = make_trials(self._compiled, codes, targets[:, :, None])
@@ -455,9 +455,11 @@ class Session:
         one hand (``"best-single-hand"``) or all (``"best-of-all"``).
 
         Trials of this search are counted as ``initial_trials``, not among the method's trials or in
-        its budget. Raises NotApplicableError if a policy finds no such sequence that completes the
-        task, or has more than 4096 to try; UndeclaredError unless
-        ``Information.CORRECTIVE_PROCESS`` and ``REWARD_BY_TRIAL`` are both declared.
+        its budget; their ticks and other counts are added to the method's. Raises
+        NotApplicableError if a policy finds no such sequence that completes the task, or has more
+        than 4096 to try; UndeclaredError unless ``Information.CORRECTIVE_PROCESS`` and
+        ``REWARD_BY_TRIAL`` are both declared; ValueError for ``hands`` that are empty or not the
+        task's.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
         chosen, spent = search_initial_hands(self._task, hands, model=self.model)

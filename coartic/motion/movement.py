@@ -568,7 +568,8 @@ def explain_failure(
     One cause is a hand that no free joint or base coordinate moves nearer. Other causes are a long
     and a short arm: near a goal, errors shrink by the factor ``1 - gain σ²`` an iteration, with the
     singular values σ of the Jacobian J, so that the descent is stable while gain × |J|² of the
-    stretched arm is below 2, and slow where it is small.
+    stretched arm is below 2, and slow where it is small. A free base adds the gain to it, whatever
+    the lengths are.
     """
     free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
     arm = robot.joints(hand)
@@ -580,10 +581,13 @@ def explain_failure(
         return ": the arm is straight and points at the goal; bend it"
     if _SLOW <= (largest := model.gain * (square + bool(free))) < 2.0:
         return ""
+    advice = "take a gain below 1"
+    if model.gain * bool(free) < 1.0:
+        factor = 1.0 / math.sqrt(model.gain * square)
+        advice = f"multiply all lengths, those of links, goals and radius, by {factor:.2g}"
     return (
         f": gain × |J|² of the stretched arm is {largest:.3g}; below {_SLOW:g} the descent is slow "
-        "and above 2 it can be unstable: multiply all lengths, those of links, goals and radius, "
-        f"by {1.0 / math.sqrt(model.gain * square):.2g}"
+        f"and above 2 it can be unstable: {advice}"
     )
 
 
@@ -665,9 +669,9 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
 
 
 def _one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
-    """Return a batch of one run, which stands at ``q``, its target, with a hand that is to hit a
-    goal. Raises TypeError if ``robot`` is no Robot, and ValueError for any other argument that does
-    not fit."""
+    """Return a batch of one run, whose configuration and target are ``q``, with the hand and goal
+    of the run; ``radius`` is only checked. Raises TypeError if ``robot`` is no Robot, and
+    ValueError for any other argument that does not fit."""
     if not isinstance(robot, Robot):
         raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
     robot.arm(hand)

@@ -538,7 +538,7 @@ def make_trials(
     stops: NDArray[np.bool_] = ALL_STOP,
 ) -> Accounts:
     """Make N trials of a task and return their accounts; ``hands``, ``targets`` and ``stops`` as in
-    :class:`Requests`. They are counted (:func:`count_trials`)."""
+    :class:`Requests`. The trials are counted (:func:`count_trials`)."""
     count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
     return reach(compiled.task.robot, arms, compiled.parameters)
@@ -712,8 +712,8 @@ def search_initial_hands(
     If the task names a sequence, this is returned, and no counts. If it names a policy, the
     corrective process alone tries sequences of ``hands`` (None: the task's): under
     ``"best-single-hand"`` sequences of one hand, else all; the first of :func:`ranked_sequences` is
-    returned. Trials are counted (:func:`count_trials`), also where the result was kept, but not of
-    a search that fails.
+    returned. Trials are counted (:func:`count_trials`), also where the result was kept, except
+    trials of a search that fails. The counts are cached: do not change them.
 
     Raises NotApplicableError if no sequence tried completes the task, or more than 4096 would have
     to be tried, and ValueError for no hand or a hand that is not among the task's hands.

@@ -366,9 +366,10 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
-    """Return the error of a solution with more than 10,000 movements, :data:`_MOST_NUMBERS` numbers
-    with the start's or, if all configurations have the shape of the start, :data:`MOST_STEPS` steps
-    from the start through them; None for any other solution. Targets and waypoints are arrays."""
+    """Return the error of a solution with more than 10,000 movements, with more numbers (in the
+    start, waypoints and targets) than :data:`_MOST_NUMBERS`, or, if all configurations have the
+    shape of the start, with more steps from the start through them than :data:`MOST_STEPS`; None
+    for any other solution. Targets and waypoints are arrays."""
     if len(solution) > _MOST_MOVEMENTS:
         return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
     corners = [task.q0]

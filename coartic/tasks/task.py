@@ -213,9 +213,10 @@ class Task(FileData):
     @model_validator(mode="before")
     @classmethod
     def _with_start(cls, content: Any) -> Any:
-        """Return the content of a task with ``q0``, ``(dof,)``, as ``start``, or, without either,
-        with the base at (0, 0) and both arms along +x; what is no dictionary comes back unchanged.
-        Raises a validation error for both keys and a wrong ``q0``."""
+        """Return the content of a task, with a ``start`` made of ``q0``, ``(dof,)``, or, without
+        either, of the base at (0, 0) and both arms along +x; content with a ``start``, or that is
+        no dictionary, is returned unchanged. Raises a validation error for both keys and a wrong
+        ``q0``."""
         if not isinstance(content, dict):
             return content
         if {"start", "q0"} <= content.keys():
@@ -441,8 +442,9 @@ def task_text(task: Task) -> str:
 
 
 def _toml_value(value: Any) -> str:
-    """Return a string of printable characters, a number, or a list or dictionary of these as TOML
-    text: as JSON writes it, a dictionary as an inline table, with keys written bare."""
+    """Return a string of printable characters, a number, a list of these (lists, too), or a
+    dictionary, as TOML text: as JSON writes it, except a dictionary, which becomes an inline table
+    with keys written bare."""
     if isinstance(value, dict):
         return (
             "{ " + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + " }"
