@@ -9,7 +9,6 @@ r"""Is a planner's horizon a number of goals, or a share of those left?
 """
 
 import sys
-import tomllib
 from pathlib import Path
 
 import pandas as pd
@@ -17,7 +16,7 @@ from scipy import stats
 
 from coartic.analysis import (
     figures,
-    judge,
+    judge_means,
     load,
     mean,
     mean_beyond,
@@ -28,7 +27,6 @@ from coartic.analysis import (
 )  # fmt: skip
 
 HERE = Path(__file__).parent
-CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 PLANNER = "receding-horizon"
 OTHERS = [
     "dual-process/EC1", "dual-process/EC4", "cma-es/bandit", "cma-es/goal-by-goal",
@@ -113,12 +111,6 @@ def at(plans, families, h, column):
     return 100 * rows.set_index("task")[column]
 
 
-def fourth_gains(gains, side="greater"):
-    """Return the finding that the fourth goal ahead gains more, or with ``side`` less, than 1 %;
-    ``gains``: per cent, a value for each task."""
-    return mean_beyond("The fourth goal ahead gains {} %", gains, GAIN, side)
-
-
 def signed_rank(gains, side="greater"):
     """Return p of a one-tailed signed-rank test that gains, per cent by task, are more or less than
     :data:`GAIN`."""
@@ -145,11 +137,10 @@ def tabulate_fourth(repeats):
     for name, part in parts.items():
         if part.empty:
             continue
-        alone = judge({"more": ("", "", fourth_gains(part))})
         rows[name] = {
             "tasks": len(part), "losing": (part < 0).sum(), "median": part.median(),
             **mean(part).columns("gain"),
-            "p": alone.p_holm["more"], "signed_rank_p": signed_rank(part),
+            "p": mean_beyond("{}", part, GAIN).tests[0].p, "signed_rank_p": signed_rank(part),
         }  # fmt: skip
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
@@ -161,27 +152,20 @@ def judge_claims(study, plans, repeats):
     pairs = [at(plans, families, h, "together").rename(lambda name: name.partition("-")[2])
              for families, h in ((MANY, 2), (HALF, 1), (HALF, 2))]  # fmt: skip
     nearer = pairs[0] - (pairs[1] + pairs[2]) / 2
-    sentence = "Two goals ahead of fourteen gain {} points more than the middle of seven"
     learner = study.runs[study.runs.method.str.startswith("dual-process")]
     cma_es = study.runs[study.runs.method == "cma-es/bandit"]
     learner, cma_es = (100 * runs.groupby("task").gap.mean() for runs in (learner, cma_es))
-    findings = {
-        "fourth-of-fourteen-gains-little-on-one-arm": fourth_gains(one, "less"),
-        "fourth-of-fourteen-gains-more-on-one-arm": fourth_gains(one),
-        "fourth-of-fourteen-gains-little-on-two-arms": fourth_gains(two, "less"),
-        "fourth-of-fourteen-gains-more-on-two-arms": fourth_gains(two),
-        "horizon-is-a-number-of-goals": mean_beyond(sentence, nearer),
-        "horizon-is-a-share-of-goals": mean_beyond(sentence, nearer, 0.0, "less"),
-        "learner-behind-no-goal-ahead": mean_beyond(
-            "The learner loses {} points more than the planner",
-            learner - at(plans, MANY, 0, "gap"), GAIN,
-        ),
-        "cma-es-behind-one-goal-ahead": mean_beyond(
-            "CMA-ES loses {} points more than the planner",
-            cma_es - at(plans, MANY[:1], 1, "gap"), GAIN,
-        ),
-    }  # fmt: skip
-    claims = judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
+    values = {
+        "fourth-of-fourteen-gains-little-on-one-arm": [one],
+        "fourth-of-fourteen-gains-more-on-one-arm": [one],
+        "fourth-of-fourteen-gains-little-on-two-arms": [two],
+        "fourth-of-fourteen-gains-more-on-two-arms": [two],
+        "horizon-is-a-number-of-goals": [nearer],
+        "horizon-is-a-share-of-goals": [nearer],
+        "learner-behind-no-goal-ahead": [learner - at(plans, MANY, 0, "gap")],
+        "cma-es-behind-one-goal-ahead": [cma_es - at(plans, MANY[:1], 1, "gap")],
+    }
+    claims = judge_means(HERE / "claims.toml", values)
     for name, side in (("little", "less"), ("more", "greater")):
         row = f"fourth-of-fourteen-gains-{name}-on-two-arms"
         if claims.verdict[row] == "supported" and signed_rank(two, side) >= 0.05:

@@ -10,7 +10,6 @@ fourth goal's gain stays undecided.
 """
 
 import sys
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -18,23 +17,18 @@ import pandas as pd
 
 from coartic.analysis import (
     SIGNATURES,
-    all_of,
     figures,
-    judge,
+    judge_means,
     load,
-    mean_beyond,
     means,
     tabulate_runs,
     write_study,
 )
 
 HERE = Path(__file__).parent
-CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 PLANNER = "receding-horizon"
 STEPS = ["0", "1", "2", "3", "4", "5+", "all"]
 """Goals ahead. ``5+`` are all beyond the fourth together; ``all`` is over all tasks."""
-GAIN = 1.0
-"""Per cent that count as a gain, set before the runs."""
 
 
 def measure_plans(study):
@@ -112,19 +106,12 @@ def judge_claims(study, plans):
     first = (gaps["0"] - gaps["1"]) - (gaps["1"] - gaps["all"])
     learner = study.runs[study.runs.method.str.startswith("dual-process")]
     behind = 100 * learner.groupby("task").gap.mean().reindex(gaps.index) - gaps["1"]
-    findings = {
-        "first-of-several-goals-ahead-gains-most": mean_beyond(
-            "The first goal ahead gains {} points more than all others together", first[ahead > 1]
-        ),
-        "further-goals-gain-little-where-they-are": all_of(
-            mean_beyond("The second goal ahead gains {} points", gaps["1"] - gaps["2"], GAIN),
-            mean_beyond("the fourth gains {} points", gaps["3"] - gaps["4"], GAIN, "less"),
-        ),
-        "learner-behind-one-goal-ahead": mean_beyond(
-            "The learner loses {} points more than the planner with one goal ahead", behind, GAIN
-        ),
+    values = {
+        "first-of-several-goals-ahead-gains-most": [first[ahead > 1]],
+        "further-goals-gain-little-where-they-are": [gaps["1"] - gaps["2"], gaps["3"] - gaps["4"]],
+        "learner-behind-one-goal-ahead": [behind],
     }
-    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
+    return judge_means(HERE / "claims.toml", values)
 
 
 @figures.styled

@@ -13,7 +13,6 @@ weight it. All tests and intervals resample tasks within families, which weigh t
 """
 
 import sys
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,10 +20,9 @@ from cells import KEEPS, MEASURES, groups_of, measure_cells, measure_contexts, m
 from equal_gain import tabulate_equal
 from scales import BOUNDS, MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
 
-from coartic.analysis import all_of, figures, judge, load, mean_beyond, write_study
+from coartic.analysis import all_of, figures, judge_means, load, mean_beyond, write_study
 
 HERE = Path(__file__).parent
-CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 
 
 def judge_claims(cells, scales):
@@ -35,10 +33,7 @@ def judge_claims(cells, scales):
     words = {measure: label.partition(" (")[0] for measure, label in MEASURES.items()}
 
     def rises(kept):
-        return all_of(*(
-            mean_beyond(f"{words[measure]} by {{}} for each factor of ten", scale.slopes())
-            for measure, scale in kept.items()
-        ))  # fmt: skip
+        return [{words[measure]: scale.slopes() for measure, scale in kept.items()}]
 
     def within(values, measure):
         bound = BOUNDS[measure]
@@ -56,28 +51,21 @@ def judge_claims(cells, scales):
     both = {measure: targets[measure].by_task(
         (targets[measure].table[MOST] - postures[measure].table[MOST]).dropna()
     ) for measure in MEASURES}  # fmt: skip
-    findings = {
+    values = {
         "rises-with-postures": rises(postures),
         "rises-with-targets": rises(targets),
         "level-from-a-hundred": same(100, MOST, MEASURES),
         "learner-at-the-level": same("learner", MOST, signatures),
         "learner-gains-the-level": same("learner", MOST, ["gain"], but_long),
-        "targets-gain-more": mean_beyond("gain {} ticks", both["gain"], BOUNDS["gain"]),
-        "targets-slow-more": mean_beyond(
-            "first movement slower by {} ticks", both["first"], BOUNDS["first"]
-        ),
-        "targets-pass-the-learner": mean_beyond(
-            "gain {} ticks", targets["gain"].more(30, "learner")
-        ),
-        "one-place": all_of(*(
-            finding for measure in MEASURES for finding in (
-                mean_beyond(f"{words[measure]} {{}} above ten",
-                            targets[measure].more("learner", 10)),
-                mean_beyond("{} below a hundred", targets[measure].more(100, "learner")),
-            )
-        )),
-    }  # fmt: skip
-    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
+        "targets-gain-more": [both["gain"]],
+        "targets-slow-more": [both["first"]],
+        "targets-pass-the-learner": [targets["gain"].more(30, "learner")],
+        "one-place": [
+            {words[measure]: scale.more(*places) for measure, scale in targets.items()}
+            for places in (("learner", 10), (100, "learner"))
+        ],
+    }
+    return judge_means(HERE / "claims.toml", values)
 
 
 @figures.styled
