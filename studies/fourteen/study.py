@@ -44,43 +44,45 @@ counts as equivalent to a published reward."""
 
 
 def measure_plans(study):
-    """Return plans, a row for each task and horizon, with what their goals ahead gain; only on the
-    tasks, and with the ``nodes``, of the plans without a goal ahead.
+    """Return plans, a row for each task, number of ``nodes`` and horizon, with what their goals
+    ahead gain.
 
     With h goals ahead the planner sees more than with h - 1 at n - h movements of n alone. ``gain``
     is the difference of their ticks for each of those movements, as a share of a mean movement of
-    the best known solution; where no run has the horizon before, of each goal since the last that
-    was run, alike. ``together``: the gains of all goals ahead up to this one.
+    the best known solution; where no run has the horizon ``before``, of each goal since the last
+    that was run, alike. ``together``: the gains of all goals ahead up to this one.
     """
     plans = study.runs[(study.runs.method == PLANNER) & study.runs.gap.notna()]
-    first = plans[plans.horizon == 0]  # later ones repeat them, or are of more tasks
-    plans = plans[plans.task.isin(first.task) & plans.nodes.isin(first.nodes)]
-    numbers = plans[["horizon", "goals", "reward", "best_known"]].astype(int)
+    numbers = plans[["horizon", "goals", "reward", "best_known", "nodes"]].astype(int)
     order = pd.Categorical(plans.task, plans.task.unique())  # as in the suite
     plans = plans.assign(**numbers, ticks=-numbers.reward, order=order)
-    plans = plans.sort_values(["order", "horizon"])
-    before = plans.groupby("task")[["horizon", "ticks"]].shift()
+    plans = plans.sort_values(["order", "nodes", "horizon"])
+    before = plans.groupby(["task", "nodes"])[["horizon", "ticks"]].shift()
     more = plans.horizon - before.horizon
     # The sum of n - h over the goals ahead since the horizon before.
     movements = more * (plans.goals - (before.horizon + 1 + plans.horizon) / 2)
     mean_movement = -plans.best_known / plans.goals
     gain = (before.ticks - plans.ticks) / movements / mean_movement
-    return plans.assign(gain=gain, together=(gain * more).groupby(plans.task).cumsum())
+    together = (gain * more).groupby([plans.task, plans.nodes]).cumsum()
+    before = before.add_prefix("before_")
+    return plans.assign(gain=gain, together=together, **before)
 
 
-def measure_repeats(study):
+def first_plans(plans):
+    """Return the plans on the tasks, and with the nodes, of plans without a goal ahead; later ones
+    repeat them, or are of more tasks."""
+    first = plans[plans.horizon == 0]
+    return plans[plans.task.isin(first.task) & plans.nodes.isin(first.nodes)]
+
+
+def repeats_of(plans):
     """Return the ticks of plans with ``three`` and ``four`` goals ahead with two arms, a row for
-    each task and number of ``nodes``, and the ``gain`` of the fourth goal, as in
-    :func:`measure_plans`."""
-    plans = study.runs[(study.runs.method == PLANNER) & (study.runs.family == MANY[1])]
-    plans = plans.astype({"reward": float, "best_known": float, "nodes": int})
-    ticks = -plans.pivot_table("reward", ["task", "nodes", "best_known", "goals"], "horizon")
-    repeats = ticks[[3, 4]].dropna().set_axis(["three", "four"], axis=1).reset_index()
-    movements = repeats.pop("goals") - 4
-    mean_movement = -repeats.pop("best_known") / (movements + 4)
-    gain = (repeats.three - repeats.four) / movements / mean_movement
-    rows = (repeats.task + " nodes=" + repeats.nodes.astype(str)).rename("row")
-    return repeats.assign(gain=gain).set_index(rows)
+    each task and number of ``nodes``, and the ``gain`` of the fourth goal."""
+    plans = plans[(plans.family == MANY[1]) & (plans.horizon == 4) & (plans.before_horizon == 3)]
+    plans = plans.sort_values(["task", "nodes"]).rename(columns={"ticks": "four"})
+    rows = (plans.task + " nodes=" + plans.nodes.astype(str)).rename("row")
+    plans = plans.assign(three=plans.before_ticks)
+    return plans.set_index(rows)[["task", "nodes", "three", "four", "gain"]]
 
 
 def tabulate(study, plans):
@@ -202,7 +204,8 @@ def draw(table):
 
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
-    plans, repeats = measure_plans(study), measure_repeats(study)
+    every = measure_plans(study)
+    plans, repeats = first_plans(every), repeats_of(every)
     rows = (plans.task + " h=" + plans.horizon.astype(str)).rename("row")
     return {
         "results": tabulate(study, plans),

@@ -20,12 +20,6 @@ def written(value, digits):
     return interval(value.columns("of"), "of", digits)
 
 
-def listed(words):
-    """Write a list: ``a, b and c``."""
-    *first, last = words
-    return f"{', '.join(first)} and {last}" if first else last
-
-
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """Values of runs, or a single number, with the words by which evidence names them."""

@@ -5,12 +5,13 @@ from dataclasses import replace
 from functools import partial
 from statistics import median
 
-from comparisons import Higher, in_words, listed, written
+from comparisons import Higher, in_words, written
 from performance import no_trial_fails
 from reader import CONDITIONS, EC1, EC2, EC3, EC4, LEARNER, MARGINS, MissingError
 
 from coartic.analysis import all_of, mean, mean_beyond, number
 from coartic.analysis.judging import Finding
+from coartic.analysis.words import listed
 from coartic.estimates import FEWEST
 
 OF_ONE_ARM = ("one-armed/v1",)
@@ -101,21 +102,6 @@ def shows_beyond_random_search(signature):
     return ", more than random search", compare
 
 
-def shows_beyond_closest_hands(read, task):
-    """Compare choices of hand under EC4 with choices under EC2, which tries the closest hand."""
-    return Higher(*(read.signature("hand", task, label) for label in (EC4, EC2)))
-
-
-def improvement(read, task):
-    """Compare the reward of the replay with the reward of the initial solution."""
-    return Higher(read.replay(task, most_exploring(read, task)), read.initial(task))
-
-
-def beyond_best_hands(read, task):
-    """Compare the reward of EC3 with the best of all hand sequences, corrected alone."""
-    return Higher(read.reward(task, EC3), read.best(task))
-
-
 def every_trial_completes(read):
     """Count the failed trials of the learner in all families."""
     names = [name for family in EVERY_FAMILY for name in reported_instances(read, family)]
@@ -130,12 +116,21 @@ def in_families(families, *comparisons):
 
 RULES = {
     "learning-improves-in-general": in_families(
-        EVERY_FAMILY, (" replay EC > initial", improvement)
+        EVERY_FAMILY,
+        (
+            " replay EC > initial",
+            lambda read, task: Higher(
+                read.replay(task, most_exploring(read, task)), read.initial(task)
+            ),
+        ),
     ),
     "proficiency-rises-in-general": in_families(OF_TWO_ARMS, earns(EC3, EC2), earns(EC4, EC3)),
     "random-hands-pay-in-general": in_families(OF_TWO_ARMS, earns(EC4, EC2)),
     "other-arm-pays-in-general": in_families(OF_TWO_ARMS, earns(EC4, EC3)),
-    "beats-exhaustive-in-general": in_families(OF_TWO_ARMS, (" EC3 > best", beyond_best_hands)),
+    "beats-exhaustive-in-general": in_families(
+        OF_TWO_ARMS,
+        (" EC3 > best", lambda read, task: Higher(read.reward(task, EC3), read.best(task))),
+    ),
     "beats-inaccurate-in-general": in_families(OF_ONE_ARM, earns(EC1, JERK)),
     "first-movement-sacrificed-in-general": in_families(
         OF_ONE_ARM,
@@ -143,7 +138,11 @@ RULES = {
         shows("whole"),
     ),
     "hand-coarticulation-in-general": in_families(
-        OF_TWO_ARMS, (", more than EC2", shows_beyond_closest_hands)
+        OF_TWO_ARMS,
+        (  # EC2 tries the closest hand
+            ", more than EC2",
+            lambda read, task: Higher(*(read.signature("hand", task, each) for each in (EC4, EC2))),
+        ),
     ),
     "arm-coarticulation-in-general": in_families(
         EVERY_FAMILY, shows("arm", by=MARGINS.rounding_ticks)
