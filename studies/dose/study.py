@@ -139,8 +139,7 @@ def draw(table):
             else:
                 places = of_kind.assign(dose=of_kind.dose + 0.01 * (counted == "later"))
                 figures.means(axes, places, x="dose", y=name, **LOOKS[counted])
-        axes.set_ylabel(MEASURES.get(name, "posture difference"))
-        axes.set_xlabel("γ")
+        axes.set(xlabel="γ", ylabel=MEASURES.get(name, "posture difference"))
     figures.letters(panels)
     figures.legend(figure, panels[0].get_legend_handles_labels()[0], 3)
     return figure

@@ -192,9 +192,7 @@ def draw(table):
     panels[1].axhline(GAIN, color="black", linewidth=0.7, linestyle="dashed")
     labels = "gap (%)", "gain of a goal ahead (%)", "gain together (%)"
     for axes, label in zip(panels, labels, strict=True):
-        axes.set_xlabel("goals ahead")
-        axes.set_xticks(range(0, 9, 2))
-        axes.set_ylabel(label)
+        axes.set(xlabel="goals ahead", ylabel=label, xticks=range(0, 9, 2))
     panels[1].set_yscale("symlog", linthresh=1)
     panels[1].set_yticks([-1, 0, 1, 3, 10, 30], ["−1", "0", "1", "3", "10", "30"])
     figures.legend(figure, panels[2].get_legend_handles_labels()[0], 4)

@@ -123,11 +123,10 @@ def draw(table):
     rows = rows.assign(place=rows.h.map([*STEPS[:5], "all"].index))
     figures.means(axes, rows, x="place", y="gap", by="value", scale=100, shift=0.08, bars=0.9)
     axes.set_xticks(range(6), [*STEPS[:5], "all"])
-    axes.set_xlabel("goals ahead")
+    axes.set(xlabel="goals ahead", ylabel="gap (%)")
     axes.set_yscale("symlog", linthresh=1, linscale=0.6)
     axes.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50], ["0", "0.5", "1", "2", "5", "10", "20", "50"])
     axes.set_ylim(bottom=-0.1)
-    axes.set_ylabel("gap (%)")
     axes.legend(title="goals of the task", loc="upper right", labelspacing=0.2)
     return figure
 

@@ -86,9 +86,7 @@ def draw(results):
         learner = results.loc["all learner"]
         axes.axhspan(learner[f"{column}_low"], learner[f"{column}_high"], color="0.85", zorder=0)
         axes.axhline(learner[column], color="0.5", linewidth=0.8, label="learner")
-        axes.set_title(label.replace(" (", "\n("))
-        axes.set_xlabel("parts r")
-        axes.set_xscale("log")
+        axes.set(title=label.replace(" (", "\n("), xlabel="parts r", xscale="log")
         axes.set_xticks([1, 10, 100, 1000], ["1", "10", "100", "1000"])
         axes.set_xticks([], minor=True)
     figures.legend(figure, every[0].get_legend_handles_labels()[0], 3)

@@ -156,8 +156,7 @@ def draw(table):
         axes.text(1.25, y[0] + up, words, color=color, weight="bold")
     axes.set_xscale("log")
     axes.set_xticks([1, 10, 100, 1000, 10_000], ["first", "10", "100", "1000", "10 000"])
-    axes.set_xlabel("trial after a goal was moved")
-    axes.set_ylabel("share of the final shift of posture")
+    axes.set(xlabel="trial after a goal was moved", ylabel="share of the final shift of posture")
     axes.set_yticks([0, 0.5, 1], ["0", "½", "1"])
     axes.set_ylim(-0.17, 1.17)
     return figure
