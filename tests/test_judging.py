@@ -110,9 +110,14 @@ def test_words_and_bounds_of_claims_are_of_a_file(tmp_path):
         ("two {}", second, 1), ("again {}", second, 6, "less"),
     )]  # fmt: skip
     due = judge({"between": ("It is between.", "bootstrap tests", all_of(*means))})
-    for given in ([both, both], all_of(*means)):
-        assert judge_means(words, {"between": given}).equals(due)
+    assert judge_means(words, {"between": [both, both]}).equals(due)
+    text = words.read_text("utf-8").replace('{ sentence = "again {}", below = 6 }', "")
+    for bound, verdict in ((1, "not supported"), (9, "supported")):
+        words.write_text(text.replace("above = 1", f"within = {bound}"))
+        within = judge_means(words, {"between": [{"two": 3 * second}]}).loc["between"]
+        assert within.evidence.startswith("Two 5.00 [4.17, 5.83] (12 tasks)")
+        assert (within.verdict, within.evidence.count("tasks")) == (verdict, 1)
     with pytest.raises(CoarticError, match="claims.toml has no claim 'beyond'"):
         judge_means(words, {"beyond": [first]})
-    with pytest.raises(ValueError, match="shorter"):
-        judge_means(words, {"between": [first]})
+    with pytest.raises(ValueError, match="longer"):
+        judge_means(words, {"between": [first, first]})

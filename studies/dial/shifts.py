@@ -2,7 +2,6 @@
 
 import runpy
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -69,31 +68,25 @@ def tabulate_shifts(shifts):
     return table
 
 
-def by_task(rows, setting, column, family):
-    """Return the means of a column under a setting on the tasks of a family that have values."""
-    rows = rows[(rows.setting == setting) & (rows.family == family)]
-    return rows.groupby("task")[column].mean().dropna()
+def by_task(rows, setting, column):
+    """Return the means of a column under a setting by family and task."""
+    return rows[rows.setting == setting].groupby(["family", "task"])[column].mean()
 
 
 def in_each(values, families=FAMILIES):
-    """Return ``values(family)`` by family, in each of which a claim has to hold."""
-    return {family: values(family) for family in families}
+    """Return values by family, in each of which a claim has to hold."""
+    return {family: values[family] for family in families}
 
 
 def judge_shifts(shifts):
     """The claims on an announced change, registered before any test instance was run."""
-
-    def of(column, setting=PLANNER):
-        return partial(by_task, shifts, setting, column)
-
-    def quicker(family):
-        return of("log_half", PAPER)(family) - of("log_half")(family)
-
-    in_both = partial(in_each, families=FAMILIES[:2])
-    after_ten = in_both(of("share_10"))
+    quicker = by_task(shifts, PAPER, "log_half") - by_task(shifts, PLANNER, "log_half")
+    quicker, after_ten, unchanged = (in_each(values, FAMILIES[:2]) for values in (
+        quicker, by_task(shifts, PLANNER, "share_10"), by_task(shifts, PLANNER, "unchanged")
+    ))  # fmt: skip
     values = {
-        "drift-makes-the-shift-quick": [in_both(quicker)],
+        "drift-makes-the-shift-quick": [quicker],
         "drift-shifts-within-ten-trials": [after_ten, after_ten],
-        "shift-is-of-the-change": [in_both(of("unchanged"))],
+        "shift-is-of-the-change": [unchanged],
     }
     return judge_means(Path(__file__).with_name("claims.toml"), values)

@@ -59,17 +59,14 @@ def judge_claims(runs):
     """The claims, as they were registered before any random test task was run."""
 
     def more(first, second, column="gain_100"):
-        return lambda family: (
-            by_task(runs, first, column, family) - by_task(runs, second, column, family)
-        )
+        return by_task(runs, first, column) - by_task(runs, second, column)
 
     informed, late = more(INFORMED, PAPER), "gain_10000"
-    pulled = more("correction", PAPER)
     values = {
         "information-in-exploration-brings-much": [in_each(informed)],
         "information-makes-quick": [in_each(more(PAPER, PLANNER, "log_quarter"))],
         "information-in-correction-brings-little": [
-            in_each(lambda family: informed(family) - 2 * pulled(family))
+            in_each(informed - 2 * more("correction", PAPER))
         ],
         "planning-alone-is-short-sighted": [in_each(more(PLANNER, "1 0", late))],
         "wrong-information-helps-less": [in_each(more(INFORMED, "0.3 0.05 start"))],

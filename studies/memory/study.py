@@ -13,14 +13,13 @@ weight it. All tests and intervals resample tasks within families, which weigh t
 """
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 from cells import KEEPS, MEASURES, groups_of, measure_cells, measure_contexts, measure_runs
 from equal_gain import tabulate_equal
-from scales import BOUNDS, MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
+from scales import MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
 
-from coartic.analysis import all_of, figures, judge_means, load, mean_beyond, write_study
+from coartic.analysis import figures, judge_means, load, write_study
 
 HERE = Path(__file__).parent
 
@@ -35,28 +34,17 @@ def judge_claims(cells, scales):
     def rises(kept):
         return [{words[measure]: scale.slopes() for measure, scale in kept.items()}]
 
-    def within(values, measure):
-        bound = BOUNDS[measure]
-        above = mean_beyond(f"{words[measure]} {{}}", values, -bound)
-        both = all_of(above, mean_beyond("{}", values, bound, "less"))
-        return replace(both, evidence=above.evidence)
-
-    def same(first, second, measures, which=postures):
-        return all_of(*(
-            within(which[measure].more(first, second), measure) for measure in measures
-        ))  # fmt: skip
-
     families = [name for name in groups_of(cells, "gain")["all"] if name != "long"]
-    but_long = {"gain": Scale(cells, "gain", "postures", families)}
+    but_long = Scale(cells, "gain", "postures", families)
     both = {measure: targets[measure].by_task(
         (targets[measure].table[MOST] - postures[measure].table[MOST]).dropna()
     ) for measure in MEASURES}  # fmt: skip
     values = {
         "rises-with-postures": rises(postures),
         "rises-with-targets": rises(targets),
-        "level-from-a-hundred": same(100, MOST, MEASURES),
-        "learner-at-the-level": same("learner", MOST, signatures),
-        "learner-gains-the-level": same("learner", MOST, ["gain"], but_long),
+        "level-from-a-hundred": [scale.more(100, MOST) for scale in postures.values()],
+        "learner-at-the-level": [postures[name].more("learner", MOST) for name in signatures],
+        "learner-gains-the-level": [but_long.more("learner", MOST)],
         "targets-gain-more": [both["gain"]],
         "targets-slow-more": [both["first"]],
         "targets-pass-the-learner": [targets["gain"].more(30, "learner")],
