@@ -17,7 +17,6 @@ import pandas as pd
 from cells import MEASURES, TRIALS, measure_runs
 
 from coartic.analysis import load
-from coartic.analysis.signatures.context_tests import distance_of_means
 from coartic.estimates import Estimate, difference_of_means
 
 CONTEXTS = "ascending", "descending"
@@ -44,7 +43,7 @@ def tabulate(study):
     search, learner = (both[both.name == name] for name in ("random search", "learner"))
     equal = as_much(learner, search)
     theirs = postures(study, search)
-    rows["contexts posture"] = row_of(distance_of_means(*theirs), equal, {
+    rows["contexts posture"] = row_of(distance(theirs), equal, {
         word: excess(postures(study, learner[learner.trials == trials]), theirs)
         for word, trials in (("more", TRIALS), ("equal", equal))
     })  # fmt: skip
@@ -71,15 +70,20 @@ def postures(study, runs):
     return [study.configurations(task, runs.label.iloc[0])[:, 0] for task in CONTEXTS]
 
 
+def distance(groups):
+    """Return the distance of the mean configurations of two groups."""
+    return float(np.linalg.norm(groups[0].mean(axis=0) - groups[1].mean(axis=0)))
+
+
 def excess(ours, theirs):
     """Return by how much a posture difference exceeds another, with percentiles of resampled
     runs."""
     rng, groups = np.random.default_rng(0), [*ours, *theirs]
-    drawn = [distance_of_means(*four[:2]) - distance_of_means(*four[2:]) for four in (
+    drawn = [distance(resampled[:2]) - distance(resampled[2:]) for resampled in (
         [group[rng.integers(len(group), size=len(group))] for group in groups]
         for _ in range(RESAMPLES)
     )]  # fmt: skip
-    value = distance_of_means(*ours) - distance_of_means(*theirs)
+    value = distance(ours) - distance(theirs)
     return Estimate(value, *map(float, np.quantile(drawn, [0.025, 0.975])))
 
 

@@ -11,7 +11,6 @@ from reader import CONDITIONS, EC1, EC2, EC3, EC4, LEARNER, MARGINS, MissingErro
 
 from coartic.analysis import all_of, mean, mean_beyond, number
 from coartic.analysis.judging import Finding
-from coartic.analysis.words import listed
 from coartic.estimates import FEWEST
 
 OF_ONE_ARM = ("one-armed/v1",)
@@ -54,6 +53,12 @@ def in_every_family(read, families, comparisons):
         seen = f"fewer than {FEWEST} instances can be judged of {listed(few)}. {evidence}"
         return Finding(None, seen)
     return replace(finding, evidence=evidence)
+
+
+def listed(words):
+    """Write a list: ``a, b and c``."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def reported_instances(read, family):

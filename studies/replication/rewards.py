@@ -9,7 +9,6 @@ from reader import LEARNER
 from scipy.special import stdtrit
 
 from coartic.analysis import figures
-from coartic.analysis.figures.style import name_rows
 from coartic.estimates import RESAMPLES, SEED, TAILS, Estimate, standard_deviation
 
 MARGIN = 0.01
@@ -145,7 +144,9 @@ def draw_rewards(rewards):
         face = "white" if row.verdict == "undecided" else colour
         axes.plot(row.difference, y, mark, color=colour, markersize=4, markerfacecolor=face)
     axes.axvline(0, color="black", linewidth=0.6)
-    name_rows(axes, names)
+    axes.set_yticks(range(0, -len(shown), -1), names)
+    axes.set_ylim(0.4 - len(shown), 0.6)
+    axes.tick_params(axis="y", length=0)
     axes.spines["left"].set_visible(False)
     # Symmetric about zero: wide enough for every interval and margin.
     ends = shown[["difference", "difference_low", "difference_high", "margin"]]
