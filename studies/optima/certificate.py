@@ -143,7 +143,11 @@ class ProofSearch:
         moves = len(problem.hands) - len(problem.merged)
         # Bounded but for goals that are hit without a movement.
         bounded = node.length > self.longest(moves) or moves >= self._claim
-        far = {g: self.miss(q[g], g) for g, hand in enumerate(problem.hands) if hand is None}
+        far = {  # of the nearer hand from the centre of each goal whose hand is undecided
+            g: min(math.dist(self._task.robot.forward_kinematics(q[g], each), self._task.goals[g])
+                   for each in self._hands)
+            for g, hand in enumerate(problem.hands) if hand is None
+        }  # fmt: skip
         goal = max(far, key=lambda g: far[g], default=None)
         wrong = node.relaxed.wrong.max(initial=0.0)
         if goal is not None and (
@@ -168,11 +172,6 @@ class ProofSearch:
                 # The parent's Lagrangian may rule a half out, without a programme.
                 if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
                     self.add(problem._replace(box=box), node.length)
-
-    def miss(self, q, goal):
-        """Return how far the nearer hand is from the centre of a goal (from 0), length unit."""
-        places = (self._task.robot.forward_kinematics(q, hand) for hand in self._hands)
-        return min(math.dist(place, self._task.goals[goal]) for place in places)
 
     def add(self, problem, parent):
         """Bound a subproblem; add it to the open ones unless no solution in it beats the claimed
