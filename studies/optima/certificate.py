@@ -28,11 +28,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from lagrangian import Array, Lagrangian
-from relaxation import PartialSequence, Relaxation, Relaxed, split
+from lagrangian import Lagrangian
+from relaxation import Relaxation, Relaxed, split
 from speed import TOLERANCE, least_ticks
 
-from coartic import PAPER
+from coartic import PAPER, Hand
 
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
 _NEAR = 0.97  # share of the path to be proven from which programmes are solved exactly
@@ -57,12 +57,13 @@ def mergeable(task, hands):
 class Subproblem(NamedTuple):
     """Solutions with these hands, these goals hit without a movement, angles in a box."""
 
-    hands: PartialSequence
+    hands: tuple[Hand | None, ...]
+    """A hand for each goal, None if it is undecided."""
     merged: tuple[int, ...]
     """Goals (0-based) that are hit without a movement."""
     open: tuple[int, ...]
     """Further goals that may be; all others are not."""
-    box: Array
+    box: np.ndarray
     """Intervals of the absolute link angles, shape ``(links, 2)``, rad."""
 
     @property
