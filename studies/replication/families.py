@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from itertools import product
 from statistics import median
 
 from comparisons import Higher, in_words, written
@@ -19,16 +19,17 @@ EVERY_FAMILY = (*OF_ONE_ARM, *OF_TWO_ARMS)
 JERK = "trajectory-optimisation/jerk"
 
 
-def in_every_family(read, families, comparisons):
-    """Test comparisons in the mean over the instances of each family.
+def in_families(families, *comparisons):
+    """Return the rule that tests comparisons in the mean over the instances of each family.
 
     Differences of rewards are in per cent of the best known reward. Where a comparison has too few
     instances in a family, the claim is not judged, and the evidence has the other comparisons.
     ``comparisons``: words that follow the name of a family, and a function that compares on a task.
     """
-    findings, parts, few = [], [], []
-    for name, compare in comparisons:
-        for family in families:
+
+    def rule(read):
+        findings, parts, few = [], [], []
+        for (name, compare), family in product(comparisons, families):
             values = []
             for task, best in reported_instances(read, family).items():
                 with suppress(MissingError):
@@ -45,14 +46,16 @@ def in_every_family(read, families, comparisons):
             quantity = first.quantity or "gain as a share of the best known reward"
             many = f"{number(median(values), digits)}{unit_of} on the median one"
             parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances, {many}"))
-    if not findings:
-        raise MissingError(f"fewer than {FEWEST} instances of {listed(few)} can be judged")
-    finding = all_of(*findings)
-    evidence = in_words(parts)
-    if few:
-        seen = f"fewer than {FEWEST} instances can be judged of {listed(few)}. {evidence}"
-        return Finding(None, seen)
-    return replace(finding, evidence=evidence)
+        if not findings:
+            raise MissingError(f"fewer than {FEWEST} instances of {listed(few)} can be judged")
+        finding = all_of(*findings)
+        evidence = in_words(parts)
+        if few:
+            seen = f"fewer than {FEWEST} instances can be judged of {listed(few)}. {evidence}"
+            return Finding(None, seen)
+        return replace(finding, evidence=evidence)
+
+    return rule
 
 
 def listed(words):
@@ -82,7 +85,7 @@ def most_exploring(read, task):
 
 def earns(first, second):
     """Return words and a function that compares the rewards of two methods on a task, for
-    :func:`in_every_family`."""
+    :func:`in_families`."""
     words = " > ".join(label.removeprefix(LEARNER) for label in (first, second))
     return f" {words}", lambda read, task: Higher(
         read.reward(task, first), read.reward(task, second)
@@ -112,11 +115,6 @@ def every_trial_completes(read):
     names = [name for family in EVERY_FAMILY for name in reported_instances(read, family)]
     cells = [(name, label) for name in names for label in CONDITIONS]
     return no_trial_fails(read, [cell for cell in cells if cell in read.study.cells])
-
-
-def in_families(families, *comparisons):
-    """Return the rule that tests comparisons in every one of these families."""
-    return partial(in_every_family, families=families, comparisons=comparisons)
 
 
 RULES = {
