@@ -20,6 +20,7 @@ _MODULES = {
     "hits_from_markers": "coartic.analysis.markers",
     "interval": "coartic.analysis.words",
     "judge": "coartic.analysis.judging",
+    "judge_means": "coartic.analysis.judging",
     "load": "coartic.analysis.study",
     "mean": "coartic.estimates",
     "mean_beyond": "coartic.analysis.judging",

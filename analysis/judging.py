@@ -8,9 +8,11 @@ holds is undecided if its tests come out otherwise without the task that favours
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -241,3 +243,71 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
             "opposite_p_holm": adjusted[2] if finding.tests else math.nan,
         }
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("claim")
+
+
+@checked_arguments
+def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
+    """Judge claims whose words and bounds are in a file, as :func:`judge` does.
+
+    Parameters
+    ----------
+    words : str or pathlib.Path
+        TOML file with a table for each claim, by its id: ``text``, the claim, ``test`` in words,
+        and ``means``, a list of tables with a ``sentence`` and a bound, ``above`` or ``below``
+        which the mean is claimed to lie (:func:`mean_beyond`), or ``within`` ± which.
+    values : mapping
+        By the ids of claims, a list with an entry for each of their means: a value for each task,
+        or a mapping of groups of tasks to such values, each of which has to lie beyond the bound;
+        a sentence can have the group as ``{group}``.
+
+    Returns
+    -------
+    DataFrame
+        The table of :func:`judge`, with the claims that have values, in their order.
+
+    Raises
+    ------
+    CoarticError
+        The file lacks a claim.
+    KeyError
+        A claim of the file lacks what is needed.
+    ValueError
+        A claim has more or fewer means than values.
+
+    Examples
+    --------
+    The claim of a file ``claims.toml``, and its verdict::
+
+        [saves]
+        text = "Planning saves ticks."
+        test = "one-tailed bootstrap test over tasks: more than one tick"
+        means = [{ sentence = "Planning saves {} ticks", above = 1.0 }]
+
+        judge_means("claims.toml", {"saves": [[4.0, 5.0, 6.0, 7.0, 5.0, 6.0]]}).verdict
+    """
+    claims, of_file = {}, tomllib.loads(Path(words).read_text("utf-8"))
+    for name, means in values.items():
+        if name not in of_file:
+            raise CoarticError(f"{words} has no claim {brief_value(name)}")
+        claim = of_file[name]
+        every = [of if isinstance(of, Mapping) else {"": of} for of in means]
+        asked = [*zip(claim["means"], every, strict=True)]
+        groups = dict.fromkeys(group for of in every for group in of)
+        finding = all_of(*(
+            _mean_as_asked(mean, group, of[group])
+            for group in groups for mean, of in asked if group in of
+        ))  # fmt: skip
+        claims[name] = (claim["text"], claim["test"], finding)
+    return judge(claims)
+
+
+def _mean_as_asked(asked: Mapping[str, Any], group: str, values: Any) -> Finding:
+    """Return the finding on the values of a group, as a file asks (:func:`judge_means`)."""
+    sentence = asked["sentence"].replace("{group}", group)
+    if "within" in asked:
+        above = mean_beyond(sentence, values, -asked["within"])
+        below = mean_beyond(sentence, values, asked["within"], "less")
+        return replace(all_of(above, below), evidence=above.evidence)
+    if "above" in asked:
+        return mean_beyond(sentence, values, asked["above"])
+    return mean_beyond(sentence, values, asked["below"], "less")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coartic import CoarticError
-from coartic.analysis.judging import all_of, judge, mean_beyond
+from coartic.analysis.judging import all_of, judge, judge_means, mean_beyond
 from tests.support.made_up import found
 
 NAN = float("nan")
@@ -92,3 +92,32 @@ def test_each_bound_of_a_verdict_on_both_sides():
     ]  # fmt: skip
     below_two = [mean_beyond("{}", [1.0, 2.0, 3.0], bound, "less").holds for bound in (2.0, 2.01)]
     assert below_two == [False, True]
+
+
+def test_words_and_bounds_of_claims_are_of_a_file(tmp_path):
+    """Of two means in two groups of tasks each has to lie beyond its bound; groups one by one."""
+    words = tmp_path / "claims.toml"
+    words.write_text("""\
+        [between]
+        text = "It is between."
+        test = "bootstrap tests"
+        means = [{ sentence = "{group} {}", above = 1 }, { sentence = "again {}", below = 6 }]
+    """)
+    first, second = [2.0, 3.0, 4.0], [3.0, 5.0, 7.0, 5.0]
+    both = {"one": first, "two": second}
+    means = [mean_beyond(*asked) for asked in (
+        ("one {}", first, 1), ("again {}", first, 6, "less"),
+        ("two {}", second, 1), ("again {}", second, 6, "less"),
+    )]  # fmt: skip
+    due = judge({"between": ("It is between.", "bootstrap tests", all_of(*means))})
+    assert judge_means(words, {"between": [both, both]}).equals(due)
+    text = words.read_text("utf-8").replace('{ sentence = "again {}", below = 6 }', "")
+    for bound, verdict in ((1, "not supported"), (9, "supported")):
+        words.write_text(text.replace("above = 1", f"within = {bound}"))
+        within = judge_means(words, {"between": [{"two": 3 * second}]}).loc["between"]
+        assert within.evidence.startswith("Two 5.00 [4.17, 5.83] (12 tasks)")
+        assert (within.verdict, within.evidence.count("tasks")) == (verdict, 1)
+    with pytest.raises(CoarticError, match="claims.toml has no claim 'beyond'"):
+        judge_means(words, {"beyond": [first]})
+    with pytest.raises(ValueError, match="longer"):
+        judge_means(words, {"between": [first, first]})

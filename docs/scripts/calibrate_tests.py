@@ -15,7 +15,7 @@ spread):
 - ``exchange below N``: exchange if the smaller sample has fewer than N values, or else bootstrap.
 
 Grid, seeds and numbers were committed before the first result. As in the package, all samples of a
-size have the same resamples; here there are 999 of them. What is done is not done again.
+size have the same resamples; here there are 999 of them.
 """
 
 import itertools
@@ -33,7 +33,11 @@ SIZES = [
 ]
 SIDES = {0.05: 0.06, 0.01: 0.015}
 """Levels, and the share of samples above which a test rejects too often."""
-LIMITS = (10, 20, 50)
+LIMITS = {
+    "exchange": math.inf, "bootstrap": 0,
+    **{f"exchange below {n}": n for n in (10, 20, 50)},
+}  # fmt: skip
+"""Candidates, the simpler first: they are the exchange if the smaller sample has fewer values."""
 
 
 def levels(values, shares):
@@ -82,11 +86,6 @@ def studentised(sums, squares, sizes):
         return np.where(difference == 0, 0.0, difference / np.sqrt(variance))
 
 
-def extreme(null, observed):
-    """Return how many t of each row are at least as extreme as the row's observed t."""
-    return ((null >= observed[:, None]) | np.isclose(null, observed[:, None], rtol=1e-9)).sum(1)
-
-
 def exchanges(sizes, rng):
     """Return the values of the first sample in each exchange, 0 or 1, shape ``(values, ways)``, and
     whether these are all ways."""
@@ -100,75 +99,57 @@ def exchanges(sizes, rng):
     return members, math.comb(n, first) <= RESAMPLES
 
 
-def exchange_p(samples, members, exact):
-    """Return p of each pair of samples, shape ``(pairs, n)`` each, by exchange."""
-    sizes = [sample.shape[1] for sample in samples]
-    both = np.concatenate(samples, axis=1)
-    both = both - both.mean(axis=1, keepdims=True)
-    whole = both.sum(1, keepdims=True), (both**2).sum(1, keepdims=True)
-    first = both @ members, both**2 @ members
-    parts = [(one, total - one) for one, total in zip(first, whole, strict=True)]
-    null = studentised(*parts, sizes)
-    shifted = both[:, : sizes[0]], both[:, sizes[0] :]
-    observed = observed_t(shifted)
-    count = extreme(null, observed)
-    return count / members.shape[1] if exact else (1 + count) / (1 + members.shape[1])
-
-
-def observed_t(samples):
-    """Return |t| of each pair of samples."""
-    sums = [sample.sum(1, keepdims=True) for sample in samples]
-    squares = [(sample**2).sum(1, keepdims=True) for sample in samples]
-    return studentised(sums, squares, [sample.shape[1] for sample in samples])[:, 0]
-
-
 def draws(sizes, rng):
     """Return how often each value of each sample is drawn, shapes ``(n, RESAMPLES)``."""
     return [rng.multinomial(n, np.full(n, 1 / n), RESAMPLES).T.astype(float) for n in sizes]
 
 
-def bootstrap_p(samples, drawn):
-    """Return p of each pair of samples, shape ``(pairs, n)`` each, by the bootstrap."""
+def p_by_test(samples, members, exact, drawn):
+    """Return p of each pair of samples, shape ``(pairs, n)`` each, by exchange and by bootstrap."""
     sizes = [sample.shape[1] for sample in samples]
+    both = np.concatenate(samples, axis=1)
+    both = both - both.mean(axis=1, keepdims=True)
+    ways = np.column_stack([np.arange(len(members)) < sizes[0], members])  # at first as they are
+    first = [values @ ways for values in (both, both**2)]
+    whole = [values.sum(axis=1, keepdims=True) for values in (both, both**2)]
+    parts = [(one, total - one) for one, total in zip(first, whole, strict=True)]
+    exchanged = studentised(*parts, sizes)
+    observed = exchanged[:, :1]
+
+    def extreme(null):
+        return ((null >= observed) | np.isclose(null, observed, rtol=1e-9)).sum(axis=1)
+
+    count = extreme(exchanged[:, 1:])
+    p = count / members.shape[1] if exact else (1 + count) / (1 + members.shape[1])
     shifted = [sample - sample.mean(axis=1, keepdims=True) for sample in samples]
     sums = [each @ places for each, places in zip(shifted, drawn, strict=True)]
     squares = [each**2 @ places for each, places in zip(shifted, drawn, strict=True)]
-    null = studentised(sums, squares, sizes)
-    middle = np.concatenate(samples, axis=1).mean(axis=1, keepdims=True)
-    observed = observed_t([sample - middle for sample in samples])
-    p = (1 + extreme(null, observed)) / (1 + RESAMPLES)
+    boot = (1 + extreme(studentised(sums, squares, sizes))) / (1 + RESAMPLES)
     still = np.all([np.ptp(sample, axis=1) == 0 for sample in samples], axis=0)
     least = max(2 / math.comb(sum(sizes), sizes[0]), 1 / (1 + RESAMPLES))
-    return np.where(still, np.where(observed > 0, least, 1.0), p)
+    return p, np.where(still, np.where(observed[:, 0] > 0, least, 1.0), boot)
 
 
 def cell(name, sizes):
     """Return shares of rejected samples of one population and pair of sizes, by test and level."""
     rng = np.random.default_rng([SEED, [*POPULATIONS].index(name), *sizes])
     members, exact = exchanges(sizes, rng)
-    drawn = draws(sizes, rng)
-    found = {"exchange": [], "bootstrap": []}
+    drawn, found = draws(sizes, rng), []
     for _ in range(SAMPLES // AT_ONCE):
-        samples = [
-            population(rng, (AT_ONCE, n))
-            for population, n in zip(POPULATIONS[name], sizes, strict=True)
-        ]
-        found["exchange"].append(exchange_p(samples, members, exact))
-        found["bootstrap"].append(bootstrap_p(samples, drawn))
+        each = zip(POPULATIONS[name], sizes, strict=True)
+        samples = [population(rng, (AT_ONCE, n)) for population, n in each]
+        found.append(p_by_test(samples, members, exact, drawn))
     row = {"population": name, "first": sizes[0], "second": sizes[1]}
-    for test, p in found.items():
-        p = np.concatenate(p)
+    for test, p in zip(("exchange", "bootstrap"), np.concatenate(found, axis=1), strict=True):
         row |= {f"{test} at {100 * level:g} %": float((p < level).mean()) for level in SIDES}
     return row
 
 
 def candidates(cells):
-    """Return the number of cells in which each candidate rejects too often, in the order of their
-    simplicity."""
+    """Return the number of cells in which each candidate rejects too often."""
     small = cells[["first", "second"]].min(axis=1)
     rows = {}
-    for name, limit in [("exchange", math.inf), ("bootstrap", 0),
-                        *((f"exchange below {n}", n) for n in LIMITS)]:  # fmt: skip
+    for name, limit in LIMITS.items():
         row = rows[name] = {}
         for level, most in SIDES.items():
             at = f"at {100 * level:g} %"
@@ -180,20 +161,14 @@ def candidates(cells):
 
 
 def main(folder):
-    """Write both tables, the first as far as it is made, and print the second."""
-    folder = Path(folder)
+    """Write both tables, and print the second."""
     folder.mkdir(parents=True, exist_ok=True)
-    file = folder / "cells.csv"
-    rows = pd.read_csv(file).to_dict("records") if file.exists() else []
-    there = {(row["population"], row["first"], row["second"]) for row in rows}
-    for name, sizes in itertools.product(POPULATIONS, SIZES):
-        if (name, *sizes) not in there:
-            rows.append(cell(name, sizes))
-            pd.DataFrame(rows).to_csv(file, index=False, float_format="%.5g")
-    table = candidates(pd.DataFrame(rows))
+    cells = pd.DataFrame([cell(*each) for each in itertools.product(POPULATIONS, SIZES)])
+    cells.to_csv(folder / "cells.csv", index=False, float_format="%.5g")
+    table = candidates(cells)
     table.to_csv(folder / "candidates.csv", float_format="%.5g")
     print(table.to_string())
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(Path(sys.argv[1]))

@@ -1,4 +1,4 @@
-/* A trial as one would write it in C: a loop over control steps, of the model of plain_loop.py.
+/* A trial as one would write it in C: a loop over control steps, of coartic.motion.
  *
  * With bounds it skips, as coartic.motion.movement.clear_steps does, the steps during which the hand
  * provably stays out of the goal and away from the end of the movement. */
@@ -10,8 +10,7 @@ enum { MOST = 64 };
 
 typedef struct {
     long first, links;
-    const double *lengths;
-    double shoulder_x, shoulder_y;
+    double lengths[MOST], shoulder_x, shoulder_y;
 } Arm;
 
 typedef struct {

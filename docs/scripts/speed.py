@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import plain_loop
+from plain_loop import trials_in_c
 
 from coartic import CONDITIONS, Objective, Task, execute, learn_many, load_task
 from coartic.baselines.cma_es import CMAES
@@ -45,14 +45,13 @@ HEAD = """\
 # How fast
 
 CPU microseconds of one core for a trial, by the function that makes it: medians of one run of
-`make speed`. Times depend on the machine, ratios less. Here the
-plain loop takes {in_c} times as long with Numba as in C.
+`make speed`. Times depend on the machine, ratios less.
 
 | µs a trial | {heads} |
 | --- | {rules} |
 """
 FOOT = """
-*Plain loop*: the model as a programmer would first write it, with Numba or in C
+*Plain loop*: the model as a programmer would first write it in C
 (`docs/scripts/plain_loop.c`); *bounds* skip steps in which the hand provably misses, as here.
 """
 
@@ -68,9 +67,8 @@ def show_ways() -> None:
     seen = {name: pd.DataFrame(each).agg(spread).T for name, each in rounds.items()}
     print("CPU microseconds a trial", pd.concat(seen, axis=1).round(2).to_string(), sep="\n")
     table = pd.DataFrame({name: of_task["median"] for name, of_task in seen.items()})
-    ratios = (table.loc["plain loop"] / table.loc["plain loop in C"]).map("{:.1f}".format)
     rules = " | ".join(["---:"] * len(columns))
-    text = HEAD.format(heads=" | ".join(columns), rules=rules, in_c=" and ".join(ratios.unique()))
+    text = HEAD.format(heads=" | ".join(columns), rules=rules)
     for way, cells in table.map("{:.3g}".format).iterrows():
         text += f"| {way} | {' | '.join(cells)} |\n"
     PAGE.write_text(text + FOOT, encoding="utf-8")
@@ -90,10 +88,8 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
     noise = 0.005 * np.random.default_rng(0).standard_normal((1000, *best.shape)) * cost.joints
     targets = best + noise
     points, solutions = targets[:100, cost.joints], [movements_of(hands, t) for t in targets[:100]]
-    plain = plain_loop.arguments(task, hands)
     reference = session.trials(hands, targets)
-    assert (plain_loop.trials(task.q0, targets, *plain) == reference.ticks).all()
-    in_c = plain_loop.trials_in_c(task, hands, targets)
+    in_c = trials_in_c(task, hands, targets)
     assert all((make() == reference.ticks).all() for make in in_c.values())
     env, many = TaskEnv(task), TaskVectorEnv(1000, task)
     shape = (len(best), *many.action_space.shape)
@@ -106,7 +102,6 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
             env.step(action)
 
     return {
-        "plain loop": (1000, lambda: plain_loop.trials(task.q0, targets, *plain)),
         **{way: (1000, make) for way, make in in_c.items()},
         "objective, one by one": (100, lambda: [cost(point) for point in points]),
         "Session.trial, one by one": (100, lambda: [session.trial(each) for each in solutions]),

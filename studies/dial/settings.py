@@ -1,11 +1,7 @@
 """Settings of the learner along the dial, of leaning towards the next goal, and off it."""
 
-import tomllib
-from pathlib import Path
-
 from coartic import CONDITIONS
 
-CLAIMS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text("utf-8"))
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 DRIFTS, NOISES = (0.03, 0.1, 0.3, 1.0), (0.01, 0.05)
 TRIALS, RUNS, AFTER = 10_000, 3, (30, 100, 1_000, 10_000)
@@ -13,8 +9,6 @@ DIAL = ("0 0.05", *(f"{kappa:g} 0.05 next-goal" for kappa in DRIFTS))
 """The dial itself: settings with the paper's noise and drift towards the next goal."""
 PAPER, INFORMED, PLANNER = "0 0.05", "0.3 0.05 next-goal", "1 0.01 next-goal"
 """Settings that claims compare."""
-TIMES = 5.0
-"""Times fewer trials that count as much fewer, set before the runs."""
 SETTINGS = {
     **{f"0 {sigma}": {"noise_sd": sigma} for sigma in NOISES},
     **{

@@ -12,13 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from settings import AFTER, CLAIMS, DIAL, FAMILIES, INFORMED, PAPER, PLANNER, TIMES, TRIALS
+from settings import AFTER, DIAL, FAMILIES, INFORMED, PAPER, PLANNER, TRIALS
 from shifts import by_task, in_each, judge_shifts, measure_shifts, tabulate_shifts
 
-from coartic.analysis import all_of, figures, judge, means, write_study
+from coartic.analysis import figures, judge_means, means, write_study
 
-POINTS = 5.0
-"""Points of the gain that count as a difference, set before the runs."""
+HERE = Path(__file__).parent
 
 
 def measure_runs(raw):
@@ -60,40 +59,25 @@ def judge_claims(runs):
     """The claims, as they were registered before any random test task was run."""
 
     def more(first, second, column="gain_100"):
-        return lambda family: (
-            by_task(runs, first, column, family) - by_task(runs, second, column, family)
-        )
+        return by_task(runs, first, column) - by_task(runs, second, column)
 
-    informed, quick = more(INFORMED, PAPER), more(PAPER, PLANNER, "log_quarter")
-    findings = {
-        "information-in-exploration-brings-much": in_each(
-            "{} points more with κ = 0.3", informed, POINTS
-        ),
-        "information-makes-quick": in_each("10^{} times fewer trials", quick, np.log10(TIMES)),
-        "information-in-correction-brings-little": in_each(
-            "{} points more than twice the pull's",
-            lambda family: informed(family) - 2 * more("correction", PAPER)(family),
-        ),
-        "planning-alone-is-short-sighted": in_each(
-            "{} points more with noise", more(PLANNER, "1 0", "gain_10000"), POINTS
-        ),
-        "wrong-information-helps-less": in_each(
-            "{} points more towards the next goal", more(INFORMED, "0.3 0.05 start"), POINTS
-        ),
-        "wrong-information-harms": in_each(
-            "{} points more without drift", more(PAPER, "1 0.05 start", "gain_10000"), POINTS,
-            families=FAMILIES[1:],
-        ),
-        "drawn-drift-is-as-good": in_each(
-            "{} points more with a drawn drift", more("drawn", INFORMED), -POINTS
-        ),
-        "information-about-hands": all_of(
-            in_each("{} points more", more("hands", PAPER), POINTS, families=("long",)),
-            in_each("{} points less", more(PAPER, "hands", "gain_10000"),
-                    families=("two-armed", "redundancy")),
-        ),
-    }  # fmt: skip
-    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
+    informed, late = more(INFORMED, PAPER), "gain_10000"
+    values = {
+        "information-in-exploration-brings-much": [in_each(informed)],
+        "information-makes-quick": [in_each(more(PAPER, PLANNER, "log_quarter"))],
+        "information-in-correction-brings-little": [
+            in_each(informed - 2 * more("correction", PAPER))
+        ],
+        "planning-alone-is-short-sighted": [in_each(more(PLANNER, "1 0", late))],
+        "wrong-information-helps-less": [in_each(more(INFORMED, "0.3 0.05 start"))],
+        "wrong-information-harms": [in_each(more(PAPER, "1 0.05 start", late), FAMILIES[1:])],
+        "drawn-drift-is-as-good": [in_each(more("drawn", INFORMED))],
+        "information-about-hands": [
+            in_each(more("hands", PAPER), ["long"]),
+            in_each(more(PAPER, "hands", late), ["two-armed", "redundancy"]),
+        ],
+    }
+    return judge_means(HERE / "claims.toml", values)
 
 
 OTHERS = {
@@ -157,4 +141,4 @@ def measure(folder):
 
 
 if __name__ == "__main__":
-    write_study(Path(__file__).parent, measure(sys.argv[1]) if sys.argv[1:] else {}, draw)
+    write_study(HERE, measure(sys.argv[1]) if sys.argv[1:] else {}, draw)

@@ -10,9 +10,7 @@ import sys
 from pathlib import Path
 
 from coartic.analysis import load
-from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.pool import Local
-from coartic.benchmarks.runner import perform
+from coartic.benchmarks.runner import run_suite
 
 SUITE = Path(__file__).with_name("suite.toml")
 
@@ -37,7 +35,7 @@ def main(folder="results/dose"):
     for blocks in (lambda: "", lambda: of_control(load(folder).runs)):
         text += blocks()
         file.write_text(text, encoding="utf-8")
-        print(perform(plan_suite(file), folder, executor=Local(-1)), flush=True)
+        print(run_suite(file, folder), flush=True)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ python studies/dose/study.py results/dose
 """
 
 import sys
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -13,19 +12,16 @@ import pandas as pd
 
 from coartic.analysis import (
     TwoContexts,
-    all_of,
     contexts_of_control,
     figures,
-    judge,
+    judge_means,
     load,
-    mean_beyond,
     means,
     tabulate_runs,
     write_study,
 )  # fmt: skip
 
 HERE = Path(__file__).parent
-CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 RANDOM_SEARCH = "random-search"
 KEYS = ["group", "counted", "dose"]
 MEASURES = {
@@ -37,10 +33,6 @@ MEASURES = {
 """Measures of each run, with the label of its axis."""
 SHARED = ("ascending", "descending")
 """Tasks of the paper that have the first goal in common, and no others."""
-TICK = 1.0
-"""Ticks that a movement can lose to rounding alone: claims about its ticks have to show more."""
-GAIN = 1.0
-"""Per cent of the ticks of the initial solution that count as a gain, set before the runs."""
 
 
 def measure_runs(study):
@@ -111,35 +103,18 @@ def judge_claims(runs):
         drawn.pivot_table(name, "task", "kind").loc[drawn.task.unique()] for name in MEASURES
     )
 
-    def saves(more, less, bound=GAIN):
-        sentence = f"With γ = {words[more]} learning saves {{}} points more than with γ = "
-        return mean_beyond(f"{sentence}{words[less]}", saved[more] - saved[less], bound)
-
-    words = {"all 0": "0", "all 0.5": "0.5", "all 0.75": "0.75", "all 1": "1"}
-    words["later 1"] = "1, later movements"
     to_half = (saved["all 0"] + saved["all 1"]) / 2 - saved["all 0.1"]
     first_to_half = (first["all 0"] + first["all 1"]) / 2 - first["all 0.1"]
-    findings = {
-        "dose-moves-postures": all_of(
-            mean_beyond("With γ = 1 postures leave the next goal nearer by {} ticks more than "
-                        "with γ = 0", nearer["all 1"] - nearer["all 0"], TICK),
-            mean_beyond("than that of random search by {} ticks", beyond["all 1"]),
-        ),
-        "dose-slows-first-movements": mean_beyond(
-            "With γ = 1 the first movement takes {} ticks longer than with γ = 0",
-            first["all 1"] - first["all 0"], TICK,
-        ),
-        "dose-saves": saves("all 1", "all 0"),
-        "no-step-at-a-small-dose": all_of(
-            mean_beyond("with γ = 0.1 {} points saved are missing to half of the way", to_half),
-            mean_beyond("with γ = 0.1 {} ticks of the first movement are missing to half of the "
-                        "way", first_to_half),
-        ),
-        "half-a-dose-saves-less": saves("all 1", "all 0.5"),
-        "three-quarters-suffice": saves("all 0.75", "all 1", -GAIN),
-        "earlier-movements-count": saves("all 1", "later 1"),
-    }  # fmt: skip
-    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
+    values = {
+        "dose-moves-postures": [nearer["all 1"] - nearer["all 0"], beyond["all 1"]],
+        "dose-slows-first-movements": [first["all 1"] - first["all 0"]],
+        "dose-saves": [saved["all 1"] - saved["all 0"]],
+        "no-step-at-a-small-dose": [to_half, first_to_half],
+        "half-a-dose-saves-less": [saved["all 1"] - saved["all 0.5"]],
+        "three-quarters-suffice": [saved["all 0.75"] - saved["all 1"]],
+        "earlier-movements-count": [saved["all 1"] - saved["later 1"]],
+    }
+    return judge_means(HERE / "claims.toml", values)
 
 
 LOOKS = {
@@ -164,8 +139,7 @@ def draw(table):
             else:
                 places = of_kind.assign(dose=of_kind.dose + 0.01 * (counted == "later"))
                 figures.means(axes, places, x="dose", y=name, **LOOKS[counted])
-        axes.set_ylabel(MEASURES.get(name, "posture difference"))
-        axes.set_xlabel("γ")
+        axes.set(xlabel="γ", ylabel=MEASURES.get(name, "posture difference"))
     figures.letters(panels)
     figures.legend(figure, panels[0].get_legend_handles_labels()[0], 3)
     return figure

@@ -124,8 +124,7 @@ def draw(table):
             some = informed[informed.task == task]
             axes.plot(some[f"true_{name}"], some[name], linestyle="", marker="o", markersize=2.5,
                       color=figures.PALETTE[number])  # fmt: skip
-        axes.set_xlabel(f"true {labels[name]}")
-        axes.set_ylabel(f"estimated {labels[name]}")
+        axes.set(xlabel=f"true {labels[name]}", ylabel=f"estimated {labels[name]}")
     rows = table[(table.data == "complete") & table.group.isin(TASKS)].sort_values("trials")
     for number, task in enumerate(TASKS):
         some = rows[rows.group == task]
@@ -134,8 +133,7 @@ def draw(table):
     panels[3].set_xscale("log")
     panels[3].set_xticks([30, 100, 300], ["30", "100", "300"])
     panels[3].minorticks_off()
-    panels[3].set_xlabel("trials")
-    panels[3].set_ylabel("right models (%)")
+    panels[3].set(xlabel="trials", ylabel="right models (%)")
     figures.letters(panels)
     figures.legend(figure, panels[3].get_legend_handles_labels()[0], 4)
     return figure

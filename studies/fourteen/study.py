@@ -9,7 +9,6 @@ r"""Is a planner's horizon a number of goals, or a share of those left?
 """
 
 import sys
-import tomllib
 from pathlib import Path
 
 import pandas as pd
@@ -17,7 +16,7 @@ from scipy import stats
 
 from coartic.analysis import (
     figures,
-    judge,
+    judge_means,
     load,
     mean,
     mean_beyond,
@@ -28,7 +27,6 @@ from coartic.analysis import (
 )  # fmt: skip
 
 HERE = Path(__file__).parent
-CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 PLANNER = "receding-horizon"
 OTHERS = [
     "dual-process/EC1", "dual-process/EC4", "cma-es/bandit", "cma-es/goal-by-goal",
@@ -46,43 +44,45 @@ counts as equivalent to a published reward."""
 
 
 def measure_plans(study):
-    """Return plans, a row for each task and horizon, with what their goals ahead gain; only on the
-    tasks, and with the ``nodes``, of the plans without a goal ahead.
+    """Return plans, a row for each task, number of ``nodes`` and horizon, with what their goals
+    ahead gain.
 
     With h goals ahead the planner sees more than with h - 1 at n - h movements of n alone. ``gain``
     is the difference of their ticks for each of those movements, as a share of a mean movement of
-    the best known solution; where no run has the horizon before, of each goal since the last that
-    was run, alike. ``together``: the gains of all goals ahead up to this one.
+    the best known solution; where no run has the horizon ``before``, of each goal since the last
+    that was run, alike. ``together``: the gains of all goals ahead up to this one.
     """
     plans = study.runs[(study.runs.method == PLANNER) & study.runs.gap.notna()]
-    first = plans[plans.horizon == 0]  # later ones repeat them, or are of more tasks
-    plans = plans[plans.task.isin(first.task) & plans.nodes.isin(first.nodes)]
-    numbers = plans[["horizon", "goals", "reward", "best_known"]].astype(int)
+    numbers = plans[["horizon", "goals", "reward", "best_known", "nodes"]].astype(int)
     order = pd.Categorical(plans.task, plans.task.unique())  # as in the suite
     plans = plans.assign(**numbers, ticks=-numbers.reward, order=order)
-    plans = plans.sort_values(["order", "horizon"])
-    before = plans.groupby("task")[["horizon", "ticks"]].shift()
+    plans = plans.sort_values(["order", "nodes", "horizon"])
+    before = plans.groupby(["task", "nodes"])[["horizon", "ticks"]].shift()
     more = plans.horizon - before.horizon
     # The sum of n - h over the goals ahead since the horizon before.
     movements = more * (plans.goals - (before.horizon + 1 + plans.horizon) / 2)
     mean_movement = -plans.best_known / plans.goals
     gain = (before.ticks - plans.ticks) / movements / mean_movement
-    return plans.assign(gain=gain, together=(gain * more).groupby(plans.task).cumsum())
+    together = (gain * more).groupby([plans.task, plans.nodes]).cumsum()
+    before = before.add_prefix("before_")
+    return plans.assign(gain=gain, together=together, **before)
 
 
-def measure_repeats(study):
+def first_plans(plans):
+    """Return the plans on the tasks, and with the nodes, of plans without a goal ahead; later ones
+    repeat them, or are of more tasks."""
+    first = plans[plans.horizon == 0]
+    return plans[plans.task.isin(first.task) & plans.nodes.isin(first.nodes)]
+
+
+def repeats_of(plans):
     """Return the ticks of plans with ``three`` and ``four`` goals ahead with two arms, a row for
-    each task and number of ``nodes``, and the ``gain`` of the fourth goal, as in
-    :func:`measure_plans`."""
-    plans = study.runs[(study.runs.method == PLANNER) & (study.runs.family == MANY[1])]
-    plans = plans.astype({"reward": float, "best_known": float, "nodes": int})
-    ticks = -plans.pivot_table("reward", ["task", "nodes", "best_known", "goals"], "horizon")
-    repeats = ticks[[3, 4]].dropna().set_axis(["three", "four"], axis=1).reset_index()
-    movements = repeats.pop("goals") - 4
-    mean_movement = -repeats.pop("best_known") / (movements + 4)
-    gain = (repeats.three - repeats.four) / movements / mean_movement
-    rows = (repeats.task + " nodes=" + repeats.nodes.astype(str)).rename("row")
-    return repeats.assign(gain=gain).set_index(rows)
+    each task and number of ``nodes``, and the ``gain`` of the fourth goal."""
+    plans = plans[(plans.family == MANY[1]) & (plans.horizon == 4) & (plans.before_horizon == 3)]
+    plans = plans.sort_values(["task", "nodes"]).rename(columns={"ticks": "four"})
+    rows = (plans.task + " nodes=" + plans.nodes.astype(str)).rename("row")
+    plans = plans.assign(three=plans.before_ticks)
+    return plans.set_index(rows)[["task", "nodes", "three", "four", "gain"]]
 
 
 def tabulate(study, plans):
@@ -113,12 +113,6 @@ def at(plans, families, h, column):
     return 100 * rows.set_index("task")[column]
 
 
-def fourth_gains(gains, side="greater"):
-    """Return the finding that the fourth goal ahead gains more, or with ``side`` less, than 1 %;
-    ``gains``: per cent, a value for each task."""
-    return mean_beyond("The fourth goal ahead gains {} %", gains, GAIN, side)
-
-
 def signed_rank(gains, side="greater"):
     """Return p of a one-tailed signed-rank test that gains, per cent by task, are more or less than
     :data:`GAIN`."""
@@ -145,11 +139,10 @@ def tabulate_fourth(repeats):
     for name, part in parts.items():
         if part.empty:
             continue
-        alone = judge({"more": ("", "", fourth_gains(part))})
         rows[name] = {
             "tasks": len(part), "losing": (part < 0).sum(), "median": part.median(),
             **mean(part).columns("gain"),
-            "p": alone.p_holm["more"], "signed_rank_p": signed_rank(part),
+            "p": mean_beyond("{}", part, GAIN).tests[0].p, "signed_rank_p": signed_rank(part),
         }  # fmt: skip
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
@@ -161,27 +154,20 @@ def judge_claims(study, plans, repeats):
     pairs = [at(plans, families, h, "together").rename(lambda name: name.partition("-")[2])
              for families, h in ((MANY, 2), (HALF, 1), (HALF, 2))]  # fmt: skip
     nearer = pairs[0] - (pairs[1] + pairs[2]) / 2
-    sentence = "Two goals ahead of fourteen gain {} points more than the middle of seven"
     learner = study.runs[study.runs.method.str.startswith("dual-process")]
     cma_es = study.runs[study.runs.method == "cma-es/bandit"]
     learner, cma_es = (100 * runs.groupby("task").gap.mean() for runs in (learner, cma_es))
-    findings = {
-        "fourth-of-fourteen-gains-little-on-one-arm": fourth_gains(one, "less"),
-        "fourth-of-fourteen-gains-more-on-one-arm": fourth_gains(one),
-        "fourth-of-fourteen-gains-little-on-two-arms": fourth_gains(two, "less"),
-        "fourth-of-fourteen-gains-more-on-two-arms": fourth_gains(two),
-        "horizon-is-a-number-of-goals": mean_beyond(sentence, nearer),
-        "horizon-is-a-share-of-goals": mean_beyond(sentence, nearer, 0.0, "less"),
-        "learner-behind-no-goal-ahead": mean_beyond(
-            "The learner loses {} points more than the planner",
-            learner - at(plans, MANY, 0, "gap"), GAIN,
-        ),
-        "cma-es-behind-one-goal-ahead": mean_beyond(
-            "CMA-ES loses {} points more than the planner",
-            cma_es - at(plans, MANY[:1], 1, "gap"), GAIN,
-        ),
-    }  # fmt: skip
-    claims = judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
+    values = {
+        "fourth-of-fourteen-gains-little-on-one-arm": [one],
+        "fourth-of-fourteen-gains-more-on-one-arm": [one],
+        "fourth-of-fourteen-gains-little-on-two-arms": [two],
+        "fourth-of-fourteen-gains-more-on-two-arms": [two],
+        "horizon-is-a-number-of-goals": [nearer],
+        "horizon-is-a-share-of-goals": [nearer],
+        "learner-behind-no-goal-ahead": [learner - at(plans, MANY, 0, "gap")],
+        "cma-es-behind-one-goal-ahead": [cma_es - at(plans, MANY[:1], 1, "gap")],
+    }
+    claims = judge_means(HERE / "claims.toml", values)
     for name, side in (("little", "less"), ("more", "greater")):
         row = f"fourth-of-fourteen-gains-{name}-on-two-arms"
         if claims.verdict[row] == "supported" and signed_rank(two, side) >= 0.05:
@@ -206,9 +192,7 @@ def draw(table):
     panels[1].axhline(GAIN, color="black", linewidth=0.7, linestyle="dashed")
     labels = "gap (%)", "gain of a goal ahead (%)", "gain together (%)"
     for axes, label in zip(panels, labels, strict=True):
-        axes.set_xlabel("goals ahead")
-        axes.set_xticks(range(0, 9, 2))
-        axes.set_ylabel(label)
+        axes.set(xlabel="goals ahead", ylabel=label, xticks=range(0, 9, 2))
     panels[1].set_yscale("symlog", linthresh=1)
     panels[1].set_yticks([-1, 0, 1, 3, 10, 30], ["−1", "0", "1", "3", "10", "30"])
     figures.legend(figure, panels[2].get_legend_handles_labels()[0], 4)
@@ -218,7 +202,8 @@ def draw(table):
 
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
-    plans, repeats = measure_plans(study), measure_repeats(study)
+    every = measure_plans(study)
+    plans, repeats = first_plans(every), repeats_of(every)
     rows = (plans.task + " h=" + plans.horizon.astype(str)).rename("row")
     return {
         "results": tabulate(study, plans),

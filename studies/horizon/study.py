@@ -10,7 +10,6 @@ fourth goal's gain stays undecided.
 """
 
 import sys
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -18,23 +17,18 @@ import pandas as pd
 
 from coartic.analysis import (
     SIGNATURES,
-    all_of,
     figures,
-    judge,
+    judge_means,
     load,
-    mean_beyond,
     means,
     tabulate_runs,
     write_study,
 )
 
 HERE = Path(__file__).parent
-CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 PLANNER = "receding-horizon"
 STEPS = ["0", "1", "2", "3", "4", "5+", "all"]
 """Goals ahead. ``5+`` are all beyond the fourth together; ``all`` is over all tasks."""
-GAIN = 1.0
-"""Per cent that count as a gain, set before the runs."""
 
 
 def measure_plans(study):
@@ -112,19 +106,12 @@ def judge_claims(study, plans):
     first = (gaps["0"] - gaps["1"]) - (gaps["1"] - gaps["all"])
     learner = study.runs[study.runs.method.str.startswith("dual-process")]
     behind = 100 * learner.groupby("task").gap.mean().reindex(gaps.index) - gaps["1"]
-    findings = {
-        "first-of-several-goals-ahead-gains-most": mean_beyond(
-            "The first goal ahead gains {} points more than all others together", first[ahead > 1]
-        ),
-        "further-goals-gain-little-where-they-are": all_of(
-            mean_beyond("The second goal ahead gains {} points", gaps["1"] - gaps["2"], GAIN),
-            mean_beyond("the fourth gains {} points", gaps["3"] - gaps["4"], GAIN, "less"),
-        ),
-        "learner-behind-one-goal-ahead": mean_beyond(
-            "The learner loses {} points more than the planner with one goal ahead", behind, GAIN
-        ),
+    values = {
+        "first-of-several-goals-ahead-gains-most": [first[ahead > 1]],
+        "further-goals-gain-little-where-they-are": [gaps["1"] - gaps["2"], gaps["3"] - gaps["4"]],
+        "learner-behind-one-goal-ahead": [behind],
     }
-    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
+    return judge_means(HERE / "claims.toml", values)
 
 
 @figures.styled
@@ -136,11 +123,10 @@ def draw(table):
     rows = rows.assign(place=rows.h.map([*STEPS[:5], "all"].index))
     figures.means(axes, rows, x="place", y="gap", by="value", scale=100, shift=0.08, bars=0.9)
     axes.set_xticks(range(6), [*STEPS[:5], "all"])
-    axes.set_xlabel("goals ahead")
+    axes.set(xlabel="goals ahead", ylabel="gap (%)")
     axes.set_yscale("symlog", linthresh=1, linscale=0.6)
     axes.set_yticks([0, 0.5, 1, 2, 5, 10, 20, 50], ["0", "0.5", "1", "2", "5", "10", "20", "50"])
     axes.set_ylim(bottom=-0.1)
-    axes.set_ylabel("gap (%)")
     axes.legend(title="goals of the task", loc="upper right", labelspacing=0.2)
     return figure
 

@@ -79,11 +79,6 @@ def norms_by_practice(runs, model):
     return pd.concat(norms, axis=1, join="inner")
 
 
-def horizon_rise(rows):
-    """Rise of the slope norm at distance 2 with practice, from :func:`norms_by_practice`."""
-    return (rows[:, 1] - rows[:, 3]).mean()
-
-
 def ratio_rise(rows):
     """Rise of the ratio of the mean slope norms at distance 2 and 1 with practice."""
     return ratio_of_means(rows[:, [1, 0]]) - ratio_of_means(rows[:, [3, 2]])
@@ -250,7 +245,9 @@ MEASURES = {
     "slope norm at distance 1": (partial(slope_norms, distance=1), np.mean),
     "slope norm at distance 2": (partial(slope_norms, distance=2), np.mean),
     "slope norm at distance -1": (partial(slope_norms, distance=-1), np.mean),
-    "rise of the slope norm at distance 2": (norms_by_practice, horizon_rise),
+    "rise of the slope norm at distance 2": (
+        norms_by_practice, lambda rows: (rows[:, 1] - rows[:, 3]).mean()
+    ),
     "rise of the ratio of slope norms": (norms_by_practice, ratio_rise),
     "benefit correlation": (norms_and_benefits, kendalls_tau),
     "sufficient horizon": (sufficient_horizon, np.mean),
@@ -259,5 +256,5 @@ MEASURES = {
     "stop ratio": (apart_by_stop, ratio_of_means),
     "first movement against isolated reach": (excess_of_first, np.mean),
     "near-tie repeats": (near_tie_repeats, np.mean),
-}
+}  # fmt: skip
 """Every measure with the statistic of all tasks, by the name that ``human.toml`` calls it by."""

@@ -15,9 +15,7 @@ from pathlib import Path
 from cells import LEAST_SHARE
 
 from coartic.analysis import load
-from coartic.benchmarks.planning import plan_suite
-from coartic.benchmarks.pool import Local
-from coartic.benchmarks.runner import perform
+from coartic.benchmarks.runner import run_suite
 
 SUITE, INSTANCES = Path(__file__).with_name("methods.toml"), "i080..i119"
 
@@ -47,7 +45,7 @@ def main(folder="results/memory", instances=INSTANCES):
     for blocks in (lambda: "", lambda: scales(load(folder).runs)):
         text += blocks()
         file.write_text(text, encoding="utf-8")
-        print(perform(plan_suite(file), folder, executor=Local(-1)), flush=True)
+        print(run_suite(file, folder), flush=True)
 
 
 if __name__ == "__main__":

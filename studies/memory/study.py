@@ -13,18 +13,15 @@ weight it. All tests and intervals resample tasks within families, which weigh t
 """
 
 import sys
-import tomllib
-from dataclasses import replace
 from pathlib import Path
 
 from cells import KEEPS, MEASURES, groups_of, measure_cells, measure_contexts, measure_runs
 from equal_gain import tabulate_equal
-from scales import BOUNDS, MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
+from scales import MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
 
-from coartic.analysis import all_of, figures, judge, load, mean_beyond, write_study
+from coartic.analysis import figures, judge_means, load, write_study
 
 HERE = Path(__file__).parent
-CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
 
 
 def judge_claims(cells, scales):
@@ -35,49 +32,28 @@ def judge_claims(cells, scales):
     words = {measure: label.partition(" (")[0] for measure, label in MEASURES.items()}
 
     def rises(kept):
-        return all_of(*(
-            mean_beyond(f"{words[measure]} by {{}} for each factor of ten", scale.slopes())
-            for measure, scale in kept.items()
-        ))  # fmt: skip
-
-    def within(values, measure):
-        bound = BOUNDS[measure]
-        above = mean_beyond(f"{words[measure]} {{}}", values, -bound)
-        both = all_of(above, mean_beyond("{}", values, bound, "less"))
-        return replace(both, evidence=above.evidence)
-
-    def same(first, second, measures, which=postures):
-        return all_of(*(
-            within(which[measure].more(first, second), measure) for measure in measures
-        ))  # fmt: skip
+        return [{words[measure]: scale.slopes() for measure, scale in kept.items()}]
 
     families = [name for name in groups_of(cells, "gain")["all"] if name != "long"]
-    but_long = {"gain": Scale(cells, "gain", "postures", families)}
+    but_long = Scale(cells, "gain", "postures", families)
     both = {measure: targets[measure].by_task(
         (targets[measure].table[MOST] - postures[measure].table[MOST]).dropna()
     ) for measure in MEASURES}  # fmt: skip
-    findings = {
+    values = {
         "rises-with-postures": rises(postures),
         "rises-with-targets": rises(targets),
-        "level-from-a-hundred": same(100, MOST, MEASURES),
-        "learner-at-the-level": same("learner", MOST, signatures),
-        "learner-gains-the-level": same("learner", MOST, ["gain"], but_long),
-        "targets-gain-more": mean_beyond("gain {} ticks", both["gain"], BOUNDS["gain"]),
-        "targets-slow-more": mean_beyond(
-            "first movement slower by {} ticks", both["first"], BOUNDS["first"]
-        ),
-        "targets-pass-the-learner": mean_beyond(
-            "gain {} ticks", targets["gain"].more(30, "learner")
-        ),
-        "one-place": all_of(*(
-            finding for measure in MEASURES for finding in (
-                mean_beyond(f"{words[measure]} {{}} above ten",
-                            targets[measure].more("learner", 10)),
-                mean_beyond("{} below a hundred", targets[measure].more(100, "learner")),
-            )
-        )),
-    }  # fmt: skip
-    return judge({name: (*CLAIMS[name].values(), found) for name, found in findings.items()})
+        "level-from-a-hundred": [scale.more(100, MOST) for scale in postures.values()],
+        "learner-at-the-level": [postures[name].more("learner", MOST) for name in signatures],
+        "learner-gains-the-level": [but_long.more("learner", MOST)],
+        "targets-gain-more": [both["gain"]],
+        "targets-slow-more": [both["first"]],
+        "targets-pass-the-learner": [targets["gain"].more(30, "learner")],
+        "one-place": [
+            {words[measure]: scale.more(*places) for measure, scale in targets.items()}
+            for places in (("learner", 10), (100, "learner"))
+        ],
+    }
+    return judge_means(HERE / "claims.toml", values)
 
 
 @figures.styled
@@ -98,9 +74,7 @@ def draw(results):
         learner = results.loc["all learner"]
         axes.axhspan(learner[f"{column}_low"], learner[f"{column}_high"], color="0.85", zorder=0)
         axes.axhline(learner[column], color="0.5", linewidth=0.8, label="learner")
-        axes.set_title(label.replace(" (", "\n("))
-        axes.set_xlabel("parts r")
-        axes.set_xscale("log")
+        axes.set(title=label.replace(" (", "\n("), xlabel="parts r", xscale="log")
         axes.set_xticks([1, 10, 100, 1000], ["1", "10", "100", "1000"])
         axes.set_xticks([], minor=True)
     figures.legend(figure, every[0].get_legend_handles_labels()[0], 3)

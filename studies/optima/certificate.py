@@ -28,11 +28,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from lagrangian import Array, Lagrangian
-from relaxation import PartialSequence, Relaxation, Relaxed, split
+from lagrangian import Lagrangian
+from relaxation import Relaxation, Relaxed, split
 from speed import TOLERANCE, least_ticks
 
-from coartic import PAPER
+from coartic import PAPER, Hand
 
 _FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
 _NEAR = 0.97  # share of the path to be proven from which programmes are solved exactly
@@ -57,12 +57,13 @@ def mergeable(task, hands):
 class Subproblem(NamedTuple):
     """Solutions with these hands, these goals hit without a movement, angles in a box."""
 
-    hands: PartialSequence
+    hands: tuple[Hand | None, ...]
+    """A hand for each goal, None if it is undecided."""
     merged: tuple[int, ...]
     """Goals (0-based) that are hit without a movement."""
     open: tuple[int, ...]
     """Further goals that may be; all others are not."""
-    box: Array
+    box: np.ndarray
     """Intervals of the absolute link angles, shape ``(links, 2)``, rad."""
 
     @property
@@ -143,7 +144,11 @@ class ProofSearch:
         moves = len(problem.hands) - len(problem.merged)
         # Bounded but for goals that are hit without a movement.
         bounded = node.length > self.longest(moves) or moves >= self._claim
-        far = {g: self.miss(q[g], g) for g, hand in enumerate(problem.hands) if hand is None}
+        far = {  # of the nearer hand from the centre of each goal whose hand is undecided
+            g: min(math.dist(self._task.robot.forward_kinematics(q[g], each), self._task.goals[g])
+                   for each in self._hands)
+            for g, hand in enumerate(problem.hands) if hand is None
+        }  # fmt: skip
         goal = max(far, key=lambda g: far[g], default=None)
         wrong = node.relaxed.wrong.max(initial=0.0)
         if goal is not None and (
@@ -168,11 +173,6 @@ class ProofSearch:
                 # The parent's Lagrangian may rule a half out, without a programme.
                 if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
                     self.add(problem._replace(box=box), node.length)
-
-    def miss(self, q, goal):
-        """Return how far the nearer hand is from the centre of a goal (from 0), length unit."""
-        places = (self._task.robot.forward_kinematics(q, hand) for hand in self._hands)
-        return min(math.dist(place, self._task.goals[goal]) for place in places)
 
     def add(self, problem, parent):
         """Bound a subproblem; add it to the open ones unless no solution in it beats the claimed

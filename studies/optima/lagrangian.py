@@ -15,9 +15,6 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 _TURN = 2.0 * math.pi
 _PARABOLAS = 4  # steps by which an interval's end moves inwards
@@ -30,9 +27,9 @@ class Lagrangian(NamedTuple):
     """
 
     constant: float
-    slopes: Array
-    sizes: Array
-    towards: Array
+    slopes: np.ndarray
+    sizes: np.ndarray
+    towards: np.ndarray
 
     def bound(self, box):
         """Return the bound on paths whose link angles are in a box, shape ``(links, 2)``, rad."""

@@ -20,15 +20,11 @@ from typing import NamedTuple
 
 import cvxpy as cp
 import numpy as np
-from lagrangian import Array, Lagrangian, least
+from lagrangian import Lagrangian, least
 from programme import LARGEST, Programme, finite
 from speed import spans_of
 
-from coartic import Hand
 from coartic.baselines.trajectory_problem import held_joints
-
-PartialSequence = tuple[Hand | None, ...]
-"""A hand for each goal, None if it is undecided."""
 
 HALF_SPACES = 9
 """Half-spaces of each link."""
@@ -45,11 +41,11 @@ class Relaxed(NamedTuple):
     """Shortest path of the relaxation in a box, and its multipliers; of any values if the box has
     no path or the solver fails."""
 
-    q: Array
+    q: np.ndarray
     """Configurations, shape ``(G, dof)``."""
-    angles: Array
+    angles: np.ndarray
     """Absolute angles of the links, shape ``(links,)``, rad."""
-    wrong: Array
+    wrong: np.ndarray
     """Error of each link's end against its angle, shape ``(links,)``, length unit."""
     multipliers: tuple
     """p of the movements, ``(G, dof)``; λ of the hands at their goals, ``(G, 2)``; μ of the spans,

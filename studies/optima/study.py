@@ -68,8 +68,7 @@ def draw(table):
     shades = "0.9", "0.8", "0.7", "0.5", "0.2"
     for shade, (column, label) in zip(shades, reversed(BOUNDS.items()), strict=True):
         axes.barh(shares.index, shares[column], color=shade, label=label)
-    axes.set_xlabel("instances (%)")
-    axes.set_xlim(0, 100)
+    axes.set(xlabel="instances (%)", xlim=(0, 100))
     figures.legend(figure, axes.get_legend_handles_labels()[0][::-1], len(BOUNDS))
     return figure
 

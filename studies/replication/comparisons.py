@@ -1,29 +1,21 @@
 """Comparisons of means, on which most claims rest, and their words."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 from published import Summary
 
 from coartic.analysis import interval, mean, number
 from coartic.analysis.judging import Finding
 from coartic.analysis.statistics.hypotheses import bootstrap_test, exchange_test
-from coartic.estimates import Estimate, difference_of_means
+from coartic.estimates import difference_of_means
 
 
 def written(value, digits):
     """Write an estimate with its interval, ``2.1 [1.3, 2.9]``."""
     return interval(value.columns("of"), "of", digits)
-
-
-def listed(words):
-    """Write a list: ``a, b and c``."""
-    *first, last = words
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +59,8 @@ class Higher(NamedTuple):
     """Margin, in the unit of the measurements."""
 
 
-def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ()) -> Finding:
-    """Test that all claimed orders of means hold, by one-tailed tests.
+def all_higher(comparisons, shown=()):
+    """Test that all ``comparisons``, claimed orders of means, hold, by one-tailed tests.
 
     The evidence also has the values of ``shown``, and the rewards that the paper publishes.
     """
@@ -90,21 +82,19 @@ def all_higher(comparisons: Iterable[Higher], shown: Iterable[Measurement] = ())
     return all_positive(pairs, parts)
 
 
-def said(published: Summary) -> str:
+def said(published):
     """Write a published mean, followed by "(derived)" if it is computed from other numbers."""
     return f"{number(published.mean)}{' (derived)' * published.derived}"
 
 
-def difference_test(first, other, alternative) -> Estimate:
+def difference_test(first, other, alternative):
     """Test the difference of the mean of ``first`` and of ``other``, values or a number."""
     if np.ndim(other):
         return exchange_test(first, other, alternative)
     return bootstrap_test(first, float(other), alternative)
 
 
-def all_positive(
-    pairs: Iterable[tuple[np.ndarray, ArrayLike]], parts: Iterable[tuple[str, str]]
-) -> Finding:
+def all_positive(pairs, parts):
     """Return the finding that in all pairs the mean of the first values exceeds the second's mean,
     or number.
 
@@ -118,7 +108,7 @@ def all_positive(
     return Finding(all(test.value > 0 for test in tests), evidence, tests, against)
 
 
-def in_words(parts: Iterable[tuple[str, str]]) -> str:
+def in_words(parts):
     """Return parts of the evidence, pairs of a measured quantity and words, by quantity."""
     seen = pd.DataFrame(parts, columns=["quantity", "words"]).groupby("quantity", sort=False)
     return ". ".join(

@@ -2,10 +2,10 @@
 
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from itertools import product
 from statistics import median
 
-from comparisons import Higher, in_words, listed, written
+from comparisons import Higher, in_words, written
 from performance import no_trial_fails
 from reader import CONDITIONS, EC1, EC2, EC3, EC4, LEARNER, MARGINS, MissingError
 
@@ -19,16 +19,17 @@ EVERY_FAMILY = (*OF_ONE_ARM, *OF_TWO_ARMS)
 JERK = "trajectory-optimisation/jerk"
 
 
-def in_every_family(read, families, comparisons):
-    """Test comparisons in the mean over the instances of each family.
+def in_families(families, *comparisons):
+    """Return the rule that tests comparisons in the mean over the instances of each family.
 
     Differences of rewards are in per cent of the best known reward. Where a comparison has too few
     instances in a family, the claim is not judged, and the evidence has the other comparisons.
     ``comparisons``: words that follow the name of a family, and a function that compares on a task.
     """
-    findings, parts, few = [], [], []
-    for name, compare in comparisons:
-        for family in families:
+
+    def rule(read):
+        findings, parts, few = [], [], []
+        for (name, compare), family in product(comparisons, families):
             values = []
             for task, best in reported_instances(read, family).items():
                 with suppress(MissingError):
@@ -45,14 +46,22 @@ def in_every_family(read, families, comparisons):
             quantity = first.quantity or "gain as a share of the best known reward"
             many = f"{number(median(values), digits)}{unit_of} on the median one"
             parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances, {many}"))
-    if not findings:
-        raise MissingError(f"fewer than {FEWEST} instances of {listed(few)} can be judged")
-    finding = all_of(*findings)
-    evidence = in_words(parts)
-    if few:
-        seen = f"fewer than {FEWEST} instances can be judged of {listed(few)}. {evidence}"
-        return Finding(None, seen)
-    return replace(finding, evidence=evidence)
+        if not findings:
+            raise MissingError(f"fewer than {FEWEST} instances of {listed(few)} can be judged")
+        finding = all_of(*findings)
+        evidence = in_words(parts)
+        if few:
+            seen = f"fewer than {FEWEST} instances can be judged of {listed(few)}. {evidence}"
+            return Finding(None, seen)
+        return replace(finding, evidence=evidence)
+
+    return rule
+
+
+def listed(words):
+    """Write a list: ``a, b and c``."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def reported_instances(read, family):
@@ -76,7 +85,7 @@ def most_exploring(read, task):
 
 def earns(first, second):
     """Return words and a function that compares the rewards of two methods on a task, for
-    :func:`in_every_family`."""
+    :func:`in_families`."""
     words = " > ".join(label.removeprefix(LEARNER) for label in (first, second))
     return f" {words}", lambda read, task: Higher(
         read.reward(task, first), read.reward(task, second)
@@ -101,21 +110,6 @@ def shows_beyond_random_search(signature):
     return ", more than random search", compare
 
 
-def shows_beyond_closest_hands(read, task):
-    """Compare choices of hand under EC4 with choices under EC2, which tries the closest hand."""
-    return Higher(*(read.signature("hand", task, label) for label in (EC4, EC2)))
-
-
-def improvement(read, task):
-    """Compare the reward of the replay with the reward of the initial solution."""
-    return Higher(read.replay(task, most_exploring(read, task)), read.initial(task))
-
-
-def beyond_best_hands(read, task):
-    """Compare the reward of EC3 with the best of all hand sequences, corrected alone."""
-    return Higher(read.reward(task, EC3), read.best(task))
-
-
 def every_trial_completes(read):
     """Count the failed trials of the learner in all families."""
     names = [name for family in EVERY_FAMILY for name in reported_instances(read, family)]
@@ -123,19 +117,23 @@ def every_trial_completes(read):
     return no_trial_fails(read, [cell for cell in cells if cell in read.study.cells])
 
 
-def in_families(families, *comparisons):
-    """Return the rule that tests comparisons in every one of these families."""
-    return partial(in_every_family, families=families, comparisons=comparisons)
-
-
 RULES = {
     "learning-improves-in-general": in_families(
-        EVERY_FAMILY, (" replay EC > initial", improvement)
+        EVERY_FAMILY,
+        (
+            " replay EC > initial",
+            lambda read, task: Higher(
+                read.replay(task, most_exploring(read, task)), read.initial(task)
+            ),
+        ),
     ),
     "proficiency-rises-in-general": in_families(OF_TWO_ARMS, earns(EC3, EC2), earns(EC4, EC3)),
     "random-hands-pay-in-general": in_families(OF_TWO_ARMS, earns(EC4, EC2)),
     "other-arm-pays-in-general": in_families(OF_TWO_ARMS, earns(EC4, EC3)),
-    "beats-exhaustive-in-general": in_families(OF_TWO_ARMS, (" EC3 > best", beyond_best_hands)),
+    "beats-exhaustive-in-general": in_families(
+        OF_TWO_ARMS,
+        (" EC3 > best", lambda read, task: Higher(read.reward(task, EC3), read.best(task))),
+    ),
     "beats-inaccurate-in-general": in_families(OF_ONE_ARM, earns(EC1, JERK)),
     "first-movement-sacrificed-in-general": in_families(
         OF_ONE_ARM,
@@ -143,7 +141,11 @@ RULES = {
         shows("whole"),
     ),
     "hand-coarticulation-in-general": in_families(
-        OF_TWO_ARMS, (", more than EC2", shows_beyond_closest_hands)
+        OF_TWO_ARMS,
+        (  # EC2 tries the closest hand
+            ", more than EC2",
+            lambda read, task: Higher(*(read.signature("hand", task, each) for each in (EC4, EC2))),
+        ),
     ),
     "arm-coarticulation-in-general": in_families(
         EVERY_FAMILY, shows("arm", by=MARGINS.rounding_ticks)

@@ -21,37 +21,37 @@ RANDOM_HANDS = "random-search/hands"
 """Random search with every hand sequence: EC3 without its memory."""
 
 
-def hands_change(read):
-    """Test that more than a quarter of the runs hit a goal that others follow with another hand
-    than the initial solution."""
+def hands_change(read, *, beyond=False):
+    """Test that under one of the conditions more than a quarter of the runs, or more than
+    ``beyond`` in random search with every hand sequence, hit a goal that others follow with another
+    hand than the initial solution.
+
+    The test has the smallest p times the number of conditions; for the opposite all must fail.
+    """
+    control = changed_hands(read, RANDOM_HANDS) if beyond else []
     tests, against, parts = [], [], []
     for label in (EC2, EC3):
         does = changed_hands(read, label)
         count, total = int(does.sum()), len(does)
-        for which, side in ((tests, "greater"), (against, "less")):
-            which.append(share_test(count, total, MARGINS.few, side))
         parts.append(f"{read.title(TASK_1)} {read.who(label)}: {count} of {total} runs")
+        if beyond:
+            counts = count, total, sum(control), len(control)
+            less = fisher_test(*counts, "less")
+            tests.append(fisher_test(*counts, "greater"))
+            against.append(replace(less, value=-less.value))
+            continue
+        tests.append(share_test(count, total, MARGINS.few, "greater"))
+        against.append(share_test(count, total, MARGINS.few, "less"))
         if 0 < count < total:
             rewards = read.reward(TASK_1, label).numbers
             better = written(difference_of_means(rewards[does], rewards[~does]), 1)
             parts[-1] += f", which end with {better} ticks more reward than the others"
-    return under_one_condition(tests, against, parts)
-
-
-def hands_change_beyond_random_search(read):
-    """Test that more runs change hands than in random search with every hand sequence."""
-    control = changed_hands(read, RANDOM_HANDS)
-    tests, against, parts = [], [], []
-    for label in (EC2, EC3):
-        does = changed_hands(read, label)
-        counts = does.sum(), len(does), control.sum(), len(control)
-        tests.append(fisher_test(*counts, "greater"))
-        less = fisher_test(*counts, "less")
-        against.append(replace(less, value=-less.value))
-        who = f"{read.title(TASK_1)} {read.who(label)}"
-        parts.append(f"{who}: {does.sum()} of {len(does)} runs")
-    parts.append(f"{read.who(RANDOM_HANDS)}: {control.sum()} of {len(control)} runs")
-    return under_one_condition(tests, against, parts)
+    if beyond:
+        parts.append(f"{read.who(RANDOM_HANDS)}: {sum(control)} of {len(control)} runs")
+    best = min(tests, key=lambda test: (test.value <= 0, test.p))
+    test = replace(best, p=min(1.0, best.p * len(tests)))
+    contrary = max(against, key=lambda test: test.p)
+    return Finding(test.value > 0, "; ".join(parts), (test,), (contrary,))
 
 
 def fisher_test(count, total, other, of_other, side="two-sided"):
@@ -60,15 +60,6 @@ def fisher_test(count, total, other, of_other, side="two-sided"):
     table = [[count, total - count], [other, of_other - other]]
     p = float(scipy.stats.fisher_exact(table, alternative=side).pvalue)
     return Estimate(count / total - other / of_other, n=(total, of_other), p=p)
-
-
-def under_one_condition(tests, against, parts):
-    """Return the finding that a test holds under one of the conditions, with the smallest p times
-    their number; for the opposite all must fail."""
-    best = min(tests, key=lambda test: (test.value <= 0, test.p))
-    test = replace(best, p=min(1.0, best.p * len(tests)))
-    contrary = max(against, key=lambda test: test.p)
-    return Finding(test.value > 0, "; ".join(parts), (test,), (contrary,))
 
 
 def changed_hands(read, label):
@@ -164,5 +155,5 @@ RULES = {
     "rail": rail,
 }
 """Rules by the ids of their claims."""
-BEYOND = {"hand-coarticulation-task-1": hands_change_beyond_random_search}
+BEYOND = {"hand-coarticulation-task-1": partial(hands_change, beyond=True)}
 """Rules that say whether learners show more than random search, by the ids of their claims."""

@@ -198,16 +198,6 @@ def proficiency_rises(read):
     return all_higher(comparisons)
 
 
-def resembles_the_plan(read):
-    """Test that learned postures lie less than half as far from the plan's as the initial ones."""
-    return all_higher(Higher(resemblance(read, task), by=MARGINS.halfway) for task in ONE_ARMED)
-
-
-def multilevel_search(read):
-    """Test that exploring hands as well beats exploring postures of the right hand alone."""
-    return all_higher(Higher(read.reward(task, EC3), read.reward(task, EC1)) for task in TWO_ARMED)
-
-
 def rules_of(which, cells, best):
     """Return the rules that are the same for tasks with one arm and with two; ``best`` is the
     condition that explores most."""
@@ -223,8 +213,12 @@ def rules_of(which, cells, best):
 RULES = {
     **rules_of("one", CELLS_OF_ONE_ARM, EC1),
     **rules_of("two", CELLS_OF_TWO_ARMS, EC4),
-    "resembles-squared-displacement": resembles_the_plan,
+    "resembles-squared-displacement": lambda read: all_higher(
+        Higher(resemblance(read, task), by=MARGINS.halfway) for task in ONE_ARMED
+    ),
     "proficiency-rises": proficiency_rises,
-    "multilevel-search": multilevel_search,
+    "multilevel-search": lambda read: all_higher(
+        Higher(read.reward(task, EC3), read.reward(task, EC1)) for task in TWO_ARMED
+    ),
 }
 """Rules by the ids of their claims."""

@@ -137,20 +137,15 @@ def beyond_random_search(signature, cells):
     )
 
 
-def overall_reward_two_armed(read):
-    """Test that the learner rewarded by subtask earns less on the two-armed tasks as well."""
-    return all_higher(
-        Higher(read.replay(task, EC4), read.replay(task, EC4_BY_SUBTASK)) for task in TWO_ARMED
-    )
-
-
 RULES = {
     "first-movement-sacrificed": first_movement_slower,
     "context": posture_depends_on_context,
     "overall-reward": overall_reward,
     "arm-coarticulation": arm_coarticulation,
     "other-arm-coarticulation": other_arm_coarticulation,
-    "overall-reward-two-armed": overall_reward_two_armed,
+    "overall-reward-two-armed": lambda read: all_higher(
+        Higher(read.replay(task, EC4), read.replay(task, EC4_BY_SUBTASK)) for task in TWO_ARMED
+    ),
 }
 """Rules by the ids of their claims."""
 BEYOND = {
