@@ -23,7 +23,7 @@ GOALS, RADIUS = (0.05 + 0.45j, 0.25 + 0.40j, 0.20 + 0.25j, -0.05 + 0.35j), 0.01
 STEP, GAIN, EXPLORATION, MOTOR = 0.01, 0.05, 0.05, 0.005
 MARKERS = ("right_1", "right_2", "right_3", "right_tip")
 NOISE, REST, GAP, TRIALS = 0.001 * sum(LINKS), 5, range(150, 153), 12
-"""Of recordings of markers."""
+"""Recordings of markers: noise (SD), samples at rest, samples without a marker, and trials."""
 
 
 def places(q):
