@@ -16,10 +16,8 @@ import random
 import sys
 from pathlib import Path
 
-import numpy as np
-
-LINKS, START, CLUMSY = np.array([(0.33, 0.27, 0.09), (0.6, 1.4, 0.5), (0.3, -0.3, -0.6)])
-GOALS, RADIUS = (0.05 + 0.45j, 0.25 + 0.40j, 0.20 + 0.25j, -0.05 + 0.35j), 0.01
+LINKS, START = (0.33, 0.27, 0.09), (0.6, 1.4, 0.5)
+GOALS, RADIUS = ((0.05, 0.45), (0.25, 0.40), (0.20, 0.25), (-0.05, 0.35)), 0.01
 STEP, GAIN, EXPLORATION, MOTOR = 0.01, 0.05, 0.05, 0.005
 MARKERS = ("right_1", "right_2", "right_3", "right_tip")
 NOISE, REST, GAP, TRIALS = 0.001 * sum(LINKS), 5, range(150, 153), 12
@@ -27,28 +25,37 @@ NOISE, REST, GAP, TRIALS = 0.001 * sum(LINKS), 5, range(150, 153), 12
 
 
 def places(q):
-    """Return the places of shoulder, elbow, wrist and hand as x + iy, shape ``(..., 4)``."""
-    links = LINKS * np.exp(1j * np.cumsum(q, axis=-1))
-    return np.concatenate([0 * links[..., :1], np.cumsum(links, axis=-1)], axis=-1)
+    """Return the places of shoulder, elbow, wrist and hand."""
+    x, y, angle, found = 0.0, 0.0, 0.0, [(0.0, 0.0)]
+    for length, joint in zip(LINKS, q, strict=True):
+        angle += joint
+        x, y = x + length * math.cos(angle), y + length * math.sin(angle)
+        found.append((x, y))
+    return found
 
 
 def move(q, target, goal, stops):
     """Return the posture where a straight movement ends, and its control steps. It ends where the
     hand hits the goal or the target is reached; with ``stops`` also where the hand is nearly as at
     the target."""
-    way = math.dist(q, target)
-    shares = np.minimum(np.arange(math.ceil(way / STEP) + 1) * STEP / (way or 1.0), 1.0)
-    postures = q + shares[:, None] * (target - q)
-    hand = places(postures)[:, -1]
-    ends = (abs(hand - goal) <= RADIUS) | (stops & (abs(hand - hand[-1]) <= RADIUS / 10))
-    ends[-1] = True
-    return postures[ends.argmax()], int(ends.argmax()) + 1
+    way = [b - a for a, b in zip(q, target, strict=True)]
+    steps, end = math.ceil(math.hypot(*way) / STEP), places(target)[-1]
+    for k in range(steps + 1):
+        share = min(k * STEP / (math.hypot(*way) or 1.0), 1.0)
+        here = [a + share * d for a, d in zip(q, way, strict=True)]
+        hand = places(here)[-1]
+        if math.dist(hand, goal) <= RADIUS or (stops and math.dist(hand, end) <= RADIUS / 10):
+            break
+    return here, k + 1
 
 
 def correct(q, goal):
     """Return the posture that descent on the distance to the goal finds."""
-    while abs(error := goal - (points := places(q))[-1]) > RADIUS / 10:
-        q = q + GAIN * ((points[-1] - points[:-1]).conj() * error).imag
+    q = list(q)
+    while math.dist((points := places(q))[-1], goal) > RADIUS / 10:
+        x, y = points[-1]
+        for j, (a, b) in enumerate(points[:-1]):
+            q[j] += GAIN * (-(y - b) * (goal[0] - x) + (x - a) * (goal[1] - y))
     return q
 
 
@@ -56,22 +63,27 @@ def practise(averages, trials, rng):
     """Yield trial, goal (both from 1), duration (s) and recorded posture (rad) of each hit, and its
     movements, as pairs of control steps and the posture at the end; trial 1 is clumsy. With
     ``averages`` what is kept moves half the way to each better trial."""
-    kept, best = [], math.inf
+    kept, best = [None] * len(GOALS), math.inf
     for trial in range(1, trials + 1):
-        q, hits = START, []
-        for number, goal in enumerate(GOALS):
-            target = q + CLUMSY
-            if kept:
-                target = kept[number] + [rng.gauss(0, EXPLORATION) for _ in q]
+        q, hits, total = list(START), [], 0
+        for goal, stored in zip(GOALS, kept, strict=True):
+            target = [q[0] + 0.3, q[1] - 0.3, q[2] - 0.6]
+            if stored:
+                target = [angle + rng.gauss(0, EXPLORATION) for angle in stored]
             q, ticks = move(q, target, goal, True)
             moves = [(ticks, q)]
-            if abs(places(q)[-1] - goal) > RADIUS:
+            if math.dist(places(q)[-1], goal) > RADIUS:
                 q, more = move(q, correct(q, goal), goal, False)
+                ticks += more
                 moves.append((more, q))
-            hits.append((sum(ticks for ticks, _ in moves), q, moves))
-        if (total := sum(ticks for ticks, *_ in hits)) < best:
-            reached = np.array([q for _, q, _ in hits])
-            best, kept = total, [*((kept + reached) / 2 if averages and kept else reached)]
+            total += ticks
+            hits.append((ticks, q, moves))
+        if total < best:
+            best = total
+            kept = [
+                [(a + b) / 2 if averages else b for a, b in zip(old or new, new, strict=True)]
+                for old, (_, new, _) in zip(kept, hits, strict=True)
+            ]
         for goal, (ticks, q, moves) in enumerate(hits, 1):
             yield trial, goal, ticks / 100, [angle + rng.gauss(0, MOTOR) for angle in q], moves
 
@@ -87,13 +99,14 @@ def hits(trials):
 
 def samples(rng):
     """Yield trial, time (s) and places of the markers (m) of each sample."""
-    q, clock, last = START, 0, 1
+    q, clock, last = list(START), 0, 1
     for trial, _, _, _, moves in practise(False, TRIALS, rng):
         if trial > last:
-            q, clock, last = START, 0, trial
+            q, clock, last = list(START), 0, trial
         for steps, end in [*moves, (REST, moves[-1][1])]:
             for k in range(steps):
-                yield trial, clock / 100, places(q + (end - q) * k / max(steps - 1, 1))
+                here = [a + (b - a) * k / max(steps - 1, 1) for a, b in zip(q, end, strict=True)]
+                yield trial, clock / 100, places(here)
                 clock += 1
             q = end
 
@@ -104,8 +117,7 @@ def markers(subject):
     axes = ",".join(f"{name}_{axis}" for name in MARKERS for axis in "xy")
     yield f"subject,session,trial,time,{axes}"
     for number, (trial, time, points) in enumerate(samples(rng)):
-        numbers = np.column_stack([points.real, points.imag]).ravel()
-        at = [f"{x + noise.gauss(0, NOISE):.4f}" for x in numbers]
+        at = [f"{x + noise.gauss(0, NOISE):.4f}" for point in points for x in point]
         if number in GAP and subject == "m1":
             at[2:4] = "", ""
         session = 1 if trial <= TRIALS / 2 else 2
