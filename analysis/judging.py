@@ -253,11 +253,11 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
     ----------
     words : str or pathlib.Path
         TOML file with a table for each claim, by its id: ``text``, the claim, ``test`` in words,
-        and ``means``, a list of tables with a ``sentence`` and a bound, ``above`` or ``below``
-        which the mean is claimed to lie (:func:`mean_beyond`), or ``within`` ± which.
+        and ``means``, a list of tables with a ``sentence`` and one bound: the mean is claimed to
+        lie ``above`` it, ``below`` it (:func:`mean_beyond`), or ``within`` plus and minus it.
     values : mapping
         By the ids of claims, a list with an entry for each of their means: a value for each task,
-        or a mapping of groups of tasks to such values, each of which has to lie beyond the bound;
+        or a mapping of groups of tasks to such values, when the mean of each group has to lie so;
         a sentence can have the group as ``{group}``.
 
     Returns
@@ -268,11 +268,7 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        The file lacks a claim.
-    KeyError
-        A claim of the file lacks what is needed.
-    ValueError
-        A claim has more or fewer means than values.
+        The file lacks a claim, a claim lacks an entry, or it has more or fewer means than values.
 
     Examples
     --------
@@ -290,7 +286,14 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
         if name not in of_file:
             raise CoarticError(f"{words} has no claim {brief_value(name)}")
         claim = of_file[name]
+        if missing := [key for key in ("text", "test", "means") if key not in claim]:
+            raise CoarticError(f"{words}: claim {name} has no {missing[0]}")
         every = [of if isinstance(of, Mapping) else {"": of} for of in means]
+        if len(claim["means"]) != len(every):
+            has = counted(len(claim["means"]), "mean")
+            raise CoarticError(
+                f"{words}: claim {name} has {has}, but values of {len(every)} are given"
+            )
         asked = [*zip(claim["means"], every, strict=True)]
         groups = dict.fromkeys(group for of in every for group in of)
         finding = all_of(*(

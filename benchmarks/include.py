@@ -131,8 +131,8 @@ def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
     """Warn of a source whose plan has runs that the joined plan lacks. Warn, too, of a source with
-    a cell (method and task) of a stochastic method, all of whose runs are joined and which
-    ``asked`` lacks, if it has fewer runs than the largest number in ``asked``. ``asked``: numbers
+    a cell (method and task) of a stochastic method that ``asked`` lacks, with all its runs joined,
+    if it has fewer runs than the largest number in ``asked``. ``asked``: numbers
     of runs asked for, by digest of the cell; ``plans``: plans by name of the source; ``jobs``:
     joined plan, by digest."""
     most = max(asked.values())

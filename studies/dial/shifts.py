@@ -74,7 +74,7 @@ def by_task(rows, setting, column):
 
 
 def in_each(values, families=FAMILIES):
-    """Return values by family, in each of which a claim has to hold."""
+    """Return values by family, for a claim that has to hold in each family."""
     return {family: values[family] for family in families}
 
 
