@@ -201,10 +201,13 @@ def _with_columns(frame: pd.DataFrame, task: Task, source: str, is_timed: bool) 
     frame = frame.assign(**starts)
     needed = ["subject", "trial", "goal", "hand", "ticks", *joints]
     if absent := [name for name in needed if name not in frame]:
+        timed = "(or duration in place of ticks)"
+        if "duration" in frame:
+            timed = "(read_hits reads a file with a duration in place of ticks)"
         raise CoarticError(
             f"{source} has no column {', '.join(absent)}; needed are "
-            f"{', '.join(name for name in needed if name not in starts)} (or duration in place of "
-            f"ticks), separated by commas; found are {there}"
+            f"{', '.join(name for name in needed if name not in starts)} {timed}, separated by "
+            f"commas; found are {there}"
         )
     if not len(frame):
         raise CoarticError(f"{source} has no hit: needed is a row for each")

@@ -322,13 +322,13 @@ def _check_clock(samples: _Samples) -> None:
 
 
 def _bridge_gaps(samples: _Samples) -> pd.DataFrame:
-    """Fill gaps in the places of markers by straight lines, in place, and warn if places are
-    coarsely rounded.
+    """Fill gaps in the places of markers by straight lines, in place.
 
     Returns a row for each sample: ``gap``, duration of the longest gap that begins there, s, or 0,
     and its ``marker``, such as ``right_1: ``, empty if whole samples are missing; ``is_held``, True
     if a marker keeps its place, or is missing, from there for over 50 ms, unlike elsewhere.
-    ``attrs["grid"]`` is the step to which places are rounded, length unit.
+    ``attrs`` has the step to which places are rounded, length unit, as ``grid``, and the column
+    with the largest as ``coarsest``.
     """
     task, step, n = samples.task, samples.step, len(samples.time)
     longest, of_marker = np.zeros(n), np.full(n, "", dtype=object)
@@ -353,13 +353,10 @@ def _bridge_gaps(samples: _Samples) -> pd.DataFrame:
             durations = _bridge(at[:, k], samples)
             of_marker[durations > longest] = f"{marker}: "
             longest = np.maximum(longest, durations)
-    if coarse > 0.2:  # radii
-        warn(f"{samples.source}: {rounded} is rounded to {coarse * task.radius:.2g}, the radius of "
-             f"goals is {task.radius:g}: are there more digits?")  # fmt: skip
     leaps = samples.leaps
     longest[leaps] = np.maximum(longest[leaps], samples.steps[leaps] - step)
     marks = pd.DataFrame({"gap": longest, "marker": of_marker, "is_held": held})
-    marks.attrs["grid"] = coarse * task.radius
+    marks.attrs |= {"grid": coarse * task.radius, "coarsest": rounded}
     return marks
 
 
@@ -589,10 +586,14 @@ def _check_starts(samples: _Samples, q: Array, trials: Sequence[_Trial]) -> None
 
 
 def _warn_of_places(samples: _Samples, q: Array, marks: pd.DataFrame) -> None:
-    """Warn of used samples in which a marker keeps its place or a gap is bridged, of samples that
-    repeat, frames that seem lost, links whose length follows a joint or drifts, and an arm without
-    markers; ``q``: postures, ``(n, dof)``."""
+    """Warn of places that are coarsely rounded, of used samples in which a marker keeps its place
+    or a gap is bridged, of samples that repeat, frames that seem lost, links whose length follows a
+    joint or drifts, and an arm without markers; ``q``: postures, ``(n, dof)``."""
     used, gap = marks.is_used.to_numpy(), marks.gap.to_numpy()
+    grid, radius = marks.attrs["grid"], samples.task.radius
+    if grid > 0.2 * radius:
+        warn(f"{samples.source}: {marks.attrs['coarsest']} is rounded to {grid:.2g}, the radius of "
+             f"goals is {radius:g}: are there more digits?")  # fmt: skip
     if frozen := np.flatnonzero(used & marks.is_held & (gap == 0)).tolist():
         words = ("a marker keeps its place to the last digit for more than 50 ms, unlike "
                  "elsewhere. Does its last place fill a gap?")  # fmt: skip
@@ -605,7 +606,7 @@ def _warn_of_places(samples: _Samples, q: Array, marks: pd.DataFrame) -> None:
     ways = np.diff(every, axis=0, prepend=np.nan)
     ways[samples.begins | samples.leaps] = np.nan
     rates = samples.step / np.where(samples.begins, samples.step, samples.steps)[:, None]
-    least = 5 * marks.attrs["grid"]  # shorter paths may be doubled by rounding
+    least = 5 * grid  # shorter paths may be doubled by rounding
     if (words := _odd_steps(ways, least)) and _odd_steps(ways * rates, least):
         warn(f"{samples.source}: {words}")
     stretched = [

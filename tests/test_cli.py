@@ -381,6 +381,12 @@ def test_a_place_that_is_taken_is_said_before_anything_is_drawn(coartic, tmp_pat
         assert (status, "is there already; add --replace" in said) == (2, True)
 
 
+def test_a_folder_is_no_task_to_draw(coartic, tmp_path):
+    status, _, said = coartic("draw", tmp_path)
+    assert status == 2
+    assert f"coartic draw {tmp_path} --run ID films a run" in said
+
+
 def test_play(coartic, tmp_path, monkeypatch):
     shown = []
     monkeypatch.setattr("webbrowser.open", lambda address: not shown.append(address))

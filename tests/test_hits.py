@@ -693,6 +693,8 @@ def test_one_armed_people_need_no_columns_of_the_other_arm(read):
 
 def test_reader_takes_durations_and_warns_of_small_degrees(people, read):
     timed = people.assign(duration=people.ticks / 100).drop(columns="ticks")
+    with pytest.raises(CoarticError, match="no column ticks.*read_hits reads a file with a dur"):
+        solutions_of(TASK, timed)
     assert read(timed, ticks_per_unit=100).ticks.tolist() == people.ticks.tolist()
     with pytest.raises(CoarticError, match="in no trial are all 4 goals hit"):
         solutions_of(TASK, people[people.goal < 4])

@@ -399,6 +399,13 @@ def test_a_scale_that_changes_by_three_per_cent_is_said():
     assert words in str(said[0].message)
 
 
+def test_places_in_another_unit_are_not_called_rounded():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(CoarticError, match="another unit"):
+            hits_from_markers(scaled(1000)(recorded(RIGHT).round(4)), RIGHT)
+
+
 @pytest.mark.parametrize("order", [(2, 1, 3, 4), (4, 3, 2, 1)])
 def test_goals_in_another_order_are_named(order):
     goals = tuple(RIGHT.goals[k - 1] for k in order)

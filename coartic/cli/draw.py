@@ -58,6 +58,11 @@ def draw(
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
+    for folder in [name for name in tasks or () if Path(name).is_dir()]:
+        raise CoarticError(
+            f"{folder} is a folder: coartic draw {folder} --run ID films a run; coartic list "
+            f"{folder} has the ids"
+        )
     out = out or Path("tasks.svg")
     if replace and not out.suffix:
         raise CoarticError("--replace has no effect on a folder, whose pictures are written again")

@@ -72,9 +72,8 @@ def report(
         f"{counted(made['.csv'], 'table')} ({what})."
     )
     if not for_paper:
-        say_pairs(
-            [("More", "coartic report --for-paper adds figures as SVG and PDF and tables as LaTeX")]
-        )
+        again = f"coartic report {study.folder_in_commands} --for-paper"
+        say_pairs([("More", f"{again} adds figures as SVG and PDF, and tables as LaTeX")])
     for part, reason in failures.items():
         complain("Error", f"{part} could not be made, by a fault of coartic: {reason}")
     if failures:

@@ -112,9 +112,12 @@ class Display:
     def show(self, doing: str, *, at_once: bool = False) -> None:
         """Note what the command is ``doing`` from now on, and print it: on a terminal or with
         ``at_once`` always, else if ten seconds have passed since the last such line or the
-        beginning."""
-        self._doing, self._since = doing, time.monotonic()
-        if self._is_live or at_once or self._since - self._last >= self.EVERY_S:
+        beginning. The time so far goes on where both texts begin with one word and a colon."""
+        now, (before, same, _) = time.monotonic(), self._doing.partition(":")
+        if not (same and doing.startswith(f"{before}:")):
+            self._since = now
+        self._doing = doing
+        if self._is_live or at_once or now - self._last >= self.EVERY_S:
             self._print(doing)
 
     def line(self, *texts: str) -> None:

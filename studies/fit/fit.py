@@ -172,6 +172,10 @@ def fit(frame, task, *, condition=None, noise=0.0, implausible="refuse"):
     condition, rows = condition or condition_for(task), []
     check_noise(noise)
     refuse_without_null_space(task, condition)
+    if idle := {*condition.hands} - {*task.hands}:
+        raise CoarticError(
+            f"{condition.id} uses the {idle.pop()} hand, task {task.name!r} does not"
+        )
     frame = checked_hits(frame, task, implausible=implausible)
     if other := {*frame.hand} - {*condition.hands}:
         raise CoarticError(f"{condition.id} does not use the {other.pop()} hand, the data do")

@@ -27,10 +27,12 @@ def sentence(row):
         f"{row.subject}, trials 1 to {row.trials} (lost: {row.lost}; hits missing in others: "
         f"{row.missing}{f'; unfinished: {row.unfinished}' * bool(row.unfinished)}): "
     )
+    lost = "A trial with lost hits may have been the best" if row.lost + row.missing else ""
+    wrong = f" {lost}: the model can be wrong." if lost else ""
     if row.misfit:
         return (
             f"{text}none of the six models explains these trials ({row.misfit}). The "
-            f"nearest is {MODELS[row.model]}. No parameters are given."
+            f"nearest is {MODELS[row.model]}. No parameters are given.{wrong}"
             + f" Outliers ({100 * row.check_lapses:.0f} % of hits) can cause this: look at them."
             * bool(row.check_lapses > OUTLIERS[1])
         )
@@ -41,15 +43,15 @@ def sentence(row):
             f"{behind - row[f'bic_{row.model}']:.0f} or more)"
         )
         if row.model not in LEARNERS:
-            return f"{text}. Parameters of the learner do not apply."
+            return f"{text}. Parameters of the learner do not apply.{wrong}"
         numbers = [
             f"{symbol} = {row[name]:.3f} [{row[f'{name}_low']:.3f}, {row[f'{name}_high']:.3f}]"
             for symbol, name in (("σ", "sigma"), ("ε", "epsilon"), ("κ", "kappa"))
             if name in row.index
         ]
         if not row.sigma_low > row.noise / 10:
-            return f"{text}. Motor noise explains all of σ, so no parameters are given."
-        doubts = ["A trial with lost hits may have been the best"] * bool(row.lost + row.missing)
+            return f"{text}. Motor noise explains all of σ, so no parameters are given.{wrong}"
+        doubts = [lost] * bool(lost)
         doubts += ["Motor noise is more than half of σ"] * bool(row.noise > row.sigma / 2)
         doubt = f" {'. '.join(doubts)}: intervals can be too narrow, and the model wrong."
         held = (
@@ -60,7 +62,7 @@ def sentence(row):
     return (
         f"{text}these trials cannot distinguish {'; '.join(MODELS[name] for name in alike)} "
         f"(differences in BIC below {CLEAR:g}), so no parameters are given. Trials better than all "
-        f"before: {row.improved}."
+        f"before: {row.improved}.{wrong}"
     )
 
 

@@ -70,6 +70,9 @@ def test_parameters_of_the_plain_learner_are_found():
         ({"noise": 0.02}, "Motor noise is more"),
         ({"lost": 1}, "A trial with lost hits may have been the best: intervals can be too narrow"),
         ({"model": "walk", "bic_walk": -1e4}, "a walk (keep the last) (other models: BIC"),
+        ({"model": "walk", "bic_walk": -1e4, "lost": 1}, "been the best: the model can be wrong."),
+        ({"misfit": "x", "missing": 1}, "may have been the best: the model can be wrong."),
+        ({"others": "walk", "lost": 1}, "may have been the best: the model can be wrong."),
     ):
         assert words in FIT.sentence(pd.Series({**fitted, **of_row}))
 
@@ -176,6 +179,8 @@ def test_a_hit_of_zeros_is_no_posture_of_the_fit(people):
         FIT.fit(gap, TASK)
     with pytest.raises(CoarticError, match="seeds are .*one is there twice"):
         PROTOCOLS.simulate(TASK, "best", 0.04, 0.3, seeds=[3, 4, 3], trials=1)
+    with pytest.raises(CoarticError, match="EC4 uses the left hand, task 'ascending' does not"):
+        FIT.fit(people, load_task("ascending"), condition=CONDITIONS["EC4"])
 
 
 @pytest.mark.filterwarnings("always")
