@@ -268,8 +268,8 @@ def _samples_of(
                       f"{hand}_tip"] for hand in hands}  # fmt: skip
     columns = [f"{marker}_{axis}" for marker in chain(*markers.values()) for axis in "xy"]
     if missing := [name for name in ["subject", "trial", "time", *columns] if name not in frame]:
-        raise CoarticError(f"{source} has no column {missing[0]}{also(missing)}; found are "
-                           f"{', '.join(map(str, frame.columns))}")  # fmt: skip
+        there = ", ".join(map(str, frame.columns)) or "none"
+        raise CoarticError(f"{source} has no column {missing[0]}{also(missing)}; found are {there}")
     if not len(frame):
         raise CoarticError(f"{source} has no sample: needed is a row for each")
     people = as_names(frame.subject)

@@ -179,6 +179,7 @@ WRONG = {
         (t.index != 3)[:, None] | (t.columns != "right_2_x"), "0,5"
     ),
     "no column right_3_x .also right_3_y": lambda t: t.drop(columns=["right_3_x", "right_3_y"]),
+    "no column subject .also trial, .* found are none": lambda t: t[[]],
     "no sample": lambda t: t[:0],
     r"4 of 4 trials are unfinished.*goal 1 in trial 1.*at \(0.0879, -0.486\).*upwards": lambda t: (
         t.assign(**{name: -t[name] for name in t if name.endswith("_y")})
