@@ -164,8 +164,9 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
 
 
 def caption_of(table: Table, frame: pd.DataFrame) -> str:
-    """Return the caption of a table, with the number of compared tasks in place of ``{tasks}``, and
-    the name of the rewards to which gaps are taken in place of ``{reference}``."""
+    """Return the caption of a table whose rows are ``frame`` (:class:`Table`), in which ``{tasks}``
+    is replaced by the number of compared tasks, and ``{reference}`` by the name of the rewards from
+    which gaps count; both are in ``frame.attrs``."""
     caption = table.caption.replace("{tasks}", frame.attrs["compared"])
     return caption.replace("{reference}", frame.attrs["reference"])
 

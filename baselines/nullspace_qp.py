@@ -59,9 +59,10 @@ class HandController(Controller):
         return solution, preferred, memory
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return zeros, shape ``(joints,)``: the changes that the joints that are not locked prefer
-        in a control step. Arguments are for subclasses: configuration, memory, and number of
-        control steps to the goal."""
+        """Return the changes that are preferred in a control step, ``(joints,)``, in lengths of a
+        control step, for the coordinates that are not locked (``self.moving``): here zeros. A
+        subclass can use the configuration ``q``, ``(dof,)``, the ``memory`` of :meth:`begin`, and
+        the number of control ``steps`` to the goal."""
         return np.zeros(len(self.moving))
 
 

@@ -134,10 +134,11 @@ class PostureController(Controller):
         return largest
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
-        """Make a Gauss-Newton step, and bend the arm where that brings the hand hardly nearer, from
-        a posture towards the posture that hits the goal of an aim (hand and goal) and is then
-        nearest to a preferred posture. Return a copy, the posture after the step, and the length of
-        the step before it was limited to 0.1, length unit and rad mixed."""
+        """Return the posture ``(dof,)`` after a Gauss-Newton step from ``posture``, a new array,
+        and the length of the step before it was limited to 0.1, length unit and rad mixed. The
+        steps lead to the posture that hits the goal of an aim (hand and goal) and is nearest to
+        ``preferred``, ``(dof,)``; joints have no limits. Where a step brings the hand hardly
+        nearer, the arm is bent besides."""
         rows, outside = self.faces(posture, aim)
         wanted = _POSTURE_GAIN * (preferred - posture)[self.moving]
         change = self.solve(rows, outside, wanted).changes

@@ -271,11 +271,13 @@ METHODS: tuple[type[Method], ...] = (PathLength, SquaredDisplacement, Accelerati
 def path_movements(
     session: Session, task: Task, instance: Instance, path: list[Array]
 ) -> tuple[Movement, ...]:
-    """Return movements of kind path, one per goal, along ``path``, a piece ``(k, dof)`` per goal.
+    """Return movements of kind path, one per goal, along ``path``: for each goal a piece, the
+    configurations ``(k, dof)`` after the present one.
 
-    A smooth path goes on towards a goal's inside after its rim is hit; the rest of the piece then
-    begins the next movement, so that the path is followed up to the last hit, except by joints held
-    on the way to the next goal, which stay where they are. The session counts the evaluations.
+    A movement ends where the hand enters its goal, and a piece may go on from there: what is left
+    of it begins the next movement, in which joints that ``instance`` holds on the way to the next
+    goal stay where they are. After the last goal nothing follows. A movement that misses its goal
+    is returned like others. The session counts the evaluations.
     """
     paths: list[Movement] = []
     here, rest = np.array(task.q0), np.empty((0, task.robot.dof))

@@ -86,8 +86,8 @@ class Progress:
     """Runs still to perform that only show whether results of own methods repeat."""
 
     def count(self, status: str) -> None:
-        """Count a run of the plan in :attr:`failed` unless its status is ``ok``, and in
-        :attr:`crashed` if it crashed."""
+        """Count a run of the plan by its status (:attr:`.Outcome.status`): any but ``ok`` in
+        :attr:`failed`, ``crashed`` in :attr:`crashed`, too."""
         self.failed += status != "ok"
         self.crashed += status == "crashed"
 

@@ -329,7 +329,7 @@ def new(
     out: given.Out = None,
     replace: given.Replace = False,
 ) -> None:
-    """Write a working method, to be changed into your own."""
+    """Write a working method, in a file of its name or --out, to be changed into your own."""
     from coartic.benchmarks import template
     from coartic.benchmarks.registry import check_id, registry
     from coartic.internal.files import write_output

@@ -292,11 +292,12 @@ def choose_hand(
 
 @inner
 def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) -> None:
-    """Set the preferred posture p of a run, once its hand for goal ``number`` (from 0) is chosen:
-    the present posture q (*stay*), the start of the trial (*start*), or (*next goal*) (q + t') / 2
-    with the target t' stored for the next goal and the hand of highest value there; q for joints
-    that the movement to t' would not explore, and without a next goal or a target stored there.
-    ``table``: Q and q* of the run, shape ``(G, 3, 2)``. Nothing changes if drift and pull are 0."""
+    """Set the preferred posture p of a run, once its hand for goal ``number`` (from 0) is chosen,
+    by the learner's ``direction``. *stay*: the present posture q. *start*: the start of the trial.
+    *next goal*: (q + t') / 2, where t' is the target that is stored for the next goal and its hand
+    of highest value; q without a next goal or such a target, and for joints that this hand's
+    movements do not explore. ``table`` has, for goal, last hand (0 left, 1 right, 2 none) and hand,
+    ``(G, 3, 2)``, records of the value and the target. Nothing changes if drift and pull are 0."""
     if run.drift == 0.0 and run.pull == 0.0:
         return
     fill_row(run.preferred, run.q)
@@ -357,10 +358,14 @@ def aim(
     rng: np.random.Generator,
     workspace: _Workspace,
 ) -> None:
-    """Choose the hand of run ``n`` for goal ``number`` (from 0) after hand ``before`` (0 left, 1
-    right, 2 none); if a target q*(s, a) is stored, set the run's target to q*, with an idle arm
-    that the condition does not modify as it is, and with ``explore`` moved by drift and noise η:
-    phase 2, *aim*. ``table``: Q and q* of the run, shape ``(G, 3, 2)``."""
+    """Choose and set, in ``workspace.batch.runs[n]``, the hand for goal ``number`` (from 0) after
+    hand ``before`` (0 left, 1 right, 2 none), and its target: phase 2, *aim*.
+
+    The target is the stored target q*(s, a), but for an idle arm that the condition does not
+    modify, which keeps its posture; without a stored target there is none, and the corrective
+    process acts. With ``explore`` the hand is explored (:func:`choose_hand`), and drift and noise η
+    are added to the target. ``table`` is that of :func:`prefer`.
+    """
     run, entries = workspace.batch.runs[n], table[number, before]
     run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
     stored = entries[run.hand]

@@ -224,8 +224,9 @@ def squared_distance(run: RunRecord) -> float:
 
 @inlined
 def start(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
-    """Copy a run into column ``slot`` of ``at`` (:func:`load`), with start, target and squared
-    joint-space length of the movement to its target, which :func:`move_slots` can then make."""
+    """Copy ``run``, record ``number`` (from 0) of its batch, into column ``slot`` of ``at``
+    (:func:`load`), and with it the start, the target and the squared joint-space distance of its
+    movement, so that :func:`move_slots` can make this movement."""
     load(at, slot, number, run, arm)
     _copy_arm(at.start, slot, run.q, arm)
     _copy_arm(at.target, slot, run.target, arm)

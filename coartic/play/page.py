@@ -40,13 +40,14 @@ def play_page(task: Task | None = None) -> str:
 
 
 def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
-    """Return the figure as HTML for a page, which has the styles of ``play.css`` and defines the
-    colours that these name.
+    """Return the figure to play with as HTML. The page has to have the styles of ``play.css``, and
+    to define the colours that ``play.css`` names.
 
-    ``presets`` are the tasks that the figure offers (:func:`preset_of`). ``more`` is data for the
-    scripts: ``page``, the address to which links lead, None for no link; ``first``, shown at first;
-    ``folder``, the folder with the stored runs, quoted for a shell; ``cells``, the fields of table
-    ``ranking`` that start films, each with row, column and the film.
+    ``presets`` are the tasks that the figure offers (:func:`preset_of`). ``more`` is optional data
+    for the scripts, such as :func:`coartic.analysis.report.player.player` gives: ``page``, the
+    address to which links lead, None for no link; ``first``, what is shown at first; ``folder``,
+    the folder with the stored runs, quoted for a shell; ``cells``, the fields of table ``ranking``
+    that start films, each with row, column and the film.
     """
     content = {"presets": presets, "version": coartic.__version__, **more}
     data = json.dumps(content, allow_nan=False, separators=(",", ":"))

@@ -133,7 +133,7 @@ class Run:
 
     @property
     def cell(self) -> Cell:
-        """The cell of the run."""
+        """Task, method and parameters of the run (:class:`Cell`)."""
         return self.job.cell
 
     @property
