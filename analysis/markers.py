@@ -400,8 +400,8 @@ def _find_jumps_of_links(samples: _Samples) -> NDArray[np.object_]:
 def _postures(samples: _Samples) -> tuple[Array, NDArray[np.bool_]]:
     """Return the postures of samples, ``(n, dof)``, unwrapped from the task's start on in each
     trial, and a mask, ``(n,)``, of samples whose two shoulders do not fit one base, by over 10 % of
-    their distance (of the shorter arm if that is 0). Raises CoarticError, or warns, if a locked
-    base is elsewhere in some trials."""
+    their distance (of the shorter arm if that is 0). A locked base that is
+    elsewhere in some trials is warned of, and raises CoarticError beyond two radii."""
     task, robot = samples.task, samples.task.robot
     shoulders = {hand: np.array(robot.arm(hand)[2:]) for hand in samples.places}
     bases = [places[:, 0] - shoulders[hand] for hand, places in samples.places.items()]

@@ -115,11 +115,11 @@ class PostureController(Controller):
         return solution, preferred, dict(zip(aims, postures, strict=True))
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
-        """Replace each of ``postures``, one for each aim (hand and goal), in place, by a posture a
-        step towards where the path from ``q`` through all is shortest; return the largest length
-        of these steps before they were limited (:meth:`step_nearer`). Preferred is the mean of the
-        postures before and after, weighted by inverse distances (Weiszfeld 1937), for the last the
-        posture before."""
+        """Move each of ``postures``, one for each aim (hand and goal), in place, by a step of
+        :meth:`step_nearer`, so that the path from ``q`` through all of them gets shorter; return
+        the largest length of these steps before they were limited, length unit and rad mixed. As
+        preferred a step gets the mean of the postures before and after, weighted by inverse
+        distances (Weiszfeld 1937), and the last step the posture before."""
         largest = 0.0
         for k, aim in enumerate(aims):
             before = q if k == 0 else postures[k - 1]

@@ -115,7 +115,8 @@ class Request(FileData):
 
 
 def request_for(**options: Any) -> Request:
-    """Return a checked request. Raises CoarticError for unknown options and wrong values."""
+    """Return a checked request; ``options`` are fields of :class:`Request`, by name, all optional.
+    Raises CoarticError for unknown options and wrong values."""
     try:
         return Request.model_validate(options)
     except ValidationError as error:

@@ -121,11 +121,12 @@ def _plots_of(study: Study, section: Section, width: float | None = None) -> lis
 
 
 def _parts_of(study: Study, section: Section) -> dict[str, Any]:
-    """Return the values of a section for the template: ``finding``, a list of lines; ``figures``,
-    a plot, its SVG and, of the ranking, its SVG at one column, for phones, else an empty text;
-    ``shown``, for each table with rows its ``id``, ``caption``, ``rows`` and ``settings`` (numbers)
-    and ``html``, without settings and ablations (:func:`.is_setting`), except in tables
-    ``ranking``, ``contexts`` and ``methods``."""
+    """Return the values of a section for the template by name. ``finding``: a list of lines;
+    ``figures``: a list of plots, each with its SVG and, for the ranking alone, an SVG at one
+    column, for phones; ``shown``: for each table with rows a dictionary of its ``id``, ``caption``,
+    numbers of ``rows`` and ``settings``, and ``html``. Rows of settings and ablations
+    (:func:`.is_setting`) are left out of all tables but ``ranking``, ``contexts`` and
+    ``methods``."""
     tables = []
     for table in section.tables:
         frame = table(study)

@@ -183,11 +183,12 @@ def classes_of(table: Table, frame: pd.DataFrame) -> list[str]:
 
 
 def latex_table(table: Table, frame: pd.DataFrame, caption: str, notes: Sequence[str] = ()) -> str:
-    """Return a table of :data:`IN_LATEX` in LaTeX, with booktabs and longtable, in the columns
-    named there; without settings and ablations (:func:`.is_setting`), except in tables ``contexts``
-    and ``methods``.
+    """Return a table of :data:`IN_LATEX`, whose rows are ``frame``, in LaTeX, with booktabs and
+    longtable, in the columns named there; without settings and ablations (:func:`.is_setting`),
+    except in tables ``contexts`` and ``methods``. Raises KeyError for another table.
 
-    ``notes``, sentences, are below the table, with the meaning of a dagger in table or notes.
+    ``notes`` are sentences below the table, with the meaning of a dagger in table or notes;
+    ``caption`` and ``notes`` are plain text, which is escaped.
     """
     frame = frame if table.id in ("contexts", "methods") else frame[~is_setting(frame)]
     wanted = IN_LATEX[table.id].split(", ")

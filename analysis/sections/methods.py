@@ -16,8 +16,8 @@ from coartic.analysis.words import commonest, tally
     "forward_kinematics: forward-kinematics evaluations; solve_s: solving time (s); median_run",
 )
 def list_methods(study: Study) -> Rows:
-    """Yield a row for each method on each task of :func:`.one_by_one`: mean reward, gap, hands and
-    median costs.
+    """Yield a name and a row (:data:`.Rows`) for each method on each task of :func:`.one_by_one`:
+    the entries of :func:`.row_of_cell`, such as mean reward and gap, hands and median costs.
 
     Within a task, searches for the optimum come first, then methods from the highest mean reward
     on. ``median_run`` is the beginning of the id of the run with the reward nearest to the median;
