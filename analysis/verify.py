@@ -399,9 +399,8 @@ def _check_rewards(row: Any) -> bytes:
 
 
 def _read_movements(db: sqlite3.Connection, run: int) -> tuple[dict[str, list[MoveRow]], list[Any]]:
-    """Return the movements of row ``run`` of table ``results``, by part, and a list of their stored
-    values, which the result's hash covers. Raises ValueError, or another error of Python, for a
-    missing or malformed movement."""
+    """Return the movements of row ``run`` of table ``results``, by part, and a list of all as
+    stored, which the result's hash covers. Raises an error for a missing or malformed movement."""
     parts: dict[str, list[MoveRow]] = {part: [] for part in STATED}
     query = "SELECT part, sum(length(path)) FROM movements WHERE result_id = ? GROUP BY part"
     for part, length in db.execute(query, [run]):
