@@ -304,7 +304,7 @@ def _without_implausible(
             advice = 'Mend the recording, or leave such hits out with implausible="drop"'
             if most:
                 advice = (
-                    f"Implausible are most hits of {most[0]}: angles are in rad (numpy.radians "
+                    f"Most hits of {most[0]} are implausible. Angles are in rad (numpy.radians "
                     "converts), anticlockwise, each measured from the link before. Is each in its "
                     "column and row, are hands and goals right, is the base in the length unit of "
                     f"the task, and is the task {task.name!r}?"

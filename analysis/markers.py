@@ -624,12 +624,12 @@ def _warn_of_places(samples: _Samples, q: Array, marks: pd.DataFrame) -> None:
 def _warn_of_movement(samples: _Samples, trials: Sequence[_Trial]) -> None:
     """Warn of what counts as movement in finished trials: rests on the way, returns to the start,
     and hits of two goals in successive samples."""
-    found: dict[str, list[int]] = {
+    rows_by_kind: dict[str, list[int]] = {
         f"the hand rests for more than {1000 * _LONGEST_REST:.0f} ms on the way": [],
         "the hand is back at the start before it hits a goal": [],
         "the hand is in the next goal already where it hits one": [],
     }
-    pauses, returns, at_once = found.values()
+    pauses, returns, at_once = rows_by_kind.values()
     for trial in trials:
         first, radius = trial.part.start, samples.task.radius
         ways = np.hstack([places[first : trial.end] for places in samples.places.values()])
@@ -638,7 +638,7 @@ def _warn_of_movement(samples: _Samples, trials: Sequence[_Trial]) -> None:
         returns += [first + k for k in _returns(to_hit, 1.5, 0.5, 0)[:1]]
         at_once += [first + one.sample for one, other in pairwise(trial.hits)
                     if other.sample - one.sample == 1]  # fmt: skip
-    for words, rows in found.items():
+    for words, rows in rows_by_kind.items():
         if rows:
             times = counted(len(rows), "time")
             warn(samples.sentence(rows, f"{words}, {times}, which counts as movement"))
@@ -784,18 +784,18 @@ def _bridge(place: Array, samples: _Samples) -> Array:
 def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[_Hit]:
     """Return the hits of a trial, up to the first goal that is missed, from places of the tips,
     ``(hands, n, 2)``, times ``(n,)`` and postures ``q``, ``(n, dof)``, of its samples."""
-    found: list[_Hit] = []
+    hits: list[_Hit] = []
     at, goals = tips @ [1, 1j], task.goal_array @ [1, 1j]
     ways = np.diff(at, axis=1, prepend=at[:, :1])  # to each sample from the one before
     for goal in goals:
-        first = found[-1].sample + 1 if found else 0
+        first = hits[-1].sample + 1 if hits else 0
         way, start = ways[:, first:], (at - ways)[:, first:] - goal
         square = np.maximum(way.real**2 + way.imag**2, 1e-18)
         slope = (start * way.conj()).real
         off = np.abs(start + np.clip(-slope / square, 0, 1) * way)
         inside = (off <= task.radius).any(axis=0)
         if not inside.any():
-            return found
+            return hits
         place = int(inside.argmax())
         hand, sample = int(off[:, place].argmin()), first + place
         excess = abs(start[hand, place]) ** 2 - task.radius**2
@@ -804,5 +804,5 @@ def _hits(tips: Array, task: Task, time: Array, q: Array) -> list[_Hit]:
         share = np.clip(share, 0, 1) if sample else 1.0
         before = max(sample - 1, 0)
         when = float(time[before] + share * (time[sample] - time[before]))
-        found.append(_Hit(sample, hand, when, q[before] + share * (q[sample] - q[before])))
-    return found
+        hits.append(_Hit(sample, hand, when, q[before] + share * (q[sample] - q[before])))
+    return hits

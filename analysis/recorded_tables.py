@@ -169,11 +169,11 @@ def row_names(frame: pd.DataFrame) -> list[str]:
 def as_names(values: pd.Series) -> pd.Series:
     """Return names as texts, with single spaces and plain hyphens (:func:`_written`); whole numbers
     are without ``.0``, and a missing name is an empty text."""
-    known = {}
+    texts = {}
     for value in values.dropna().unique():
-        whole = isinstance(value, float | np.floating) and value.is_integer()
-        known[value] = _written(f"{value:.0f}" if whole else str(value))
-    return values.map(known).astype(object).where(values.notna(), "")
+        is_whole = isinstance(value, float | np.floating) and value.is_integer()
+        texts[value] = _written(f"{value:.0f}" if is_whole else str(value))
+    return values.map(texts).astype(object).where(values.notna(), "")
 
 
 def as_numbers(values: pd.Series) -> NDArray[np.float64]:

@@ -213,7 +213,6 @@ coartic.__main__.main()
 
 
 @pytest.mark.process
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(
     ("moment", "name", "times"),
     [
@@ -313,7 +312,6 @@ os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
 
 
 @pytest.mark.process
-@pytest.mark.skipif(sys.platform == "win32", reason="signals and streams of POSIX")
 def test_a_command_ends_well_whatever_started_it(tmp_path):
     """With all signals blocked, and without input, output and errors, whatever a method's file
     starts. Modules that a stranger has put into the working folder are imported by no process of a

@@ -59,7 +59,7 @@ WRONG = {
     "line 3: ticks is -5": put("ticks", 1, -5),
     "has no hit": lambda t: t[:0],
     "line 2: ticks is empty": put("ticks", 0, None),
-    "angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
+    "Angles are in rad": lambda t: t.assign(left_1=np.degrees(t.left_1)),
     "a line above already; number trials": lambda t: pd.concat([t, t]),
     "line 2: ticks is .*column duration": lambda t: t.assign(ticks=t.ticks / 100),
     "duration is 0.0; needed is more than 0": lambda t: t.assign(duration=0.0).drop(
@@ -173,12 +173,10 @@ MOSTLY = {
 def test_a_person_whose_hits_are_mostly_impossible_is_refused_by_row(people, read, change):
     ofb = people.subject == "b"
     frame = pd.concat([people[~ofb], MOSTLY[change](people[ofb])])
-    sentence = (
-        r"line \d+: .*(radii from its goal|no angle in rad).*most hits of b: angles are in rad"
-    )
+    sentence = r"line \d+: .*(radii from its goal|no angle in rad).*Most hits of b are implausible"
     with pytest.raises(CoarticError, match=sentence):
         read(frame)
-    with pytest.raises(CoarticError, match="most hits of b"):
+    with pytest.raises(CoarticError, match="Most hits of b"):
         solutions_of(TASK, frame, implausible="drop")
 
 
@@ -704,7 +702,7 @@ def test_reader_takes_durations_and_warns_of_small_degrees(people, read):
     ):
         read(people.assign(ticks=since_start))
     angles = [name for name in people if name[-1].isdigit()]
-    with pytest.raises(CoarticError, match="most hits of [ab]: angles are in rad"):
+    with pytest.raises(CoarticError, match="Most hits of [ab] are implausible. Angles are in rad"):
         read(people.assign(**np.degrees(people[angles] / 10)), implausible="drop")
 
 

@@ -19,9 +19,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
-ENDING = {
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-}
+ENDING = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
 """Signals by which people and systems end a program."""
 _CLEANING_S = 5.0  # in which another signal is ignored
 _heard: list[tuple[int, float]] = []  # each signal that was raised, and when
@@ -30,7 +28,7 @@ _words = ["Interrupted."]
 
 def catch_signals() -> None:
     """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) raise KeyboardInterrupt from now
-    on, and unblock all signals (not on Windows). For 5 s after a signal has done so others are
+    on, and unblock all signals. For 5 s after a signal has done so others are
     ignored, unless Python lost the KeyboardInterrupt (:func:`_interrupt_again`). A signal that was
     ignored before, as by ``nohup``, stays so."""
 
@@ -39,8 +37,7 @@ def catch_signals() -> None:
             _heard.append((number, time.monotonic()))
             raise KeyboardInterrupt
 
-    if hasattr(signal, "pthread_sigmask"):  # where all are blocked, no process would end
-        signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())  # where all are blocked, no process would end
     for number in ENDING:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, interrupt)
@@ -61,10 +58,7 @@ def _interrupt_again(lost: UnraisableHookArgs) -> None:
     def send() -> None:
         for pause in (0.01, 0.1, 1.0):
             time.sleep(pause)
-            if hasattr(signal, "pthread_kill"):
-                signal.pthread_kill(main, number)
-            else:
-                signal.raise_signal(number)
+            signal.pthread_kill(main, number)
 
     _heard[-1] = number, math.inf
     threading.Thread(target=send, daemon=True).start()
@@ -97,10 +91,7 @@ def end_if_interrupted() -> None:
 @contextmanager
 def blocked_signals() -> Iterator[None]:
     """Block the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) for this thread in the block of
-    this context, also for processes that it starts there; do nothing on Windows."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
+    this context, also for processes that it starts there."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     try:
         yield

@@ -115,8 +115,8 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     several = list(names)
     others = len(several) - _MOST_NAMED
     more = f" and {counted(others, 'other')}" if others > 0 else ""
-    known = f". Known: {', '.join(several[:_MOST_NAMED])}{more}."
-    hint = (did_you_mean(name, several) if isinstance(name, str) else "") or known
+    listed = f". Known: {', '.join(several[:_MOST_NAMED])}{more}."
+    hint = (did_you_mean(name, several) if isinstance(name, str) else "") or listed
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 
 

@@ -84,7 +84,7 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
-    """Make this process a worker: the leader of a new group of processes (not on Windows), with the
+    """Make this process a worker: the leader of a new group of processes, with the
     first ``streams`` of input, output and errors connected to the null device. When its parent by
     ``multiprocessing`` has ended, a thread removes ``folder``, if given, and kills this process
     with its group."""
@@ -99,16 +99,14 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     nobody = os.open(os.devnull, os.O_RDWR)
     for stream in range(streams):
         os.dup2(nobody, stream)
-    if hasattr(os, "setpgid"):
-        os.setpgid(0, 0)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
+    os.setpgid(0, 0)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
     threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def end_group(pid: int) -> None:
     """Kill the group of processes that process ``pid`` leads, and process ``pid``; pass over either
     that does not exist or may not be killed."""
-    for end in (getattr(os, "killpg", None), os.kill):
-        if end is not None:
-            with contextlib.suppress(OSError):
-                end(pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+    for end in (os.killpg, os.kill):
+        with contextlib.suppress(OSError):
+            end(pid, signal.SIGKILL)

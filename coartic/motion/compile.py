@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import ctypes
+import fcntl
 import hashlib
 import logging
 import os
@@ -358,9 +359,7 @@ class _MachineCode:
         """Lock this function's code for this process, whose id the file of the lock gets unless the
         disk is full, and return True; return False if it cannot be locked, or another process holds
         the lock for more than 120 s. A log message names that process after 5 s."""
-        with contextlib.suppress(ImportError, OSError):
-            import fcntl
-
+        with contextlib.suppress(OSError):
             file = open(f"{self.cache_path}/{self.name}.lock", "a+b", buffering=0)  # noqa: SIM115
             for tries in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
                 with contextlib.suppress(BlockingIOError):

@@ -9,6 +9,7 @@ batch of finished runs at a time; whatever interrupts it, a batch is there whole
 
 from __future__ import annotations
 
+import fcntl
 import itertools
 import json
 import os
@@ -675,14 +676,12 @@ def writing(folder: Path) -> Iterator[Store]:
 @contextmanager
 def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
     """Lock a folder for this process in the block of this context, or, with ``shared``, share the
-    lock with other readers; do nothing where the folder cannot be opened, or the system or the disk
-    has no such locks. Raises CoarticError, which names ``command``, if the lock is held elsewhere,
+    lock with other readers; do nothing where the folder cannot be opened, or the disk has no such
+    locks. Raises CoarticError, which names ``command``, if the lock is held elsewhere,
     and without ``shared`` stays so for 1 s."""
     try:
-        import fcntl
-
         opened = os.open(folder, os.O_RDONLY)
-    except (ImportError, OSError):
+    except OSError:
         yield
         return
     end = time.monotonic() + (0 if shared else WAIT_S)  # a reader holds the lock for a moment

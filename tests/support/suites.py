@@ -1,6 +1,6 @@
 """Suites run into folders, in this process where processes are not what is tested."""
 
-import contextlib
+import fcntl
 import lzma
 import os
 import sqlite3
@@ -91,10 +91,7 @@ def made_once(tmp_path_factory, name, make):
     root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
     folder, made = root / name, root / f"{name}.made"
     with open(root / f"{name}.lock", "w") as file:
-        with contextlib.suppress(ImportError):  # a system without it has one worker
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX)
+        fcntl.flock(file, fcntl.LOCK_EX)
         if not made.exists():
             make(folder)
             made.touch()
