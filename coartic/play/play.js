@@ -960,7 +960,7 @@ class Play {
     if (!same(this.your_trials.at(-1) || null, hits)) this.your_trials.push(hits);
   }
 
-  /* Your trials, a row a hit: the format of studies/fit. */
+  /* Your trials, a row a hit: the format of `read_hits`. */
   get csv() {
     const joints = this.problems[0].arms.flatMap(({ links }, hand) => links.map((_, k) => `${HANDS[hand]}_${k + 1}`));
     const rows = this.your_trials.flatMap((hits, trial) => hits.map((hit) => ["you", trial + 1, ...hit]));

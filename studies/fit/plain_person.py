@@ -1,6 +1,6 @@
 """Four simulated people in metres, for the how-to: a simulator that does not use coartic.
 
-    python studies/fit/plain_person.py studies/fit
+    python studies/fit/plain_person.py docs/examples/recordings
 
 A right arm (upper arm, forearm, hand) practises four targets of 1 cm. p1 keeps the best trial; p2
 averages: what is kept moves half the way to each better trial, as none of the six models does.

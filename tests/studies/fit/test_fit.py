@@ -18,6 +18,7 @@ from tests.support.processes import ROOT, programs
 from tests.support.strategies import metres_task
 
 FOLDER = ROOT / "studies" / "fit"
+RECORDINGS = ROOT / "docs" / "examples" / "recordings"
 PROTOCOLS, FIT, STUDY, PLAIN, NEEDED = programs(
     "fit", "protocols", "fit", "study", "plain_person", "needed"
 )
@@ -158,11 +159,11 @@ def test_how_to_shows_what_the_command_prints(
     if subject == "p2":  # of whom no parameters are given
         monkeypatch.setattr(FIT, "bias", lambda *_: None)
         monkeypatch.setattr(FIT, "with_intervals", lambda *_: {})
-    task, recorded, options = "two-armed-1", "example.csv", []
+    task, recorded, options = "two-armed-1", "two-armed.csv", []
     if subject != "s2":
-        task, recorded = str(FOLDER / "metres.toml"), "metres.csv"
+        task, recorded = str(RECORDINGS / "metres.toml"), "metres.csv"
         options = ["--ticks-per-unit", "100", "--noise", "0.005"]
-    lines = (FOLDER / recorded).read_text("utf-8").splitlines(keepends=True)
+    lines = (RECORDINGS / recorded).read_text("utf-8").splitlines(keepends=True)
     file = tmp_path / recorded
     file.write_text("".join(line for line in lines if line.startswith(("subject", subject))))
     monkeypatch.setattr("sys.argv", ["fit.py", task, str(file), *options])
@@ -213,8 +214,8 @@ def test_recordings_are_of_a_simulator_without_the_package(tmp_path):
     (tmp_path / "markers").mkdir()
     PLAIN.main(tmp_path, 20)
     for name in ("markers/m1.csv", "markers/m2.csv"):
-        assert (tmp_path / name).read_bytes() == (FOLDER / name).read_bytes()
-    stored = (FOLDER / "metres.csv").read_text("utf-8").splitlines()
+        assert (tmp_path / name).read_bytes() == (RECORDINGS / name).read_bytes()
+    stored = (RECORDINGS / "metres.csv").read_text("utf-8").splitlines()
     first = [line for line in stored[1:] if int(line.split(",")[1]) <= 20]
     assert (tmp_path / "metres.csv").read_text("utf-8").splitlines() == [stored[0], *first]
 
@@ -223,7 +224,7 @@ def test_recordings_are_of_a_simulator_without_the_package(tmp_path):
 def test_a_recording_of_markers_is_fitted(monkeypatch, capsys, fewer_simulated):
     fewer_simulated(9)
     options = ["--markers", "right", "--noise", "0.007"]
-    task, file = str(FOLDER / "metres.toml"), str(FOLDER / "markers" / "m1.csv")
+    task, file = str(RECORDINGS / "metres.toml"), str(RECORDINGS / "markers" / "m1.csv")
     monkeypatch.setattr("sys.argv", ["fit.py", task, file, *options])
     FIT.main()
     printed = capsys.readouterr()
