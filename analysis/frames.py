@@ -19,18 +19,14 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
 
-from coartic import Execution, Movement, Task
-from coartic.analysis.hits import Implausible, checked_hits
 from coartic.analysis.method_frame import with_joined_learners
 from coartic.analysis.optima import gap_share
-from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.text import counted, plain
+from coartic.internal.text import plain
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
@@ -503,48 +499,3 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
         steps = zip(*running_times.share_by_budget(times), strict=True)
         rows += [(method, *step) for step in steps]
     return pd.DataFrame(rows, columns=["method", "trials", "share"])
-
-
-@checked_arguments
-def solutions_of(
-    task: Task, hits: pd.DataFrame, *, implausible: Implausible = "refuse"
-) -> Solutions:
-    """Return recorded trials, of people for instance, as solutions for signatures.
-
-    Nothing is executed again: postures at hits (unwrapped) and ticks (rounded) are as recorded.
-
-    Parameters
-    ----------
-    task : Task
-        The task of the trials.
-    hits : DataFrame
-        A row for each hit: ``subject``, ``trial``, ``goal`` (from 1), ``hand``, ``ticks``, and the
-        posture, a column for each of ``task.robot.joint_names``, length unit and rad. The frame is
-        checked like a file of :func:`coartic.analysis.read_hits`.
-    implausible : {"refuse", "drop"}
-        Implausible hits (:func:`.read_hits`) raise CoarticError or are left out.
-
-    Returns
-    -------
-    Solutions
-        A run for each trial in which all goals are hit; ``run_ids`` has subject and trial, such as
-        ``P1 3``.
-
-    Raises
-    ------
-    CoarticError
-        The frame has no trial with all goals, or is wrong as a file of ``read_hits`` can be.
-    """
-    joints, runs = [*task.robot.joint_names], {}
-    columns = checked_hits(hits, task, implausible=implausible)
-    for (subject, trial), rows in columns.groupby(["subject", "trial"], sort=False):
-        if len(rows) == len(task.goals):
-            postures, ticks = rows[joints].to_numpy(), rows.ticks.round().astype(int).tolist()
-            each = zip(rows.hand, postures, ticks, strict=True)
-            movements = tuple(Movement(g, hand, "learned", q, n)
-                              for g, (hand, q, n) in enumerate(each, 1))  # fmt: skip
-            runs[f"{subject} {trial:g}"] = Execution(movements, postures, sum(ticks), 0)
-    if not runs:
-        raise CoarticError(f"in no trial are all {counted(len(task.goals), 'goal')} hit")
-    unfinished = hits.attrs.get("unfinished", 0)
-    return Solutions(task, "recorded", tuple(runs.values()), tuple(runs), unfinished)

@@ -464,6 +464,8 @@ TAKEN = (
     "new a-search [--replace]",
     "draw ascending [--out f.svg]",
     "draw ascending --out f.svg [--replace]",
+    "draw metres.toml --out j.svg [--recording hits.csv]",
+    "draw metres.toml --recording hits.csv --out k.svg [--ticks-per-unit 100]",
     "cite [--analysis]",
 )
 """Commands with and without what is in brackets, in this order: some write over what earlier ones
@@ -483,6 +485,8 @@ REFUSED = (
     "draw ascending --out g [--replace]",
     "draw ascending --out h.svg [--initial]",
     "draw ascending --out i.svg [--width 300]",
+    "draw ascending --out l.svg [--ticks-per-unit 100]",
+    "draw metres.toml --recording hits.csv --out m.svg [--width 300]",
 )
 
 
@@ -502,6 +506,9 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
     Path("mine.py").write_text(
         (ROOT / "tests" / "methods" / "nearest_hand.py").read_text("utf-8"), "utf-8"
     )
+    for name in ("metres.toml", "hits.csv"):
+        shipped = ROOT / "docs/examples/recordings" / name.replace("hits", "metres")
+        Path(name).write_text("".join(shipped.read_text("utf-8").splitlines(True)[:40]), "utf-8")
     Path("task.toml").write_text(TASK_FILE.read_text("utf-8"), "utf-8")
 
     def call(words):

@@ -10,22 +10,25 @@ import coartic
 from coartic import (
     MotionModel,
     Movement,
+    correct,
     corrective_trial,
     execute,
     hand_sequences,
     load_task,
+    move,
     movements_of,
     trajectory,
 )
 from coartic.method import Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
-from coartic.motion.batch import SLOTS
+from coartic.motion.batch import SLOTS, robot_parameters
 from coartic.motion.solution import execute_many
-from coartic.motion.trial import compiled_task
+from coartic.motion.trial import ALL_STOP, Requests, compiled_task, reach, reach_goals
 from coartic.tasks.task import hands_of
 from tests.support import reference
 from tests.support.strategies import make_trials, sample, uneven_task
 
+BOTH = load_task("two-armed-1")
 LIMITS = {  # iterations of the corrective process, spread of the targets
     "ascending": (100, 4.0),
     "two-armed-1": (150, 0.3),
@@ -187,3 +190,45 @@ def test_a_trial_does_not_notice_its_neighbours(name):
         alone = execute(task, solution, model=OTHERS[0])
         np.testing.assert_array_equal(alone.configurations, execution.configurations)
         assert alone.evaluations == execution.evaluations
+
+
+@pytest.mark.parametrize("bad", [np.nan, -np.inf, 1e300])
+@pytest.mark.parametrize("where", ["start", "target", "goal"])
+def test_kernels_end_whatever_they_get(bad, where):
+    """Without the checks of their callers; a loop that does not end would end the tests."""
+    q, targets = np.tile(BOTH.q0, (5, 1)), np.tile(BOTH.q0 + 0.5, (5, 1))
+    goals = np.tile(BOTH.goal_array[0], (5, 1))
+    {"start": q, "target": targets, "goal": goals}[where][::2, 0] = bad
+    hands, parameters = np.arange(5)[:, None] % 2, robot_parameters(BOTH.robot)
+    for given in (targets, targets * np.nan):
+        arms = Requests(q, hands, given[:, None, None], ALL_STOP, goals[:, None])
+        assert len(reach(BOTH.robot, arms, parameters).rewards) == 5
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "words"),
+    [
+        *(("hands", [0, hand], "needed are 0 .left. and 1 .right.") for hand in (2, -1, 0.5)),
+        ("hands", [True, False], "hands"),
+        *(("q", q, "^q ") for q in ([BOTH.q0[:9]] * 2, [BOTH.q0 * np.nan] * 2)),
+        *(("goals", goals, "^goals ") for goals in ([[1.0, 2.0]], [[1.0, np.inf]] * 2)),
+        ("targets", np.zeros((2, 9)), "^targets "),
+        ("radius", 0.0, "radius"),
+        ("locked_base", ("z",), "may name 'x' and 'y'"),
+    ],
+)
+def test_many_arms_are_checked_before_a_kernel_gets_them(name, wrong, words):
+    usual = {"q": [BOTH.q0] * 2, "hands": [0, 1], "goals": BOTH.goal_array[:2], "radius": 0.1}
+    assert reach_goals(BOTH.robot, **usual).hit.all()
+    with pytest.raises(ValueError, match=words):
+        reach_goals(BOTH.robot, **usual | {name: wrong})
+
+
+@pytest.mark.parametrize("goal", [(1, 2, 3), 1.0, (np.inf, 1), ("1", "2"), None])
+def test_a_goal_is_two_finite_numbers(goal):
+    with pytest.raises(ValueError, match="goal"):
+        correct(BOTH.robot, BOTH.q0, "right", goal)
+    with pytest.raises(ValueError, match="goal"):
+        move(BOTH.robot, BOTH.q0, BOTH.q0, "right", goal, 0.1)
+    with pytest.raises(ValueError, match="configuration"):
+        correct(BOTH.robot, BOTH.q0 * np.nan, "right", (1, 2))
