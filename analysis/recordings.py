@@ -689,7 +689,7 @@ def _draw_postures(
         arms = task.robot.joint_positions(chosen[joints].to_numpy(np.float64), hand)
         lines = LineCollection([*arms], colors=shades, linewidths=0.7, zorder=2)
         axes.add_collection(lines, autolim=False)
-        axes.scatter(*arms[:, -1].T, s=4, color=shades, linewidths=0, zorder=4)
+        axes.scatter(arms[:, -1, 0], arms[:, -1, 1], s=4, color=shades, linewidths=0, zorder=4)
     for trial in trials:
         ends = [0.0, *(sample for sample, _ in trial.hits), len(trial.time) - 1.0]
         for tip in trial.tips.values() if goal < len(ends) else ():

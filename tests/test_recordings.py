@@ -147,7 +147,7 @@ def test_durations_are_ticks_of_their_unit(people, read):
 
 @given(turns=some.lists(some.integers(-2, 2), min_size=160, max_size=160))
 def test_whole_turns_of_recorded_angles_change_nothing(turns):
-    hits = check_hits(pd.read_csv(EXAMPLES / "two-armed.csv")[:40], BOTH)
+    hits = check_hits(pd.read_csv(EXAMPLES / "example.csv")[:40], BOTH)
     wound = hits.copy()
     wound[JOINTS[6:]] += 2 * np.pi * np.array(turns).reshape(40, 4)
     pd.testing.assert_frame_equal(check_hits(wound, BOTH), hits, atol=1e-9)

@@ -159,7 +159,7 @@ def test_how_to_shows_what_the_command_prints(
     if subject == "p2":  # of whom no parameters are given
         monkeypatch.setattr(FIT, "bias", lambda *_: None)
         monkeypatch.setattr(FIT, "with_intervals", lambda *_: {})
-    task, recorded, options = "two-armed-1", "two-armed.csv", []
+    task, recorded, options = "two-armed-1", "example.csv", []
     if subject != "s2":
         task, recorded = str(RECORDINGS / "metres.toml"), "metres.csv"
         options = ["--ticks-per-unit", "100", "--noise", "0.005"]
