@@ -434,9 +434,10 @@ def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
     order = np.lexsort((hits.goal.array, hits.trial.array, pd.factorize(hits.subject)[0]))
     unused = {name: value for name, value in at_start.items() if name not in used}
     hits = hits.iloc[order].reset_index(drop=True).assign(**unused)
-    for rows in hits.groupby(["subject", "trial"], sort=False).indices.values():
-        angles = np.vstack([task.q0[2:], hits.loc[rows, joints[2:]]])
-        hits.loc[rows, joints[2:]] = np.unwrap(angles, axis=0)[1:]
+    angles, trials = joints[2:], [hits.subject, hits.trial]
+    before = hits.groupby(trials, sort=False)[angles].shift().fillna(at_start)
+    turns = ((hits[angles] - before) / (2 * np.pi)).round()
+    hits[angles] -= 2 * np.pi * turns.groupby(trials, sort=False).cumsum()
     return hits[[*_KEY, "hand", "ticks", *joints]]
 
 
