@@ -31,7 +31,7 @@ from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 from coartic.model import PAPER
 from coartic.motion.movement import LARGEST_ENTRY
-from coartic.pictures.drawing import box, circle_goals, draw_robot, number_goals
+from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
 from coartic.robot import HANDS, Array, Hand
 
 FAR = 2.0
@@ -649,14 +649,15 @@ def _drawn(hits: pd.DataFrame, trials: list[_Trial], task: Task) -> Figure:
     corners = [*box(task, postures, 0.2)]
     corners += [tip for trial in trials for tip in trial.tips.values()]
     low, high = (end(np.vstack(corners), axis=0) for end in (np.min, np.max))
-    rows = -(-len(task.goals) // _COLUMNS)
-    shape = np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.3, 1.4)
-    heights = [rows * (0.6 + 1.3 * shape), 1.9]
+    columns = min(len(task.goals), _COLUMNS)
+    rows = -(-len(task.goals) // columns)
+    shape = np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.2, 1.5)
+    heights = [rows * (0.6 + shape * (style.TWO / max(columns, 3) - 0.2)), 1.9]
     heights += [0.9 + 0.06 * min(len(trials), 40)] * bool(trials)
     figure = Figure((style.TWO, sum(heights)), layout="constrained")
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
     panels = parts[0].subplots(
-        rows, min(len(task.goals), _COLUMNS), sharex=True, sharey=True, squeeze=False,
+        rows, columns, sharex=True, sharey=True, squeeze=False,
         subplot_kw={"aspect": "equal", "xlim": (low[0], high[0]), "ylim": (low[1], high[1])},
     ).ravel()  # fmt: skip
     for axes in panels[len(task.goals) :]:
@@ -690,7 +691,8 @@ def _draw_postures(
         arms = task.robot.joint_positions(chosen[joints].to_numpy(np.float64), hand)
         lines = LineCollection([*arms], colors=shades, linewidths=0.7, zorder=2)
         axes.add_collection(lines, autolim=False)
-        axes.scatter(arms[:, -1, 0], arms[:, -1, 1], s=4, color=shades, linewidths=0, zorder=4)
+        x, y = arms[:, -1].T
+        axes.scatter(x, y, 5, marker=MARKERS[hand]["marker"], color=shades, zorder=4)
     for trial in trials:
         ends = [0.0, *(sample for sample, _ in trial.hits), len(trial.time) - 1.0]
         for tip in trial.tips.values() if goal < len(ends) else ():
@@ -711,10 +713,12 @@ def _draw_fit(panels: Any, hits: pd.DataFrame, task: Task) -> None:
         for goal in range(1, len(task.goals) + 1):
             shown = (fit.goal == goal).to_numpy()
             axes.plot(at[shown], fit[measure][shown].clip(lower=0.03), ".", color=_color_of(goal),
-                      markersize=3.5, markeredgewidth=0)  # fmt: skip
+                      markersize=4.5, markeredgewidth=0)  # fmt: skip
         for line in lines:
             axes.axhline(line, color=style.GREY, linewidth=0.6, linestyle=":")
         axes.set(yscale="log", ylabel=label, xlabel="trial")
+        if not len(fit):
+            axes.text(0.5, 0.5, "no hits", ha="center", transform=axes.transAxes)
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, 0.4), max(high, 2.6))
         axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -740,7 +744,7 @@ def _draw_times(axes: Axes, trials: list[_Trial]) -> None:
             axes.hlines(row, time[begin], time[end], style.GREY, linewidth=4, alpha=0.6)
         for goal, (sample, _) in enumerate(trial.hits, 1):
             axes.plot(trial.at(sample, time), row, ".", color=_color_of(goal), markersize=4)
-    shown = np.unique(np.linspace(0, len(trials) - 1, min(len(trials), 8)).astype(int)).tolist()
+    shown = range(0, len(trials), -(-len(trials) // 12))
     several = len({trial.subject for trial in trials}) > 1
     names = [f"{trials[k].subject}, " * several + f"{trials[k].number:g}" for k in shown]
     axes.set_yticks(shown, names)
