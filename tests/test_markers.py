@@ -11,7 +11,10 @@ from coartic.analysis import hits_from_markers, read_hits, solutions_of
 from coartic.robot import HANDS
 from tests.support.processes import ROOT
 
-BOTH, RIGHT = load_task("two-armed-1"), load_task(ROOT / "docs" / "examples" / "recordings" / "metres.toml")
+BOTH, RIGHT = (
+    load_task("two-armed-1"),
+    load_task(ROOT / "docs" / "examples" / "recordings" / "metres.toml"),
+)
 ONE_OF_TWO = BOTH.model_copy(update={"hands": ("right",)})
 
 

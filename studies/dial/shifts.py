@@ -8,7 +8,8 @@ import numpy as np
 from settings import DIAL, FAMILIES, PAPER, PLANNER, SETTINGS, TRIALS, base_of
 
 from coartic import learn, load_task
-from coartic.analysis import judge_means, means
+from coartic.analysis import means
+from common.judging import judge_means
 
 ANNOUNCED = runpy.run_path(str(Path(__file__).parents[1] / "tell-apart" / "announced.py"))
 """Functions of study tell-apart: which goal moves, and shares of a shift."""

@@ -1,6 +1,6 @@
 """Fit the learner, and five other models, to the trials of people.
 
-    python studies/fit/fit.py two-armed-1 docs/examples/recordings/two-armed.csv [--condition EC4] [--noise 0.01]
+    python studies/fit/fit.py two-armed-1 FILE.csv [--condition EC4] [--noise 0.01]
 
 reads the files, one for each person, one by one, and prints for each subject which model explains
 the trials, and the parameters of the learner with 95 % profile intervals.

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from check import STATISTICS
-from fit import MODELS, fit_subject
 from models import condition_for, tables_before, trials_of
 from simulate import FOREIGN, simulate
 
 from coartic import load_task
 from coartic.benchmarks.pool import process_pool
+from fit import MODELS, fit_subject
 
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")

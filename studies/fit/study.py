@@ -1,7 +1,7 @@
 """Measure how well parameters and models of simulated people are recovered.
 
 python studies/fit/protocols.py results/fit
-python studies/fit/study.py results/fit
+PYTHONPATH=studies python studies/fit/study.py results/fit
 """
 
 import sys
@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from fit import MODELS, judge
 
-from coartic.analysis import figures, write_study
+from coartic.analysis import figures
+from common.writing import write_study
+from fit import MODELS, judge
 
 HERE = Path(__file__).parent
 TASKS = ("ascending", "descending", "two-armed-1", "two-armed-2")

@@ -1,7 +1,7 @@
 """Do the models behave like people?
 
     coartic run studies/human/suite.toml
-    python studies/human/study.py results/human
+    PYTHONPATH=studies python studies/human/study.py results/human
 
 human.toml has the findings, in place of claims, the models and how verdicts are made; measures.py
 what is measured.
@@ -19,8 +19,9 @@ import pandas as pd
 from measures import MEASURES
 
 from coartic import trajectory
-from coartic.analysis import figures, load, write_study
+from coartic.analysis import figures, load
 from coartic.estimates import Estimate
+from common.writing import write_study
 
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))

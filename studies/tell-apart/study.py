@@ -1,7 +1,7 @@
 """Measure which experiment would distinguish trial and error from planning.
 
 python studies/tell-apart/protocols.py results/tell-apart
-python studies/tell-apart/study.py results/tell-apart
+PYTHONPATH=studies python studies/tell-apart/study.py results/tell-apart
 """
 
 import sys
@@ -13,7 +13,9 @@ from announced import DISTANCES, with_shares
 from protocols import AFTER, NOISE
 from scipy import stats
 
-from coartic.analysis import figures, judge_means, means, write_study
+from coartic.analysis import figures, means
+from common.judging import judge_means
+from common.writing import write_study
 
 HERE = Path(__file__).parent
 EXPERIMENTS = 2000
