@@ -48,12 +48,6 @@ class Finding:
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
 
-    def __str__(self) -> str:
-        """Return what the runs show, the largest p of ``tests``, and the evidence."""
-        shown = {True: "The runs show it", False: "The runs do not show it", None: "Too few runs"}
-        p = p_value(_largest_p(self.tests))
-        return f"{shown[self.holds]}{f' ({p})' * bool(p)}: {self.evidence.rstrip('.')}."
-
     @property
     def opposite_p(self) -> float:
         """Return the smallest p-value in ``against``, corrected by Bonferroni; NaN without one."""

@@ -38,16 +38,6 @@ def test_joined_findings_have_the_opposites_of_all():
     assert [joined.holds, all_of(other, other).holds] == [False, True]
 
 
-def test_a_finding_prints_as_a_sentence():
-    first, *others = (str(found(*each)) for each in ((True, 0.0004, 0.03), (False,), (None,)))
-    assert first.startswith("The runs show it (p\u00a0=\u00a00.03): ")
-    assert [words.partition(":")[0] for words in others] == [
-        "The runs do not show it",
-        "Too few runs",
-    ]
-    assert all(words.endswith(".") for words in (first, *others))
-
-
 def judged(*findings):
     """Planted findings judged together."""
     return judge({f"planted-{n}": ("It is so.", "exact", each) for n, each in enumerate(findings)})
