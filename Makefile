@@ -11,7 +11,9 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations)
 STORED := comparison ablations families
-STUDIES ?= $(filter-out replication,$(notdir $(wildcard studies/[a-z]*)))
+STUDIES ?= $(filter-out common replication,$(notdir $(wildcard studies/[a-z]*)))
+# Studies, and the pages made from them, import the package studies/common.
+STUDY  := PYTHONPATH=studies $(BIN)/python
 
 .PHONY: benchmark test check format docs shipped shipped-check findings studies speed release-check setup clean
 
@@ -20,7 +22,7 @@ benchmark: $(READY)
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
 	  $(BIN)/coartic report $(OUT)/$$suite || exit; \
 	done
-	$(BIN)/python studies/replication/study.py $(SUITES:%=$(OUT)/%) --out $(OUT)/replication
+	$(STUDY) studies/replication/study.py $(SUITES:%=$(OUT)/%) --out $(OUT)/replication
 	@$(BIN)/python docs/scripts/check_readme.py $(OUT)/comparison
 	@echo "Look at $(OUT)/comparison/report/report.html and $(OUT)/replication/page.html."
 
@@ -71,8 +73,8 @@ findings: $(READY)
 	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
 	  $(BIN)/coartic report $(OUT)/$$suite --for-paper --width 3.5 || exit; \
 	done
-	$(BIN)/python studies/replication/study.py $(STORED:%=$(OUT)/%)
-	$(BIN)/python docs/make_findings.py --from $(OUT)
+	$(STUDY) studies/replication/study.py $(STORED:%=$(OUT)/%)
+	$(STUDY) docs/make_findings.py --from $(OUT)
 
 # Every study, or those of make studies STUDIES="horizon dose": its suite, with its own families,
 # then its tables, figure and page. All of them take over two hours.
@@ -81,12 +83,12 @@ studies: $(READY)
 	  files=""; \
 	  for file in studies/$$study/*.v*.toml; do [ -e $$file ] && files="$$files --family-file $$file"; done; \
 	  if [ -e studies/$$study/protocols.py ]; then \
-	    $(BIN)/python studies/$$study/protocols.py $(OUT)/$$study; \
+	    $(STUDY) studies/$$study/protocols.py $(OUT)/$$study; \
 	  elif [ -e studies/$$study/suite.toml ]; then \
 	    $(BIN)/coartic run studies/$$study/suite.toml --out $(OUT)/$$study $$files; fi && \
-	  $(BIN)/python studies/$$study/study.py $(OUT)/$$study || exit; \
+	  $(STUDY) studies/$$study/study.py $(OUT)/$$study || exit; \
 	done
-	$(BIN)/python docs/make_findings.py
+	$(STUDY) docs/make_findings.py
 
 setup: $(READY)
 

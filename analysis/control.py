@@ -19,18 +19,15 @@ from __future__ import annotations
 
 import math
 from statistics import mode
-from typing import Annotated
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
 
 from coartic.analysis.method_frame import BY_TRIAL
 from coartic.analysis.methods import RANDOM_SEARCH
 from coartic.analysis.signatures.two_contexts import TwoContexts
 from coartic.analysis.study import MOST_EXECUTED, Study, cached, solved
 from coartic.internal.arguments import checked_arguments
-from coartic.internal.limits import MOST_RUNS
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import Array
 
@@ -174,49 +171,3 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     )
     pair = TwoContexts(first, second, contexts.goal, contexts.hand)
     return pair if pair.in_both else None
-
-
-@checked_arguments
-def control_suite(study: Study, *, runs: Annotated[int, Field(ge=1, le=MOST_RUNS)] = 20) -> str:
-    """Return a suite of random search, the control of signatures except ``hand``, where the study
-    lacks it.
-
-    For each method that may select its solution by rewards (:func:`selects`), on each task, the
-    suite has random search with as many trials as the method, with noise on the idle arm if the
-    method has such noise, and with each hand sequence that a tenth or more of the method's solved
-    runs have, unless the study has this random search. Write the suite to a file and run it with
-    the results of the study: ``coartic run control.toml --include FOLDER``.
-
-    Parameters
-    ----------
-    study : Study
-        Results with learners.
-    runs : int
-        Runs of each cell.
-
-    Returns
-    -------
-    str
-        The suite as TOML; empty if nothing is missing.
-    """
-    blocks = dict[tuple[str, str, int, bool], None]()
-    for (task, label), of_method in study.cells.items():
-        if not selects(study, label):
-            continue
-        trials = int(_most_trials(study, task, label))
-        explored = explores_idle_arm(study, task, label)
-        for hands, share in solved(of_method).hands.value_counts(normalize=True).items():
-            if share >= LEAST_SHARE and not control_of(study, task, label, str(hands), alike=True):
-                blocks[task, str(hands), trials, explored] = None
-    lines = [
-        'title = "Random search with the hands of learners"',
-        'description = "The control of signatures where results lack it."',
-        f"runs = {runs}",
-    ]
-    lines += [
-        f'\n[[blocks]]\ntasks = ["{task}"]\nmethods = ["random-search"]\n'
-        f'parameters = {{ hands = "{hands}", trials = {trials}'
-        f"{'' if explored else ', idle_arm = false'} }}"
-        for task, hands, trials, explored in blocks
-    ]
-    return "\n".join(lines) + "\n" if blocks else ""

@@ -18,8 +18,9 @@ from typing import Any, get_args
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import by_task, fill_page, load
-from coartic.analysis.judging import Verdict
+from coartic.analysis import by_task, load
+from common.judging import Verdict
+from common.writing import fill_page
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"

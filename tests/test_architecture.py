@@ -123,6 +123,7 @@ def modules_on_pages():
     """Of each module on a reference page its members, and those that the page chooses or leaves
     out."""
     paths = {module_of(path): path for path in sources()}
+    paths |= {f"common.{path.stem}": path for path in (ROOT / "studies" / "common").glob("*.py")}
     found = []
     for page in sorted((ROOT / "docs" / "reference" / "python").glob("*.md")):
         directives = re.findall(r"automodule:: (\S+)\n((?:   :.*\n)*)", page.read_text("utf-8"))

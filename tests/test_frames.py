@@ -8,18 +8,19 @@ import pytest
 
 import coartic
 from coartic import CoarticError
-from coartic.analysis import frames, judging, pages
-from coartic.analysis.judging import judge, mean_beyond
+from coartic.analysis import frames
 from coartic.analysis.signatures import context_tests
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.statistics import hypotheses, instances
 from coartic.analysis.words import p_value
 from coartic.learner import learning
+from common import judging
+from common.judging import judge, mean_beyond
 from tests.support.made_up import row, study_of
 
 
 @pytest.mark.parametrize(
-    "module", [context_tests, frames, hypotheses, instances, judging, learning, pages]
+    "module", [context_tests, frames, hypotheses, instances, judging, learning]
 )
 def test_examples(module):
     options = doctest.NORMALIZE_WHITESPACE

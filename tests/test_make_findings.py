@@ -8,11 +8,11 @@ import pandas as pd
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from coartic.analysis import fill_page
 from coartic.benchmarks.suites import Suite
 from coartic.tasks.families import Family
 from coartic.tasks.optima import BEST_KNOWN
 from coartic.tasks.task import Task
+from common.writing import fill_page
 from tests.support.processes import ROOT, program
 
 DOCS = ROOT / "docs"

@@ -11,12 +11,7 @@ import pytest
 from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task, movements_of
-from coartic.analysis.control import (
-    contexts_of_control,
-    control_suite,
-    mean_excess,
-    with_control,
-)
+from coartic.analysis.control import contexts_of_control, mean_excess, with_control
 from coartic.analysis.methods import EC1, EC3, EC4, RANDOM_SEARCH
 from coartic.analysis.sections import TABLES, coarticulation
 from coartic.analysis.signatures import context_tests, measures
@@ -32,6 +27,7 @@ from coartic.analysis.solutions import Solutions
 from coartic.analysis.statistics.hypotheses import exchange_test, smallest_p
 from coartic.benchmarks.planning import plan_suite
 from coartic.robot import HANDS
+from common.writing import control_suite
 from tests.support.made_up import runs_of, study_of_solutions
 from tests.support.strategies import AS_RELEASED, changed, posture, tiny_task
 

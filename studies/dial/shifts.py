@@ -1,17 +1,16 @@
 """An announced change: how fast does the posture shift, along the dial?"""
 
-import runpy
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from announced import moves, with_shares
 from settings import DIAL, FAMILIES, PAPER, PLANNER, SETTINGS, TRIALS, base_of
 
 from coartic import learn, load_task
-from coartic.analysis import judge_means, means
+from coartic.analysis import means
+from common.judging import judge_means
 
-ANNOUNCED = runpy.run_path(str(Path(__file__).parents[1] / "tell-apart" / "announced.py"))
-"""Functions of study tell-apart: which goal moves, and shares of a shift."""
 SHIFTED = (PAPER, *DIAL[2:], PLANNER)
 """Settings that practise, hear of a goal that has moved, and practise again."""
 SHIFT_TASKS = [f"{family}/v1/i{number:03d}" for number in range(30) for family in FAMILIES[:2]]
@@ -24,13 +23,12 @@ def run_shifts(name):
     """Let learners practise a task, move the goal after a goal by half a link, and follow the
     posture at that goal while they practise on; rows of :data:`SHIFT_COLUMNS`.
 
-    As in study tell-apart: at the change the learner keeps its movements and drops the rewards.
+    At the change the learner keeps its movements and drops the rewards.
     ``dot_N`` is the shift of the posture after N trials times the shift after all of them,
     ``square`` the latter squared, ``same`` such a product for practice without a change.
     """
     task, seed, rows = load_task(name), SHIFT_TASKS.index(name), []
-    moved = ANNOUNCED["moves"](task, seed)
-    cases = [(g, other) for g, distance, other in moved if distance == 0.5]
+    cases = [(g, other) for g, distance, other in moves(task, seed) if distance == 0.5]
     for setting in SHIFTED:
         condition = replace(base_of(task), **SETTINGS[setting])
         practised = learn(task, condition, seed=10 * seed, trials=TRIALS)
@@ -49,12 +47,12 @@ def run_shifts(name):
 def measure_shifts(raw):
     """Measure shares of the shift after the change, a row for each task and setting.
 
-    ``share_N`` and ``log_half`` as of study tell-apart, of sums over goals. ``unchanged``: the
-    share that as much practice without a change brings.
+    ``share_N`` and ``log_half`` (:func:`announced.with_shares`) are of sums over goals.
+    ``unchanged`` is the share that as much practice brings without a change.
     """
     sums = raw.groupby(["setting", "task"], sort=False).sum(numeric_only=True).reset_index()
     sums["family"] = sums.task.str.partition("/")[0]
-    return ANNOUNCED["with_shares"](sums, SHIFT_AFTER).assign(unchanged=sums.same / sums.square)
+    return with_shares(sums, SHIFT_AFTER).assign(unchanged=sums.same / sums.square)
 
 
 def tabulate_shifts(shifts):

@@ -1,7 +1,7 @@
 """Measure how far exploration leans towards the next goal, on tasks on which it was not tuned.
 
     python studies/dial/protocols.py results/dial
-    python studies/dial/study.py results/dial
+    PYTHONPATH=studies python studies/dial/study.py results/dial
 
 The *gain* of a run is the share of the way from the corrective process alone, with its best hands,
 to the best known reward.
@@ -15,7 +15,9 @@ import pandas as pd
 from settings import AFTER, DIAL, FAMILIES, INFORMED, PAPER, PLANNER, TRIALS
 from shifts import by_task, in_each, judge_shifts, measure_shifts, tabulate_shifts
 
-from coartic.analysis import figures, judge_means, means, write_study
+from coartic.analysis import figures, means
+from common.judging import judge_means
+from common.writing import write_study
 
 HERE = Path(__file__).parent
 

@@ -1,7 +1,7 @@
 """Measure how much of the reward for the whole task coarticulation needs.
 
 python studies/dose/protocols.py results/dose
-python studies/dose/study.py results/dose
+PYTHONPATH=studies python studies/dose/study.py results/dose
 """
 
 import sys
@@ -10,16 +10,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from coartic.analysis import (
-    TwoContexts,
-    contexts_of_control,
-    figures,
-    judge_means,
-    load,
-    means,
-    tabulate_runs,
-    write_study,
-)  # fmt: skip
+from coartic.analysis import TwoContexts, contexts_of_control, figures, load, means
+from common.judging import judge_means
+from common.writing import tabulate_runs, write_study
 
 HERE = Path(__file__).parent
 RANDOM_SEARCH = "random-search"

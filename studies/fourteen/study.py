@@ -5,7 +5,7 @@ r"""Is a planner's horizon a number of goals, or a share of those left?
         --family-file studies/fourteen/fourteen-two.v1.toml \
         --family-file studies/fourteen/seven-one.v1.toml \
         --family-file studies/fourteen/seven-two.v1.toml
-    python studies/fourteen/study.py results/fourteen
+    PYTHONPATH=studies python studies/fourteen/study.py results/fourteen
 """
 
 import sys
@@ -14,17 +14,9 @@ from pathlib import Path
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import (
-    figures,
-    judge_means,
-    load,
-    mean,
-    mean_beyond,
-    means,
-    other_tasks,
-    tabulate_runs,
-    write_study,
-)  # fmt: skip
+from coartic.analysis import figures, load, mean, means, other_tasks
+from common.judging import judge_means, mean_beyond
+from common.writing import tabulate_runs, write_study
 
 HERE = Path(__file__).parent
 PLANNER = "receding-horizon"

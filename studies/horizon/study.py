@@ -1,7 +1,7 @@
 """How far ahead must a planner look?
 
     coartic run studies/horizon/suite.toml
-    python studies/horizon/study.py results/horizon
+    PYTHONPATH=studies python studies/horizon/study.py results/horizon
 
 Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims,
 tables and figure are of the mean over the repeats of a task; repeats.csv judges each repeat alone.
@@ -15,15 +15,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from coartic.analysis import (
-    SIGNATURES,
-    figures,
-    judge_means,
-    load,
-    means,
-    tabulate_runs,
-    write_study,
-)
+from coartic.analysis import SIGNATURES, figures, load, means
+from common.judging import judge_means
+from common.writing import tabulate_runs, write_study
 
 HERE = Path(__file__).parent
 PLANNER = "receding-horizon"

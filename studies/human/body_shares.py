@@ -24,10 +24,9 @@ def postures(study, model):
     """Return the configurations at goal 1 on both tasks, shape ``(runs, dof)`` each; empty for a
     model that did not run there."""
     method = MODELS[model]["method"] or "dual-process/EC1"
-    replay = MODELS[model].get("replayed", False)
     if any((task, method) not in study.cells for task in TASKS):
         return []
-    return [study.configurations(task, method, replay=replay)[:, 0] for task in TASKS]
+    return [study.configurations(task, method)[:, 0] for task in TASKS]
 
 
 def differences(groups, joints):

@@ -1,7 +1,7 @@
 """Do the models behave like people?
 
     coartic run studies/human/suite.toml
-    python studies/human/study.py results/human
+    PYTHONPATH=studies python studies/human/study.py results/human
 
 human.toml has the findings, in place of claims, the models and how verdicts are made; measures.py
 what is measured.
@@ -19,8 +19,9 @@ import pandas as pd
 from measures import MEASURES
 
 from coartic import trajectory
-from coartic.analysis import figures, load, write_study
+from coartic.analysis import figures, load
 from coartic.estimates import Estimate
+from common.writing import write_study
 
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
@@ -61,36 +62,32 @@ def tidy(study):
             "best": best[cell.task], "origin": origin, "moved": int(moved or 0), "place": place,
             "horizon": parameters.get("horizon"),
         }  # fmt: skip
-        for name, model in models_of(task, cell.method, parameters).items():
-            replay = model.get("replayed", False)
-            label = f"{cell.method} {cell.setting}".strip()
-            for run in study.executed(cell.task, label, replay=replay).runs:
+        for name in models_of(task, cell.method, parameters):
+            for run in study.executed(cell.task, f"{cell.method} {cell.setting}".strip()).runs:
                 path = trajectory(task, run.movements)
                 rows.append({"model": name, **facts, "hands": run.hands, "path": path})
     return pd.DataFrame(rows)
 
 
 def models_of(task, method, parameters):
-    """Return the models, by name, whose runs of a task are those of a method with all its
+    """Return the names of the models whose runs of a task are those of a method with all its
     ``parameters``, defaults included."""
     learner = f"dual-process/EC{4 if len(task.hands) > 1 else 1}"
     given = parameters | {"hands": parameters.get("hands") or ""}
-    return {
-        name: model
+    return [
+        name
         for name, model in (MODELS | FURTHER).items()
         if (model["method"] or learner) == method
         and model.get("parameters", {}).items() <= given.items()
-    }
+    ]
 
 
 def of_control(runs, model, measure):
     """Return a measure of two arms by task for the control of a model: random search with the hands
-    of each of its runs, whose idle arm keeps still as under EC3; of the choice of hands, random
-    search with every hand sequence."""
+    of each of its runs; of the choice of hands, random search with every hand sequence."""
     if measure == "near-tie repeats":
         return MEASURES[measure][0](runs, "random search, every hand sequence")
-    still = model == "learner EC3"
-    search = "random search, idle arm still" if still else "random search by hands"
+    search = "random search by hands"
     hands = runs[(runs.model == model) & (runs.arms == 2)][["task", "hands"]]
     control = hands.merge(runs[runs.model == search], on=["task", "hands"])
     return MEASURES[measure][0](control, search)

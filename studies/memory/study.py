@@ -1,7 +1,7 @@
 """Measure what memory adds to random search: how often something is kept, and what.
 
     python studies/memory/protocols.py results/memory
-    python studies/memory/study.py results/memory
+    PYTHONPATH=studies python studies/memory/study.py results/memory
 
 Random search is the learner without its memory. Here it has memory by the dose: after each of r
 equal parts of its trials it goes on from its best trial, from the postures that this trial reached
@@ -19,7 +19,9 @@ from cells import KEEPS, MEASURES, groups_of, measure_cells, measure_contexts, m
 from equal_gain import tabulate_equal
 from scales import MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
 
-from coartic.analysis import figures, judge_means, load, write_study
+from coartic.analysis import figures, load
+from common.judging import judge_means
+from common.writing import write_study
 
 HERE = Path(__file__).parent
 

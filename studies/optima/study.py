@@ -1,6 +1,6 @@
 """Count how many shipped best known rewards are proven to be the optimum, or nearly.
 
-    python studies/optima/study.py results/optima
+    PYTHONPATH=studies python studies/optima/study.py results/optima
 
 Tables are of the shipped data and of the effort that the log of ``prove.py`` in the folder has.
 """
@@ -11,7 +11,8 @@ from pathlib import Path
 import pandas as pd
 import shipped
 
-from coartic.analysis import figures, write_study
+from coartic.analysis import figures
+from common.writing import write_study
 
 BOUNDS = {
     "proven": "proven optimal", "within_1": "bound within 1 %", "within_5": "within 5 %",

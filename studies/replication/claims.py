@@ -15,8 +15,7 @@ import performance
 import postures
 from reader import MissingError, Reader
 
-from coartic.analysis import judge
-from coartic.analysis.judging import Finding
+from common.judging import Finding, judge
 
 HERE = Path(__file__).parent
 CLAIMS = pd.DataFrame.from_dict(

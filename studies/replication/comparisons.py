@@ -8,9 +8,9 @@ import pandas as pd
 from published import Summary
 
 from coartic.analysis import interval, mean, number
-from coartic.analysis.judging import Finding
 from coartic.analysis.statistics.hypotheses import bootstrap_test, exchange_test
 from coartic.estimates import difference_of_means
+from common.judging import Finding
 
 
 def written(value, digits):

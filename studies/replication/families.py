@@ -9,9 +9,9 @@ from comparisons import Higher, in_words, written
 from performance import no_trial_fails
 from reader import CONDITIONS, EC1, EC2, EC3, EC4, LEARNER, MARGINS, MissingError
 
-from coartic.analysis import all_of, mean, mean_beyond, number
-from coartic.analysis.judging import Finding
+from coartic.analysis import mean, number
 from coartic.estimates import FEWEST
+from common.judging import Finding, all_of, mean_beyond
 
 OF_ONE_ARM = ("one-armed/v1",)
 OF_TWO_ARMS = ("two-armed/v1", "aligned/v1", "redundancy/v1", "long/v1")

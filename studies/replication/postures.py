@@ -23,9 +23,9 @@ from reader import (
 )
 
 from coartic.analysis import TwoContexts, contexts_of_control, number
-from coartic.analysis.judging import Finding
 from coartic.analysis.signatures.context_tests import posture_difference_below
 from coartic.estimates import SEED, Estimate
+from common.judging import Finding
 
 ONE_GOAL = "posture-based/one-goal", "corrective-alone/given"
 """Methods that look at the current goal alone."""

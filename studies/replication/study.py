@@ -1,7 +1,8 @@
 """Judge what of Shah, Barto & Fagg (2013) replicates.
 
     coartic run comparison --out results/comparison
-    python studies/replication/study.py results/comparison [FOLDER ...] [--out FOLDER]
+    PYTHONPATH=studies python studies/replication/study.py results/comparison [FOLDER ...]
+        [--out FOLDER]
 
 The folder of suite ``comparison`` comes first; claims for which it has no runs are judged by the
 folders that follow, of suites ``ablations`` and ``families``. Writes tables, figures and page.html
@@ -19,7 +20,8 @@ from markdown_it import MarkdownIt
 from rewards import compare_rewards, draw_rewards
 from solutions import draw_solutions, measure_solutions
 
-from coartic.analysis import figures, fill_page, load
+from coartic.analysis import figures, load
+from common.writing import fill_page
 
 HERE = Path(__file__).parent
 STYLE = HERE.parents[1] / "analysis" / "report" / "page.css"

@@ -12,11 +12,12 @@ import re
 import pandas as pd
 import pytest
 
-from coartic.analysis import figures, fill_page, load, write_study
+from coartic.analysis import figures, load
 from coartic.benchmarks.runner import run_suite
 from coartic.benchmarks.suites import load_suite
 from coartic.tasks.families import instance_of, own_families
 from coartic.tasks.task import address_of, task_text
+from common.writing import fill_page, write_study
 from tests.support.processes import ROOT, program
 from tests.support.suites import InProcess
 

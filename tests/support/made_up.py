@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 
 from coartic import load_task
-from coartic.analysis.judging import Finding
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.study import Study
 from coartic.estimates import Estimate
 from coartic.runs.method_info import BUILT_IN, MethodInfo
 from coartic.runs.plan import Cell, Job
+from common.judging import Finding
 
 MADE_WITH = {
     "coartic": "0", "model_code": "code", "commit": {"id": "abc4567", "dirty": True},

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from coartic import corrective_trial, hand_sequences, load_task
-from coartic.analysis import judging, ranking, runtimes, shares
+from coartic.analysis import ranking, runtimes, shares
+from common import judging
 from tests.support.made_up import study_of_rewards
 from tests.support.processes import programs
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coartic.analysis import judging
 from coartic.analysis.methods import EC2, EC4, RANDOM_SEARCH
+from common import judging
 from tests.support.made_up import MadeUp
 from tests.support.processes import programs
 from tests.test_random_tasks import ALONE, ONE, RISING, TWO, hands_of, rewarded

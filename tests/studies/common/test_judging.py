@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coartic import CoarticError
-from coartic.analysis.judging import all_of, judge, judge_means, mean_beyond
+from common.judging import all_of, judge, judge_means, mean_beyond
 from tests.support.made_up import found
 
 NAN = float("nan")
@@ -12,8 +12,18 @@ NAN = float("nan")
 
 @pytest.mark.parametrize("sentence", ["It saves ticks", "{} {}", "It saves {:d}", "{mean}"])
 def test_a_sentence_has_one_place_for_the_mean(sentence):
-    with pytest.raises(CoarticError, match="needs one {}, for the mean"):
+    with pytest.raises(CoarticError, match="exactly one {}, for the mean"):
         mean_beyond(sentence, [4.0, 5.0, 6.0])
+
+
+def test_a_side_is_known_values_are_a_list_and_something_is_joined():
+    """A misspelt side would otherwise test the other one."""
+    with pytest.raises(CoarticError, match="side must be 'greater' or 'less', not 'lower'"):
+        mean_beyond("{}", [4.0, 5.0, 6.0], 0.0, "lower")
+    with pytest.raises(CoarticError, match=r"values have shape \(2, 2\)"):
+        mean_beyond("{}", [[1.0, 2.0], [3.0, 4.0]])
+    with pytest.raises(CoarticError, match="at least one finding"):
+        all_of()
 
 
 def test_other_braces_are_text():
@@ -26,16 +36,6 @@ def test_joined_findings_have_the_opposites_of_all():
     joined = all_of(own, other)
     assert (joined.against, joined.tests) == (own.against + other.against, own.tests + other.tests)
     assert [joined.holds, all_of(other, other).holds] == [False, True]
-
-
-def test_a_finding_prints_as_a_sentence():
-    first, *others = (str(found(*each)) for each in ((True, 0.0004, 0.03), (False,), (None,)))
-    assert first.startswith("The runs show it (p\u00a0=\u00a00.03): ")
-    assert [words.partition(":")[0] for words in others] == [
-        "The runs do not show it",
-        "Too few runs",
-    ]
-    assert all(words.endswith(".") for words in (first, *others))
 
 
 def judged(*findings):
@@ -119,7 +119,7 @@ def test_words_and_bounds_of_claims_are_of_a_file(tmp_path):
         assert (within.verdict, within.evidence.count("tasks")) == (verdict, 1)
     with pytest.raises(CoarticError, match="claims.toml has no claim 'beyond'"):
         judge_means(words, {"beyond": [first]})
-    with pytest.raises(CoarticError, match="between has 1 mean, but values of 2 are given"):
+    with pytest.raises(CoarticError, match="between has 1 means, but values has 2"):
         judge_means(words, {"between": [first, first]})
     words.write_text("[between]\ntext = 'It is.'\nmeans = []")
     with pytest.raises(CoarticError, match="claim between has no test"):

@@ -1,7 +1,4 @@
-"""An announced change: which goal moves, and after how many trials half of the shift is there.
-
-Study dial uses it as well.
-"""
+"""Move a goal, and find after how many trials half of the shift of a posture is there."""
 
 import numpy as np
 

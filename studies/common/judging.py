@@ -1,8 +1,9 @@
-"""Findings and verdicts: evidence and tests of each claim, corrected over all claims of a study.
+"""Judge the claims of a study by tests that are corrected over all its claims.
 
-A claim needs one mean over tasks, or several, beyond a bound (:func:`mean_beyond`, joined by
-:func:`all_of`). :func:`judge` corrects the claims of a study over each other (Holm). A claim that
-holds is undecided if its tests come out otherwise without the task that favours it most.
+A claim says that a mean over tasks, or each of several means, lies beyond a bound
+(:func:`mean_beyond`, joined by :func:`all_of`). :func:`judge` corrects the tests of all claims of a
+study together (Holm). A claim that holds stays undecided if its tests are not significant without
+the task that favours it most.
 """
 
 from __future__ import annotations
@@ -16,59 +17,53 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
+from coartic import CoarticError
+from coartic.analysis import interval, mean
 from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
-from coartic.analysis.words import capital, interval, p_value
-from coartic.errors import CoarticError
-from coartic.estimates import FEWEST, LEVEL, Estimate, mean
-from coartic.internal.arguments import Numbers, checked_arguments
-from coartic.internal.limits import brief_value
-from coartic.internal.text import counted
+from coartic.analysis.words import p_value
+from coartic.estimates import FEWEST, LEVEL, Estimate
 
 RESAMPLES_OF_CLAIMS = 99_999
 """Resamples of a test over tasks, whose p-value is corrected over many claims."""
+SIGNS = {"greater": 1.0, "less": -1.0}
 Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
 Side = Literal["greater", "less"]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Evidence and tests of one claim, before any correction."""
+    """Hold the evidence and the tests of one claim, before any correction."""
 
     holds: bool | None
     """True if the runs show the claim; None if the runs are too few."""
     evidence: str
     """Sentence with the means and their intervals, or why the claim cannot be judged."""
     tests: tuple[Estimate, ...] = ()
-    """Tests of the claim, which all have to hold; a positive estimate is as claimed."""
+    """Tests of the claim, which must all hold. A positive estimate is as claimed."""
     against: tuple[Estimate, ...] = ()
-    """Tests of the opposite of the claim; p below 5 % of any test, after correction, refutes a
-    claim that does not hold."""
+    """Tests of the opposite of the claim. A claim that does not hold is refuted if one of them has
+    p below 5 % after correction."""
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
 
-    def __str__(self) -> str:
-        """Return a sentence: what the runs show, the largest p of ``tests``, and the evidence."""
-        shown = {True: "The runs show it", False: "The runs do not show it", None: "Too few runs"}
-        p = p_value(_largest_p(self.tests))
-        return f"{shown[self.holds]}{f' ({p})' * bool(p)}: {self.evidence.rstrip('.')}."
-
     @property
     def opposite_p(self) -> float:
-        """Smallest p-value in ``against``, times the number of p-values there (Bonferroni), 1 at
-        most; NaN without a p-value."""
+        """Return the smallest p-value in ``against``, corrected by Bonferroni; NaN without one."""
         tested = [test.p for test in self.against if not math.isnan(test.p)]
         return min(1.0, min(tested) * len(tested)) if tested else math.nan
 
     def verdict(self, p: float, opposite_p: float) -> Verdict:
-        """Return ``supported``, ``not supported`` or ``undecided`` by p-values of the claim and of
-        its opposite, corrected or not.
+        """Return the verdict for p-values of the claim and of its opposite.
 
-        A claim that holds is supported if ``p`` is below 5 %, or NaN: counted exactly. A claim
-        that does not hold is not supported if ``opposite_p`` is below 5 %, if the claim has no
-        test, or if a test of three values or more (in each sample) has no p and no positive
-        estimate: all values equal the bound or each other. Other claims are undecided, and so is a
-        claim that holds by a test of fewer than three values without p."""
+        - *supported*: the claim holds, and ``p`` is below 5 % or NaN (counted exactly);
+        - *not supported*: the claim does not hold, and ``opposite_p`` is below 5 %, or the claim
+          has no test, or a test of three values or more has no p and no positive estimate (all
+          values are equal);
+        - *undecided*: any other claim, and a claim with a test of fewer than three values that has
+          no p.
+        """
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
@@ -86,10 +81,11 @@ def _largest_p(tests: Iterable[Estimate]) -> float:
     return max((test.p for test in tests if not math.isnan(test.p)), default=math.nan)
 
 
-def _tests_over_tasks(values: Numbers, bound: float) -> tuple[Estimate, Estimate]:
-    """Return two one-tailed bootstrap tests that the mean of values, one for each task, exceeds a
-    bound: with all values, and without the largest value. Two values are needed at least; p is NaN
-    for a test of a single value."""
+def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
+    """Test that the mean over tasks exceeds a bound, with and without the largest value.
+
+    ``values`` has one value for each task, two at least. p is NaN for a test of a single value.
+    """
     every = np.asarray(values, dtype=np.float64)
     return (
         bootstrap_test(every, bound, resamples=RESAMPLES_OF_CLAIMS),
@@ -97,19 +93,18 @@ def _tests_over_tasks(values: Numbers, bound: float) -> tuple[Estimate, Estimate
     )
 
 
-@checked_arguments
 def mean_beyond(
-    sentence: str, values: Numbers, bound: float = 0.0, side: Side = "greater"
+    sentence: str, values: ArrayLike, bound: float = 0.0, side: Side = "greater"
 ) -> Finding:
     """Test whether the mean over tasks lies beyond a bound, by a one-tailed bootstrap test.
 
     Parameters
     ----------
     sentence : str
-        Sentence of the evidence, with one ``{}`` in the place of the mean and its interval; other
-        braces are text.
+        Sentence of the evidence, with one ``{}`` for the mean and its interval. Other braces stay
+        as they are.
     values : array_like, shape (tasks,)
-        A value for each task; NaN, which does not count, for a task without a value.
+        One value for each task. NaN stands for a task without a value and does not count.
     bound : float
         In the unit of the values.
     side : {"greater", "less"}
@@ -118,18 +113,19 @@ def mean_beyond(
     Returns
     -------
     Finding
-        ``holds``: the mean lies on this side; None, without a test, with fewer than three tasks.
-        ``evidence``: the sentence, or that tasks are too few. ``tests`` has a test of the claim;
-        ``without`` a test of the claim without the task that favours it most; ``against`` a test of
-        the opposite, with all tasks or without the task that favours the opposite most, whichever
-        has the larger p.
+        ``holds`` is True if the mean lies on this side, and None, without a test, if there are
+        fewer than three tasks. ``tests`` has the test of the claim, and ``without`` the same test
+        without the task that favours the claim most. ``against`` has the test of the opposite:
+        with all tasks or without the task that favours the opposite most, whichever has the
+        larger p.
 
     Raises
     ------
     CoarticError
-        For another side or shape, and for a sentence that has not one ``{}``.
+        If ``side`` is unknown, ``values`` is not one-dimensional, or ``sentence`` does not have
+        exactly one ``{}``.
     ValueError
-        There are three values or more, and one of them or the bound is not finite.
+        If there are three values or more, and one of them or the bound is not finite.
 
     Examples
     --------
@@ -138,24 +134,25 @@ def mean_beyond(
     (True, 'Planning saves 5.50 [4.50, 6.50] ticks (4 tasks)')
     """
     if sentence.count("{}") != 1:
-        raise CoarticError(f"the sentence {brief_value(sentence)} needs one {{}}, for the mean")
-    there = np.asarray(values)
-    if there.ndim != 1:
-        raise CoarticError(f"values have shape {there.shape}; needed is a value for each task")
-    there = there[~np.isnan(there)]
-    if len(there) < FEWEST:
+        raise CoarticError(f"sentence {sentence!r} must have exactly one {{}}, for the mean")
+    if side not in SIGNS:
+        raise CoarticError(f"side must be 'greater' or 'less', not {side!r}")
+    found = np.asarray(values, dtype=np.float64)
+    if found.ndim != 1:
+        raise CoarticError(f"values have shape {found.shape}; they need one value for each task")
+    found = found[~np.isnan(found)]
+    if len(found) < FEWEST:
         return Finding(None, f"fewer than {FEWEST} random tasks can be judged")
-    sign = 1.0 if side == "greater" else -1.0
-    test, without = _tests_over_tasks(sign * there, sign * bound)
-    opposite = max(_tests_over_tasks(-sign * there, -sign * bound), key=lambda test: test.p)
-    found = interval(mean(there).columns("mean"), "mean", 2)
-    evidence = f"{sentence.replace('{}', found)} ({counted(len(there), 'task')})"
+    sign = SIGNS[side]
+    test, without = _tests_over_tasks(sign * found, sign * bound)
+    opposite = max(_tests_over_tasks(-sign * found, -sign * bound), key=lambda test: test.p)
+    words = interval(mean(found).columns("mean"), "mean", 2)
+    evidence = f"{sentence.replace('{}', words)} ({len(found)} tasks)"
     return Finding(test.value > 0, evidence, (test,), (opposite,), (without,))
 
 
-@checked_arguments
 def all_of(*findings: Finding) -> Finding:
-    """Join findings that a claim needs together.
+    """Join the findings that a claim needs together.
 
     Parameters
     ----------
@@ -165,13 +162,13 @@ def all_of(*findings: Finding) -> Finding:
     Returns
     -------
     Finding
-        Finding that holds if all findings hold, with ``tests``, ``against`` and ``without`` of all;
-        or the first finding with too few runs (``holds`` is None).
+        A finding that holds if all findings hold, with the tests of all of them. If a finding has
+        too few runs (``holds`` is None), the first such finding is returned.
 
     Raises
     ------
     CoarticError
-        Without findings.
+        If there are no findings.
 
     Examples
     --------
@@ -180,7 +177,7 @@ def all_of(*findings: Finding) -> Finding:
     'fewer than 3 random tasks can be judged'
     """
     if not findings:
-        raise CoarticError("all_of needs one finding at least: a claim cannot rest on nothing")
+        raise CoarticError("all_of needs at least one finding")
     for finding in findings:
         if finding.holds is None:
             return finding
@@ -193,24 +190,27 @@ def all_of(*findings: Finding) -> Finding:
     )
 
 
-@checked_arguments
 def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     """Judge the claims of a study, with their tests corrected over each other (Holm).
 
     Parameters
     ----------
     claims : mapping of str to (str, str, Finding)
-        Statement, test in words and finding of each claim, by the claim's id. A claim without a
-        p-value counts in the correction all the same.
+        By the id of each claim: its statement, its test in words, and its finding. A claim without
+        a p-value still counts in the correction.
 
     Returns
     -------
     DataFrame
-        A row for each claim, by its id: ``statement``, ``verdict`` (``supported``, ``not
-        supported`` or ``undecided``), ``evidence``, ``test`` and corrected p-values: ``p_holm`` of
-        the claim, ``p_without`` of the claim with all tasks and without the task that favours it
-        most (the larger p), and ``opposite_p_holm`` of its opposite; NaN without a test. The
-        verdict is :meth:`Finding.verdict` of the last two p-values.
+        One row for each claim, by its id, with the columns ``statement``, ``verdict``,
+        ``evidence``, ``test`` and three corrected p-values (NaN without a test):
+
+        - ``p_holm`` of the claim;
+        - ``p_without`` of the claim with all tasks or without the task that favours it most,
+          whichever is larger;
+        - ``opposite_p_holm`` of the opposite of the claim.
+
+        The verdict is :meth:`Finding.verdict` of the last two.
 
     Examples
     --------
@@ -236,7 +236,7 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
         rows[name] = {
             "statement": statement,
             "verdict": finding.verdict(*adjusted[1:]),
-            "evidence": f"{capital(evidence)}.",
+            "evidence": f"{evidence[:1].upper()}{evidence[1:]}.",
             "test": test,
             "p_holm": adjusted[0],
             "p_without": adjusted[1],
@@ -245,30 +245,30 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("claim")
 
 
-@checked_arguments
 def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
     """Judge claims whose words and bounds are in a file, as :func:`judge` does.
 
     Parameters
     ----------
     words : str or pathlib.Path
-        TOML file with a table for each claim, by its id: ``text``, the claim, ``test`` in words,
-        and ``means``, a list of tables with a ``sentence`` and one bound: the mean is claimed to
-        lie ``above`` it, ``below`` it (:func:`mean_beyond`), or ``within`` plus and minus it.
+        TOML file with a table for each claim, by its id. ``text`` is the claim, ``test`` the test
+        in words, and ``means`` a list of tables. Each table has a ``sentence`` and one bound: the
+        mean is claimed to lie ``above`` it, ``below`` it, or ``within`` plus and minus it.
     values : mapping
-        By the ids of claims, a list with an entry for each of their means: a value for each task,
-        or a mapping of groups of tasks to such values, when the mean of each group has to lie so;
-        a sentence can have the group as ``{group}``.
+        By the id of each claim, a list with one entry for each of its means. An entry has one value
+        for each task, or such values by group of tasks. With groups the mean of each group must lie
+        beyond the bound, and the sentence may contain ``{group}``.
 
     Returns
     -------
     DataFrame
-        The table of :func:`judge`, with the claims that have values, in their order.
+        The table of :func:`judge`, with the claims of ``values``, in their order.
 
     Raises
     ------
     CoarticError
-        The file lacks a claim, a claim lacks an entry, or it has more or fewer means than values.
+        If the file has no such claim, if a claim has no ``text``, ``test`` or ``means``, or if a
+        claim has more or fewer means than ``values``.
 
     Examples
     --------
@@ -284,21 +284,21 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
     claims, of_file = {}, tomllib.loads(Path(words).read_text("utf-8"))
     for name, means in values.items():
         if name not in of_file:
-            raise CoarticError(f"{words} has no claim {brief_value(name)}")
+            raise CoarticError(f"{words} has no claim {name!r}")
         claim = of_file[name]
         if missing := [key for key in ("text", "test", "means") if key not in claim]:
             raise CoarticError(f"{words}: claim {name} has no {missing[0]}")
-        every = [of if isinstance(of, Mapping) else {"": of} for of in means]
-        if len(claim["means"]) != len(every):
-            has = counted(len(claim["means"]), "mean")
+        by_group = [each if isinstance(each, Mapping) else {"": each} for each in means]
+        if len(claim["means"]) != len(by_group):
             raise CoarticError(
-                f"{words}: claim {name} has {has}, but values of {len(every)} are given"
+                f"{words}: claim {name} has {len(claim['means'])} means, but values has "
+                f"{len(by_group)} of them"
             )
-        asked = [*zip(claim["means"], every, strict=True)]
-        groups = dict.fromkeys(group for of in every for group in of)
+        asked = [*zip(claim["means"], by_group, strict=True)]
+        groups = dict.fromkeys(group for values_of in by_group for group in values_of)
         finding = all_of(*(
-            _mean_as_asked(mean, group, of[group])
-            for group in groups for mean, of in asked if group in of
+            _mean_as_asked(words_of, group, values_of[group])
+            for group in groups for words_of, values_of in asked if group in values_of
         ))  # fmt: skip
         claims[name] = (claim["text"], claim["test"], finding)
     return judge(claims)
