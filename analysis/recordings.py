@@ -8,8 +8,6 @@ all hits over the goals, where wrong units, axes, columns, clocks and sensors ca
 
 from __future__ import annotations
 
-import csv
-import io
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -196,11 +194,12 @@ def hits_from_markers(
     ValueError
         ``ticks_per_unit`` is not above 0.
     """
-    source = _name_of(recording)
-    trials = _trials_of(recording, task, side)
+    source, trials = _trials_of(recording, task, side)
     for trial in trials:
         if trial.fault:
-            raise CoarticError(f"{source}, {trial.name}: {trial.fault}")
+            raise CoarticError(
+                f"{source}, trial {trial.number:g} of {trial.subject}: {trial.fault}"
+            )
     finished = [trial for trial in trials if len(trial.hits) == len(task.goals)]
     if not finished:
         raise CoarticError(
@@ -293,7 +292,7 @@ def draw_recording(
     CoarticError
         A table cannot be read, or neither ``hits`` nor ``samples`` is given.
     """
-    trials = [] if samples is None else _trials_of(samples, task, None)
+    trials = [] if samples is None else _trials_of(samples, task, None)[1]
     if hits is None:
         if samples is None:
             raise CoarticError("hits and samples are both None: draw_recording needs one of them")
@@ -329,40 +328,22 @@ def _hits_in_file(path: str | Path, task: Task, ticks_per_unit: float) -> pd.Dat
 
 
 def _table(path: str | Path) -> pd.DataFrame:
-    """Return a CSV file as a frame whose index has the numbers of lines. Raises CoarticError."""
-    try:
-        text = Path(path).read_text("utf-8-sig")
-    except OSError as error:
-        raise CoarticError(f"{path} cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise CoarticError(f"{path} is not a CSV file in UTF-8: save it as one") from None
-    lines = {number: line for number, line in enumerate(text.split("\n"), 1)
-             if line.strip() and not line.startswith("#")}  # fmt: skip
-    heading, *rows = lines.values() or [""]
-    names = [name.strip() or f"column {k}" for k, name in enumerate(next(csv.reader([heading])), 1)]
-    if not rows:
-        raise CoarticError(f"{path} has no rows: a recording has a row for each hit or sample")
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise CoarticError(f"{path} has two columns {twice[0]!r}: give one of them another name")
+    """Return a CSV file as a frame whose index counts rows from 1. Raises CoarticError."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)  # of rows with too many values
             frame = pd.read_csv(
-                io.StringIO("\n".join(rows)), names=names, header=None, index_col=False,
-                dtype={"subject": str, "hand": str}, skipinitialspace=True, keep_default_na=False,
-                na_values=[""], low_memory=False,
+                path, comment="#", index_col=False, skipinitialspace=True, keep_default_na=False,
+                na_values=[""], dtype={"subject": str, "hand": str}, encoding="utf-8-sig",
+                low_memory=False,
             )  # fmt: skip
+    except OSError as error:
+        raise CoarticError(f"{path} cannot be read: {error.strerror or error}") from None
     except (ValueError, pd.errors.ParserWarning) as error:
-        raise CoarticError(f"{path} is not a table separated by commas: {error}") from None
-    numbers = [*lines][1:]
-    return (
-        frame.set_axis(numbers) if len(numbers) == len(frame) else frame.set_axis(frame.index + 2)
-    )
-
-
-def _name_of(recording: pd.DataFrame | str | Path) -> str:
-    """Return the name of a recording for messages."""
-    return "the frame" if isinstance(recording, pd.DataFrame) else str(recording)
+        raise CoarticError(
+            f"{path} is not a table in UTF-8, separated by commas: {error}"
+        ) from None
+    return frame.rename(columns=str.strip).set_axis(frame.index + 1)
 
 
 def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
@@ -402,9 +383,10 @@ def _refuse(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str, sou
     if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():
         (value,) = frame[column].iloc[rows[:1]].tolist()
         shown = "empty" if pd.isna(value) or value == "" else brief_value(value)
-        row = f"{'row' if source == 'the frame' else 'line'} {frame.index[rows[0]]}"
         more = f" ({len(rows)} such rows)" * (len(rows) > 1)
-        raise CoarticError(f"{source}, {row}: {column} is {shown}; it must be {needed}{more}")
+        raise CoarticError(
+            f"{source}, row {frame.index[rows[0]]}: {column} is {shown}; it must be {needed}{more}"
+        )
 
 
 def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
@@ -497,11 +479,6 @@ class _Trial:
     fault: str
     """What makes the hits of the trial wrong, as a sentence; empty without a fault."""
 
-    @property
-    def name(self) -> str:
-        """Name of the trial for messages."""
-        return f"trial {self.number:g} of {self.subject}"
-
     def at(self, sample: float, values: Array) -> Array:
         """Return ``values``, shape ``(n, ...)``, at a sample, linearly interpolated."""
         before = min(int(sample), len(values) - 2)
@@ -513,10 +490,13 @@ def _trials_of(
     recording: pd.DataFrame | str | Path,
     task: Task,
     side: Literal["left", "right", "both"] | None,
-) -> list[_Trial]:
-    """Return the trials of a recording of markers. Raises CoarticError if it cannot be read."""
-    source = _name_of(recording)
-    frame = recording if isinstance(recording, pd.DataFrame) else _table(recording)
+) -> tuple[str, list[_Trial]]:
+    """Return the name, for messages, and the trials of a recording of markers. Raises CoarticError
+    if it cannot be read."""
+    if isinstance(recording, pd.DataFrame):
+        source, frame = "the frame", recording
+    else:
+        source, frame = str(recording), _table(recording)
     hands = [hand for hand in HANDS if hand in task.hands
              and (side in (hand, "both") if side else f"{hand}_tip_x" in frame)]  # fmt: skip
     if not hands:
@@ -546,7 +526,7 @@ def _trials_of(
             found.append(_trial(subject, float(number), times[rows], of_trial, task))
     if not found:
         raise CoarticError(f"{source} has one sample in each trial: a trial needs at least two")
-    return found
+    return source, found
 
 
 def _trial(

@@ -84,15 +84,15 @@ def test_other_forms_of_a_table_have_the_same_hits(people, read, form):
 
 UNREADABLE = {
     "no column left_2; it needs subject, .*, and has subject": lambda t: t.drop(columns="left_2"),
-    "line 4: hand is 'both'; it must be left or right": put("hand", 2, "both"),
-    "line 3: goal is .*9.*; it must be an integer from 1 to 4": put("goal", 1, 9),
-    "line 2: trial is .*0.5": put("trial", 0, 0.5),
-    "line 3: ticks is .*-5.*; it must be more than 0": put("ticks", 1, -5),
-    "line 2: ticks is empty": put("ticks", 0, None),
-    "line 5: subject is empty; it must be a name": put("subject", 3, None),
+    "row 3: hand is 'both'; it must be left or right": put("hand", 2, "both"),
+    "row 2: goal is .*9.*; it must be an integer from 1 to 4": put("goal", 1, 9),
+    "row 1: trial is .*0.5": put("trial", 0, 0.5),
+    "row 2: ticks is .*-5.*; it must be more than 0": put("ticks", 1, -5),
+    "row 1: ticks is empty": put("ticks", 0, None),
+    "row 4: subject is empty; it must be a name": put("subject", 3, None),
     "has no rows": lambda t: t[:0],
     r"goal is .*hit once in each trial.*\(80 such rows\)": lambda t: pd.concat([t, t]),
-    "line 2: left_2 is '?inf": put("left_2", 0, np.inf),
+    "row 1: left_2 is '?inf": put("left_2", 0, np.inf),
     "base_x is .*1e\\+300": put("base_x", 0, 1e300),
     "left_2 is .*True": put("left_2", 0, True),
     r"left_2 is .*\(1\+2j\)": put("left_2", 0, 1 + 2j),
@@ -113,11 +113,10 @@ def test_what_cannot_be_read_is_refused_with_its_row(people, read, sentence):
 
 
 NO_TABLE = {
-    "is not a CSV file in UTF-8": "subject,trial\nä,1\n".encode("utf-16"),
-    "has no rows": "subject,trial\n",
-    "has two columns 'goal'": "subject,goal,goal\na,1,1\n",
-    "not a table separated by commas: .*line 2": "subject,trial\na,1\na,1,2\n",
-    "not a table separated by commas": "subject,trial\na,1,2\na,1,2\n",
+    "is not a table in UTF-8": "subject,trial\nä,1\n".encode("utf-16"),
+    "separated by commas: No columns": "",
+    "separated by commas: .*line 3": "subject,trial\na,1\na,1,2\n",
+    "separated by commas": "subject,trial\na,1,2\na,1,2\n",
     "no column subject; .* has subject;trial": "subject;trial\na;1\n",
 }
 
