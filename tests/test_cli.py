@@ -495,9 +495,9 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
     coartic, commands, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(film, "HOLD_S", 0.0)  # films end at once
-    monkeypatch.setattr(film, "PAUSE_S", 0.0)
-    monkeypatch.setattr(film, "LASTS_S", 0.3)  # few frames
+    monkeypatch.setattr(film, "LONGEST", 3)  # films are short
+    monkeypatch.setattr(film, "PAUSE", 1)
+    monkeypatch.setattr(film, "HOLD", 1)
     monkeypatch.setattr(build, "for_page", lambda _: "")
     monkeypatch.setattr(build, "picture", lambda *_: b"")
     Path("near.toml").write_text(NEAR, "utf-8")
