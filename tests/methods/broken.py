@@ -154,9 +154,9 @@ class Outsider(Good):
 
 
 def step_in_a_thread(task):
-    from coartic.gym import TaskVectorEnv
+    from coartic.gym import TaskEnv
 
-    env = TaskVectorEnv(5, task)
+    env = TaskEnv(task)
     env.reset()
     with ThreadPoolExecutor(1) as pool:
         pool.submit(env.step, env.action_space.sample()).result()
