@@ -148,7 +148,7 @@ class Outsider(Good):
             "execute": lambda: coartic.execute(task, correction),
             "initial hands": lambda: coartic.initial_hands(searched),
             "session": lambda: (own.trial(correction), own.trials("RRR", np.zeros((3, 3, 10)))),
-            "environments in a thread": lambda: step_in_a_thread(task),
+            "environment in a thread": lambda: step_in_a_thread(task),
         }
         means[self.parameters.means]()
 
