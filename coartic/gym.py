@@ -183,12 +183,12 @@ class TaskEnv(gymnasium.Env):
         """
         super().reset(seed=seed)
         drawn, options = self.np_random.integers(len(self.tasks)), {**(options or {})}
-        number = int(options.pop("task", drawn))
+        number = options.pop("task", drawn)
         check_limits("options['task']", number, 0, len(self.tasks) - 1)
         if options:
             raise ValueError(f"reset has no options {brief_value(options)}; it has 'task'")
         if number != self.number:
-            self._load(number)
+            self._load(int(number))
         self.q, self.goal, self.going, self._total = self.task.q0.copy(), 0, True, 0.0
         return self._seen(), self._info()
 
@@ -222,7 +222,7 @@ class TaskEnv(gymnasium.Env):
             The action has another shape or is not finite.
         """
         if not self.going:
-            raise ResetNeeded("no trial goes on: reset first")
+            raise ResetNeeded("no trial goes on: call reset first")
         entries, shape = real_array("action", action), self.action_space.shape
         if entries.shape != shape or not np.isfinite(entries).all():
             raise ValueError(
@@ -434,8 +434,8 @@ def score(
     inner, wrappers = _layers(env)[-1], _wrappers_of(env)
     if not isinstance(inner, TaskEnv):
         raise TypeError(
-            f"env is {brief_value(env)}; it must be an environment of coartic, or several in this "
-            "process, or an id"
+            f"env is {brief_value(env)}; it must be an id, or an environment or vector environment "
+            "of coartic in this process"
         )
     normalisers = [each for each in wrappers if _normalises(each)]
     if vec_normalize is None and wrappers == normalisers:
@@ -443,17 +443,19 @@ def score(
     if wrappers == normalisers:
         wrappers = []
     if wrappers and options:
-        raise ValueError(f"{', '.join(options)}: make the environment in the wrappers with this")
+        raise ValueError(f"{', '.join(options)}: env has wrappers, so make it with this option")
     if vec_normalize is not None and wrappers and normalisers:
         raise ValueError("env normalises already, in a VecNormalize: leave vec_normalize out")
     given = inner.options | options
     if _is_family(given["task"]) and not wrappers:
         given = inner.options | {"split": "test", "count": None, "year": None} | options
-    setting = TaskEnv(**given)
+    setting = type(inner)(**given)
     setting.tasks[:] = tasks = [*map(as_task, setting.tasks)]
     policies = policy if isinstance(policy, Mapping) else {"policy": policy}
     if taken := {"random actions", "corrective process", "best known"} & {*policies}:
-        raise ValueError(f"a policy is called {min(taken)!r}, as a row of the table: rename it")
+        raise ValueError(
+            f"policy has the name {min(taken)!r} of another row of the table: rename it"
+        )
     if isinstance(vec_normalize, str | Path):
         vec_normalize = pickle.loads(Path(vec_normalize).read_bytes())
     rewards: dict[str, Any] = {}
@@ -497,8 +499,8 @@ def _layers(env: Any) -> list[Any]:
         env = getattr(env, name)
         if name == "envs":
             inner = [_layers(each)[-1] for each in env]
-            if any(vars(each).get("options") != vars(inner[0]).get("options") for each in inner):
-                raise TypeError("the environments side by side have several tasks: score each")
+            if len({repr(getattr(each, "options", None)) for each in inner}) > 1:
+                raise TypeError("env has environments with different options: score each of them")
             env = env[0]
         found.append(env)
     return found
@@ -559,7 +561,7 @@ def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int = 1) 
     while going := [n for n, each in enumerate(robots) if each.going]:
         actions = np.asarray(act(np.array([seen[n] for n in going])))
         if len(actions) != len(going):
-            raise ValueError(f"actions have shape {actions.shape}; needed are {len(going)} rows")
+            raise ValueError(f"actions have shape {actions.shape}, not a row for each observation")
         for n, action in zip(going, actions, strict=True):
             seen[n] = robots[n].step(action)[0]
     return np.reshape([each.outcome for each in robots], (-1, trials))
@@ -579,7 +581,7 @@ def _wrapped_trial(act: Callable[[Any], ArrayLike], env: Any, number: int, seed:
         else:
             seen, _ = env.reset(seed=seed, options=options)
         if inner.number != number:
-            raise TypeError("a wrapper does not pass on the options of reset")
+            raise TypeError("a wrapper of env does not pass on the options of reset")
         inner.outcome, ended = np.nan, False
         while not ended:
             actions = np.asarray(act(np.asarray(seen)[None] if is_one else seen))

@@ -139,7 +139,7 @@ def test_where_the_corrective_process_fails_the_posture_takes_its_place():
     assert not correct(task.robot, task.q0, "right", task.goals[0], model=model).converged
     for share in (0.0, 0.6):  # of half a unit, to the right
         env, action = TaskEnv(task, model=model), [share, 0, 0, 0, 0, 0]
-        with pytest.raises(gymnasium.error.ResetNeeded, match="reset first"):
+        with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
             env.step(action)
         env.reset()
         target = task.q0.copy()
@@ -148,7 +148,7 @@ def test_where_the_corrective_process_fails_the_posture_takes_its_place():
         _, reward, ended, _, info = env.step(action)
         assert (reward, ended) == (-FAILED if due is None else due, True)
         assert info["is_success"] == (due is not None) == (share > 0)
-        with pytest.raises(gymnasium.error.ResetNeeded, match="reset first"):
+        with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
             env.step(action)
 
 
@@ -166,10 +166,10 @@ def test_what_is_refused():
         (ValueError, "'task'.* is 1; it must be", lambda: env.reset(options={"task": 1})),
         (ValueError, "finite, of shape", lambda: env.step(missing)),
         (ValueError, "finite, of shape", lambda: env.step(np.zeros(3))),
-        (ValueError, "needed are 1 rows", lambda: score(env, lambda seen: np.zeros((2, 6)))),
-        (TypeError, "an environment of coartic", lambda: score(gymnasium.make("CartPole-v1"))),
-        (TypeError, "have several tasks", lambda: score(gymnasium.vector.SyncVectorEnv(several))),
-        (ValueError, "as a row of the table", lambda: score(env, {"best known": None})),
+        (ValueError, "not a row for each", lambda: score(env, lambda seen: np.zeros((2, 6)))),
+        (TypeError, "vector environment of coartic", lambda: score(gymnasium.make("CartPole-v1"))),
+        (TypeError, "different options", lambda: score(gymnasium.vector.SyncVectorEnv(several))),
+        (ValueError, "of another row", lambda: score(env, {"best known": None})),
     ):
         with pytest.raises(error, match=words):
             call()
@@ -265,12 +265,24 @@ def test_an_environment_in_wrappers_is_taken_as_it_is():
     short = score(gymnasium.make(TWO, max_episode_steps=2), partial(policy, 1.0))
     assert short.completed["policy"] == 0
     assert np.isnan(short.reward["policy"])
-    with pytest.raises(ValueError, match="ahead: make the environment in the wrappers with this"):
+    with pytest.raises(ValueError, match="ahead: env has wrappers"):
         score(wrappers.RescaleAction(made, *half), ahead=2)
     learns = wrappers.NormalizeObservation(gymnasium.make(TWO))
     count = learns.obs_rms.count
     score(learns, partial(policy, 1.0))
     assert (learns.obs_rms.count, learns.update_running_mean) == (count, True)
+
+
+class Still(TaskEnv):
+    """Whatever the action, does what zeros do."""
+
+    def step(self, action):
+        return super().step(np.zeros_like(action))
+
+
+def test_an_environment_of_ones_own_is_scored_itself():
+    due = score(TWO, lambda seen: np.zeros((len(seen), 10))).reward["policy"]
+    assert (score(Still("two-armed-1"), lambda seen: seen[:, :10]).reward[:2] == due).all()
 
 
 def test_the_instances_of_a_family_in_wrappers_are_its_own():
