@@ -224,7 +224,7 @@ class TaskEnv(gymnasium.Env):
         if not self.going:
             raise ResetNeeded("no trial goes on: call reset first")
         entries, shape = real_array("action", action), self.action_space.shape
-        if entries.shape != shape or not np.isfinite(entries).all():
+        if entries.shape != shape or not all(map(math.isfinite, entries.tolist())):
             raise ValueError(
                 f"action is {brief_value(action)}; it must be finite, of shape {shape}"
             )
@@ -499,7 +499,8 @@ def _layers(env: Any) -> list[Any]:
         env = getattr(env, name)
         if name == "envs":
             inner = [_layers(each)[-1] for each in env]
-            if len({repr(getattr(each, "options", None)) for each in inner}) > 1:
+            options = [getattr(each, "options", None) for each in inner]
+            if any(each != options[0] for each in options):
                 raise TypeError("env has environments with different options: score each of them")
             env = env[0]
         found.append(env)
