@@ -30,7 +30,7 @@ from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import robot_parameters
 from coartic.motion.solution import execute, initial_reward
 from coartic.motion.trial import ALL_STOP, Requests, count_trials, reach
-from coartic.robot import BASE_DOF, HANDS, LARGEST_FIGURE, Array, Hands
+from coartic.robot import HANDS, LARGEST_FIGURE, Array
 from coartic.tasks.catalogue import as_task
 from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
 from coartic.tasks.optima import best_shipped
@@ -146,8 +146,8 @@ class TaskEnv(gymnasium.Env):
         self.names = [getattr(each, "name", each) for each in self.tasks]
         self._joints = [f"base_{axis}" for axis in "xy" if axis not in locked]
         self._joints += [f"{hand}_{k + 1}" for hand in hands for k in range(links)]
-        self._view, joints = ahead + 1, len(self._joints)
-        sizes = [self._view, 2 * self._view + joints, joints * (fewest < links)]
+        self._view, joints, self._has_flags = ahead + 1, len(self._joints), fewest < links
+        sizes = [self._view, 2 * self._view + joints, joints * self._has_flags]
         high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
         self.observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
         self.action_space = Box(-1.0, 1.0, (len(hands) - 1 + joints,), np.float32)
@@ -190,6 +190,7 @@ class TaskEnv(gymnasium.Env):
         if number != self.number:
             self._load(int(number))
         self.q, self.goal, self.going, self._total = self.task.q0.copy(), 0, True, 0.0
+        self._found = self._found_at_start
         return self._seen(), self._info()
 
     def step(
@@ -223,23 +224,28 @@ class TaskEnv(gymnasium.Env):
         """
         if not self.going:
             raise ResetNeeded("no trial goes on: call reset first")
-        entries, shape = real_array("action", action), self.action_space.shape
-        if entries.shape != shape or not all(map(math.isfinite, entries.tolist())):
+        array, shape = real_array("action", action), self.action_space.shape
+        entries = array.tolist()
+        if array.shape != shape or not all(map(math.isfinite, entries)):
             raise ValueError(
                 f"action is {brief_value(action)}; it must be finite, of shape {shape}"
             )
         count_trials(int(self.goal == 0))
         now, dof = self.q, len(self.q)
-        found = [self._reach(side, self._no_target) for side in self._sides]
-        ends = [each["corrected"][:dof] if each["corrections"] else None for each in found]
+        ends = [each["corrected"][:dof] if each["corrections"] else None for each in self._found]
         away = [math.inf if end is None else _square(end - now) for end in ends]
         hand = int(len(away) > 1 and (away[1] < away[0]) != (entries[0] > 0.5))
-        target = now.copy() if (end := ends[hand]) is None else end.copy()
-        target[self._moved] += REACH * np.minimum(np.maximum(entries[self._movers], -1.0), 1.0)
-        made = self._reach(self._sides[hand], target)
+        target = (now if (end := ends[hand]) is None else end).tolist()
+        for joint, entry in self._moves:
+            target[joint] += REACH * min(max(entries[entry], -1.0), 1.0)
+        targets = self._no_targets[:, : len(self._goals) - self.goal].copy()
+        targets[0, 0, 0] = target
+        made, *after = self._reach(hand, targets)
         self.q, hit = made["q"][:dof].copy(), made["hit"].item()
         self.goal += hit
         self.going = hit and self.goal < len(self._goals)
+        if self.going:
+            self._found = after + self._reached_by(range(1, len(self._sides)))
         reward = -float(made["ticks"].item() if hit else FAILED)
         self._total += reward
         if not self.going:
@@ -271,36 +277,44 @@ class TaskEnv(gymnasium.Env):
         check_model(self.model, radius=task.radius)
         self.task, self.number, self._goals = task, number, task.goal_array
         place = {name: k for k, name in enumerate(task.robot.joint_names)}
-        places = np.array([place.get(name, -1) for name in self._joints])
-        moves = (places >= 0) & ~np.isin(
-            self._joints, [f"base_{axis}" for axis in task.locked_base]
-        )
-        first = 3 * self._view
-        self._blank = np.zeros(self.observation_space.shape, np.float32)
-        self._blank[first + len(places) :] = moves[: len(self._blank) - first - len(places)]
-        self._seen_at, self._places = first + np.flatnonzero(places >= 0), places[places >= 0]
-        self._moved = places[moves]
-        self._movers = np.flatnonzero(moves) + len(task.hands) - 1
-        self._sides = [np.array([[HANDS.index(hand)]]) for hand in task.hands]
-        self._no_target = np.full(task.robot.dof, np.nan)
+        locked = [f"base_{axis}" for axis in task.locked_base]
+        self._places = [place.get(name, -1) for name in self._joints]
+        self._moves = [
+            (place[name], entry)
+            for entry, name in enumerate(self._joints, len(task.hands) - 1)
+            if name in place and name not in locked
+        ]
+        moved = {joint for joint, _ in self._moves}
+        self._flags = [float(each in moved) for each in self._places] if self._has_flags else []
+        sides = [HANDS.index(hand) for hand in task.hands]
+        self._sides = [np.array([[side, sides[0]]]) for side in sides]
+        self._no_targets = np.full((1, 2, 1, task.robot.dof), np.nan)
         self._parameters = robot_parameters(
             task.robot, task.radius, locked_base=task.locked_base, model=self.model, checks=False
         )
+        self.q, self.goal = task.q0.copy(), 0
+        self._found_at_start = self._reached_by(range(len(sides)))
 
-    def _reach(self, side: Hands, target: Array) -> Any:
-        """Return the account of an arm, ``side`` (shape ``(1, 1)``), that reaches for the next goal
-        from where the robot stands, by the corrective process alone if ``target`` is NaN."""
-        goal = self._goals[None, self.goal, None]
-        arms = Requests(self.q[None], side, target[None, None, None], ALL_STOP, goal)
-        return reach(self.task.robot, arms, self._parameters).goals[0, 0, 0]
+    def _reach(self, hand: int, targets: Array) -> NDArray[np.void]:
+        """Return the accounts of an arm that reaches, from where the robot stands, for the next
+        goal with hand ``hand`` of the task, and, as each call costs, for the goal after it with the
+        task's first hand. ``targets`` has shape ``(1, goals, 1, dof)``; where it is NaN the
+        corrective process acts alone."""
+        goals = self._goals[None, self.goal : self.goal + targets.shape[1]]
+        arms = Requests(self.q[None], self._sides[hand], targets, ALL_STOP, goals)
+        return reach(self.task.robot, arms, self._parameters).goals[0, :, 0]
+
+    def _reached_by(self, hands: range) -> list[Any]:
+        """List the accounts of hands that reach for the next goal by the corrective process."""
+        return [self._reach(hand, self._no_targets[:, :1])[0] for hand in hands]
 
     def _seen(self) -> NDArray[np.float32]:
-        seen, view = self._blank.copy(), self._view
-        near = self._goals[self.goal : self.goal + view] - self.q[:BASE_DOF]
-        seen[: len(near)] = 1.0
-        seen[view : view + near.size] = near.ravel()
-        seen[self._seen_at] = self.q[self._places]
-        return seen
+        q, near = self.q.tolist(), self._goals[self.goal :][: self._view].tolist()
+        beyond = self._view - len(near)
+        places = [each - base for goal in near for each, base in zip(goal, q, strict=False)]
+        joints = [q[k] if k >= 0 else 0.0 for k in self._places]
+        exist = [1.0] * len(near) + [0.0] * beyond
+        return np.array(exist + places + [0.0, 0.0] * beyond + joints + self._flags, np.float32)
 
     def _info(self) -> dict[str, Any]:
         return {"task": self.names[self.number], "is_success": self.goal == len(self._goals)}
