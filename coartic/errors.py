@@ -19,3 +19,7 @@ class SolutionError(CoarticError):
 
 class NotApplicableError(CoarticError):
     """A method, a condition or a search for hands cannot be used for a task or first solution."""
+
+
+class MissingExtraError(CoarticError, ImportError):
+    """A package is not installed that an extra, such as ``coartic[gym]``, installs."""

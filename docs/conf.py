@@ -56,7 +56,6 @@ autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "exclude-members": "model_config, model_post_init"}
 autodoc_preserve_defaults = True
 napoleon_google_docstring = False  # docstrings have NumPy's blocks
-autodoc_mock_imports = ["stable_baselines3"]  # of the extra coartic[rl]
 python_use_unqualified_type_names = True
 toc_object_entries = False
 # Names in signatures are short, and two packages may have one: the link goes to the first.

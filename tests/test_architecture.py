@@ -337,21 +337,3 @@ def test_no_module_is_imported_but_undeclared():
             if root in PACKAGES or root in sys.stdlib_module_names:
                 continue
             assert f'"{aliases.get(root, root)}>=' in declared, f"{path}: {root}"
-
-
-MOVED = {
-    "coartic.optimisers": "coartic.method.optimisers",
-    "coartic.film": "coartic.pictures.film",
-    "coartic.sb3": "coartic.gym.stable_baselines",
-}
-
-
-@pytest.mark.parametrize("old", MOVED)
-def test_a_module_that_moved_answers_by_its_former_name(old):
-    new = MOVED[old]
-    if "stable" in new:
-        pytest.importorskip("stable_baselines3")
-    sys.modules.pop(old, None)
-    with pytest.warns(DeprecationWarning, match=f"{old} is {new} now"):
-        found = importlib.import_module(old)
-    assert found is importlib.import_module(new)

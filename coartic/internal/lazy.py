@@ -4,7 +4,6 @@ commands need it."""
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
@@ -29,10 +28,3 @@ def import_lazily(
         return sorted({*homes, *(name for name in vars(module) if name.endswith("__"))})
 
     return find, names
-
-
-def moved(old: str, new: str) -> None:
-    """Warn (DeprecationWarning) that module ``old`` is called ``new`` now, and import ``new`` under
-    its former name, too."""
-    warnings.warn(f"{old} is {new} now", DeprecationWarning, stacklevel=3)
-    sys.modules[old] = import_module(new)

@@ -9,10 +9,10 @@ A goal has five phases. A run, one of many side by side,
    hits it, and the robot moves there;
 5. *accounts*: what happened is noted, and the trial goes on where the goal is hit
 
-(paper, sections *Generating Movement for Each Goal* and *The Corrective Process*). Three loops are
-made of these phases: :func:`reach_kernel` moves to given targets, :mod:`coartic.learner.kernel`
-explores around learned targets, and :mod:`coartic.gym.kernel` does what actions say. The result of
-a run depends neither on the others nor on their number.
+(paper, sections *Generating Movement for Each Goal* and *The Corrective Process*). Two loops are
+made of these phases: :func:`reach_kernel` moves to given targets, and :mod:`coartic.learner.kernel`
+explores around learned targets. The result of a run depends neither on the others nor on their
+number.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from plain_loop import trials_in_c
 from coartic import CONDITIONS, Objective, Task, execute, learn_many, load_task
 from coartic.baselines.cma_es import CMAES
 from coartic.benchmarks.planning import plan_suite
-from coartic.gym import TaskEnv, TaskVectorEnv
+from coartic.gym import TaskEnv
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import TRIALS, warm_up
 from coartic.method import Session
@@ -91,14 +91,13 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
     reference = session.trials(hands, targets)
     in_c = trials_in_c(task, hands, targets)
     assert all((make() == reference.ticks).all() for make in in_c.values())
-    env, many = TaskEnv(task), TaskVectorEnv(1000, task)
-    shape = (len(best), *many.action_space.shape)
+    env = TaskEnv(task)
+    shape = (len(best), *env.action_space.shape)
     actions = np.random.default_rng(0).uniform(-0.1, 0.1, shape)
-    many.reset()
 
     def episode() -> None:
         env.reset()
-        for action in actions[:, 0]:
+        for action in actions:
             env.step(action)
 
     return {
@@ -112,7 +111,6 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
             lambda: session.trials(hands, np.tile(targets, (10, 1, 1))),
         ),
         "objective.many, 1000 at once": (1000, lambda: cost.many(targets[:, cost.joints])),
-        "environments, 1000 at once": (1000, lambda: [*map(many.step, actions)]),
     }
 
 

@@ -148,15 +148,15 @@ class Outsider(Good):
             "execute": lambda: coartic.execute(task, correction),
             "initial hands": lambda: coartic.initial_hands(searched),
             "session": lambda: (own.trial(correction), own.trials("RRR", np.zeros((3, 3, 10)))),
-            "environments in a thread": lambda: step_in_a_thread(task),
+            "environment in a thread": lambda: step_in_a_thread(task),
         }
         means[self.parameters.means]()
 
 
 def step_in_a_thread(task):
-    from coartic.gym import TaskVectorEnv
+    from coartic.gym import TaskEnv
 
-    env = TaskVectorEnv(5, task)
+    env = TaskEnv(task)
     env.reset()
     with ThreadPoolExecutor(1) as pool:
         pool.submit(env.step, env.action_space.sample()).result()
