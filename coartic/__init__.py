@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING
 from coartic.internal.lazy import import_lazily
 
 if TYPE_CHECKING:
-    from coartic.errors import CoarticError, NotApplicableError, SolutionError, TaskError
+    from coartic.errors import (
+        CoarticError,
+        MissingExtraError,
+        NotApplicableError,
+        SolutionError,
+        TaskError,
+    )
     from coartic.learner.conditions import ABLATIONS, CONDITIONS, INFORMED, ExplorationCondition
     from coartic.learner.learning import learn, learn_many
     from coartic.learner.learning_run import LearningRun
@@ -48,6 +54,7 @@ __all__ = [
     "Hand",
     "LearningRun",
     "MethodError",
+    "MissingExtraError",
     "MotionModel",
     "MoveResult",
     "Movement",
@@ -80,7 +87,10 @@ __all__ = [
 ]
 
 _HOMES = {
-    "errors": ("CoarticError", "NotApplicableError", "SolutionError", "TaskError"),
+    "errors": (
+        *("CoarticError", "MissingExtraError", "NotApplicableError"),
+        *("SolutionError", "TaskError"),
+    ),
     "learner.conditions": ("CONDITIONS", "ABLATIONS", "INFORMED", "ExplorationCondition"),
     "learner.learning": ("learn", "learn_many"),
     "learner.learning_run": ("LearningRun",),

@@ -29,7 +29,6 @@ from coartic import (
     corrective_trial,
     estimates,
     execute,
-    gym,
     learn,
     load_task,
     movements_of,
@@ -480,7 +479,6 @@ def as_lists(value):
     [
         *CALLS,
         (other_tasks, {"scores": {"a": [np.array([1.0, 2.0])] * 3}}),
-        (gym.compare, {"rewards": {"a": np.array([[-2.0]])}, "best": np.array([[-1.0]])}),
     ],
 )  # fmt: skip
 def test_arrays_may_be_lists(call, usual):
@@ -550,7 +548,6 @@ def test_no_wrong_question_to_a_study_gets_an_error_of_python(name, traced):
         (lambda: analysis.number(np.timedelta64(3)), "value is '3 generic time units'; it should"),
         (lambda: Task(goals=[(3.0, np.True_)]), r"goals\[0\]\[1\] is True; it should be a number"),
         (lambda: ROBOT.jacobian([[np.True_, 1.0]], "right"), "real numbers, without True or False"),
-        (lambda: gym.compare({"best known": [[-2.0]]}, [[-1.0]]), "a policy is called 'best known"),
         (lambda: movements_of("RRR", np.zeros((2, 10))), "a row for each of the 3"),
         (lambda: Robot(links=(1, 1)), "Robot: links is an unknown key; did you mean 'left_l"),
         (
