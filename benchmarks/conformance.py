@@ -26,7 +26,7 @@ from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.internal.text import counted
 from coartic.method import METERED
-from coartic.motion.solution import goals_without_target, hint_of
+from coartic.motion.solution import goals_without_target
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, in_words
 from coartic.runs.record import Outcome, Run
@@ -128,12 +128,7 @@ def _laws_of_runs(
     asked += f", which have no target: is this meant{few}?" if asked else ""
     yield _law(
         "solution",
-        chain(
-            (f"on {task}: {each.status}: {each.reason}" for task, each in first.items()
-             if each.reason),
-            (f"on {task}: {hint}" for task, solution in solutions.items()
-             if (hint := hint_of(solution.movements))),
-        ),
+        [f"on {task}: {each.status}: {each.reason}" for task, each in first.items() if each.reason],
         f"executed and scored on {rewards}{checked_with}{asked}",
     )  # fmt: skip
     by_seed = [*changes("other seed", "declared not to be stochastic, but another seed on {}")]

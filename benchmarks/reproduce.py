@@ -15,7 +15,6 @@ from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import plain
 from coartic.method import Meter
-from coartic.motion.solution import hint_of
 from coartic.pictures.trajectories import Trajectory, trajectory
 from coartic.runs.plan import Job
 from coartic.runs.record import EARLIER, LATE, PARTS, Run, too_long
@@ -130,11 +129,9 @@ def repeats_of(run: Run) -> list[Job]:
 
 def doubts_of(run: Run, repeats: Sequence[Run]) -> Iterator[str]:
     """Yield sentences on doubts about a method, from one of its runs and the runs of
-    :func:`repeats_of` in any order: angles in degrees, hidden state, use of the seed."""
+    :func:`repeats_of` in any order: hidden state, use of the seed."""
     name, task = run.cell.method.name, run.cell.task.name
     advice = f"see: coartic check {name}"
-    if hint := hint_of(run.solution.movements):
-        yield f"{name} on {task}: {hint}"
     again, *others = sorted(repeats, key=lambda each: each.number)
     when = AFTER_ANOTHER if others else "with the same seed"
     for change in compare_runs(run, again)[:1]:

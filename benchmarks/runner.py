@@ -30,6 +30,7 @@ from coartic.benchmarks.reproduce import (
 )
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
+from coartic.benchmarks.time_left import TimeLeft
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
@@ -49,9 +50,9 @@ _LEAST_BATCH = 8
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
 
-@dataclass(repr=False)
+@dataclass
 class Progress:
-    """The progress of a plan in a folder; its representation is a sentence."""
+    """The progress of a plan in a folder."""
 
     folder: Path
     total: int
@@ -74,14 +75,8 @@ class Progress:
     runs, by the seed of their suite."""
     wall_s: float = 0.0
     """Wall time of the call, s; 0 until it ends."""
-    waiting: Counter[str] = field(default_factory=Counter)
-    """Runs still to perform, with repeats, by method."""
-    took: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
-    """Wall time of the runs performed by this call, by method, s."""
-    timed: Counter[str] = field(default_factory=Counter)
-    """Number of runs with a known wall time, by method."""
-    workers: int = 1
-    """Number of processes that perform runs at once; 1 if it is not known."""
+    time_left: TimeLeft = field(default_factory=TimeLeft)
+    """Estimate of the time that the runs to perform take."""
     repeats: int = 0
     """Runs still to perform that only show whether results of own methods repeat."""
 
@@ -92,14 +87,10 @@ class Progress:
         self.crashed += status == "crashed"
 
     def finish(self, run: Run) -> None:
-        """Count a run that has just been performed, by its status and method, with its time."""
-        method, seconds = run.cell.method.name, run.outcome.times.wall_s
+        """Count a run that has just been performed."""
         self.done += 1
         self.count(run.outcome.status)
-        self.waiting[method] -= 1
-        if seconds is not None:
-            self.timed[method] += 1
-            self.took[method] += seconds
+        self.time_left.finish(run)
 
     @property
     def unused(self) -> Iterator[str]:
@@ -111,18 +102,7 @@ class Progress:
                 changed = "from before a change of its code, or of what this imports or reads"
             yield f"Not used: {counted(count, 'run')} of {method} {changed}. They are kept."
 
-    @property
-    def time_left(self) -> float:
-        """Seconds that the runs to perform will take, from the mean times of performed runs; NaN
-        until a quarter is done, and if no time is known."""
-        coming = +self.waiting
-        if not self.timed or self.done < coming.total() / 3:
-            return math.nan
-        mean = sum(self.took.values()) / self.timed.total()
-        each = {method: self.took[method] / count for method, count in self.timed.items()}
-        return sum(each.get(m, mean) * count for m, count in coming.items()) / self.workers
-
-    def __repr__(self) -> str:
+    def __str__(self) -> str:
         """Return a sentence: how many runs are there, after which time, how many failed, and the
         folder."""
         minutes, seconds = divmod(self.wall_s, 60)
@@ -259,11 +239,9 @@ def perform(
         progress.others[plan[0].seed] -= progress.stale.total()
         progress.marks = store.marks()
         missing = _missing_jobs(plan, store, progress)
-        for job in missing:
-            progress.waiting[job.cell.method.name] += len(job.numbers)
-        for name in {job.cell.method.name for job in missing if not job.cell.method.is_ours}:
-            progress.waiting[name] += 2  # which show whether its results repeat
-        progress.workers = executor.workers
+        own = {job.cell.method.name: job for job in missing if not job.cell.method.is_ours}
+        repeats = [replace(job, numbers=job.numbers[:1]) for job in own.values()]
+        progress.time_left.expect([*missing, *repeats])
         tell(None)
         jobs, chosen = _divided(missing, executor.workers), dict[str, Run]()
         while jobs:
@@ -284,13 +262,13 @@ def perform(
             jobs = alone
         again, doubts = defaultdict[str, list[Run]](list), list[str]()
         repeats = [job for run in chosen.values() for job in repeats_of(run)]
-        progress.waiting = Counter(job.cell.method.name for job in repeats)
-        progress.repeats, progress.workers = len(repeats), min(executor.workers, Local().workers)
+        progress.time_left.expect(repeats)
+        progress.repeats = len(repeats)
         for job in repeats[:1]:
             tell(job.cell)
-        for run in perform_in_order(repeats, progress.workers):
+        for run in perform_in_order(repeats, min(executor.workers, Local().workers)):
             again[run.cell.method.name].append(run)
-            progress.waiting[run.cell.method.name] -= 1
+            progress.time_left.finish(run)
             progress.repeats -= 1
             tell(run.cell)
         for name, run in chosen.items():

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from coartic.learner.learning import learn, learn_many
     from coartic.learner.learning_run import LearningRun
     from coartic.method import BudgetError, MethodError, UndeclaredError
-    from coartic.method.optimisers import Objective, Optimiser, objective, problems
+    from coartic.method.optimisers import Objective, Optimiser, objective
     from coartic.model import PAPER, MotionModel
     from coartic.motion.movement import Correction, MoveResult, correct, move
     from coartic.motion.solution import (
@@ -82,7 +82,6 @@ __all__ = [
     "movements_of",
     "objective",
     "parse_task",
-    "problems",
     "trajectory",
 ]
 
@@ -101,7 +100,7 @@ _HOMES = {
         *("Execution", "Movement", "corrective_trial", "execute"),
         *("hand_sequences", "initial_hands", "movements_of"),
     ),
-    "method.optimisers": ("Objective", "Optimiser", "objective", "problems"),
+    "method.optimisers": ("Objective", "Optimiser", "objective"),
     "robot": ("Arm", "Hand", "Robot"),
     "tasks.catalogue": ("builtin_tasks", "load_task"),
     "tasks.task": ("Provenance", "Start", "Task", "parse_task"),

@@ -381,12 +381,6 @@ def test_a_learner_without_a_trial_left_says_so():
         method().solve(session)
 
 
-def test_a_first_solution_in_degrees_is_hinted_at():
-    start = movements_of("RRR", [[0, 0, 0, 0, 0, 0, 90, 0, 0, 0]] * 3)
-    with pytest.warns(UserWarning, match="has the angle 90; angles are in rad"):
-        learn("ascending", "EC1", seed=0, trials=1, start=start)
-
-
 FAILED_AT_ONCE = MotionModel(max_iterations=60)
 
 

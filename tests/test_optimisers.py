@@ -6,7 +6,6 @@ import multiprocessing
 import pickle
 import re
 import runpy
-import warnings
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
@@ -208,9 +207,13 @@ def test_runs_in_the_format_of_iohprofiler(monkeypatch, tmp_path):
     import iohinspector
 
     monkeypatch.chdir(tmp_path)
-    costs = coartic.problems("one-armed/v1", count=3, budget=60)
-    monkeypatch.setattr(coartic, "problems", lambda *_, **__: costs)
-    exec((EXAMPLES / "ioh_logger.py").read_text("utf-8"), {})
+    costs = []
+    monkeypatch.setattr(
+        coartic, "objective", lambda *a, **b: costs.append(objective(*a, **b)) or costs[-1]
+    )
+    program = (EXAMPLES / "ioh_logger.py").read_text("utf-8")
+    exec(program.replace("range(10)", "range(3)").replace("budget=2000", "budget=60"), {})
+    assert len(costs) == 3
     manager = iohinspector.DataManager()
     manager.add_folder("ioh-pycma")
     assert manager.overview["evals"].sum() == sum(cost.evaluations for cost in costs)
@@ -253,24 +256,14 @@ def test_what_was_found_cannot_be_set():
             setattr(cost, name, 0)
 
 
-def test_names_of_columns_are_not_left_out():
+def test_frames_are_points_in_the_order_of_their_columns():
     cost = objective("ascending")
-    frame = pd.DataFrame([cost.x0], columns=[f"x{n}" for n in range(cost.dim)])
-    for call, points in ((cost.many, frame), (cost, frame.iloc[0]), (cost.movements, frame.T)):
-        with pytest.raises(ValueError, match="has names of pandas: give .*to_numpy"):
-            call(points)
-    assert cost.many(frame.to_numpy()).shape == (1,)
-
-
-def test_points_in_degrees_get_a_hint():
-    """As targets of a solution do; points in rad get none, however costly."""
-    cost = objective("ascending")
-    for call in (cost, lambda x: cost.many([cost.x0, x])):
-        with pytest.warns(UserWarning, match="the target has the angle .* Did you mean"):
-            call(np.rad2deg(cost.x0))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        cost(cost.x0 + 15.0)
+    points = cost.x0 + 0.01 * np.arange(3)[:, None]
+    frame = pd.DataFrame(points, columns=[f"x{n}" for n in range(cost.dim)])
+    due = cost.many(points).tolist()
+    assert cost.many(frame).tolist() == cost(frame.T).tolist() == due
+    assert cost(frame.iloc[2]) == due[2]
+    assert -execute("ascending", cost.movements(frame.iloc[2])).reward == due[2]
 
 
 def test_the_first_program_of_the_page(capsys):
@@ -365,9 +358,8 @@ def test_history_and_evaluations_to_are_what_the_returned_costs_say(threads, siz
 def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
     problem = objective(FOUR, budget=17)
     problem(problem.x0)
-    again = problem.fresh()
-    assert (again.evaluations, again.dim) == (0, problem.dim)
-    again(again.x0)
+    with pytest.raises(BudgetError):
+        problem(problem.x0)
     few = "budget is 15; to choose among the hand sequences .* takes 16 trials: give more, or say"
     for budget, words in ((0, "budget is 0; it must be a whole number from 1"), (15, few)):
         with pytest.raises(ValueError, match=words):
@@ -399,22 +391,9 @@ def test_a_trial_that_fails_is_not_the_best_where_others_take_longer():
     assert np.isnan(cost.best_x).all()
 
 
-def test_instances_of_a_family():
-    test, tuned = (
-        coartic.problems("one-armed/v1", split=split, count=3) for split in ("test", "development")
-    )
-    assert [p.task.name for p in test] == [f"one-armed/v1/i00{n}" for n in range(3)]
-    assert [p.task.split for p in tuned] == ["development"] * 3
-    with pytest.raises(ValueError, match="split is 'fresh'; it should be 'test' or 'development'"):
-        coartic.problems("one-armed/v1", split="fresh")
-
-
 def test_a_method_cannot_see_its_task():
     cost = Objective(Session(FOUR, 0, OPTIMISER_INFORMATION))
     for ask in ("task", "best_known", "proven"):
         with pytest.raises(UndeclaredError, match="cannot see its task"):
             getattr(cost, ask)
-    with pytest.raises(UndeclaredError):
-        cost.fresh()
-    assert "best known" not in repr(cost)
     assert cost.hand_sequences == coartic.hand_sequences(FOUR)

@@ -274,7 +274,6 @@ DOUBTS = {
     "test/random": "another result on ascending with the same seed after another run",
     "test/remembers": "another result on ascending with the same seed after another run",
     "test/lucky": "declared not to be stochastic, but another seed gives another result",
-    "test/degrees": "on ascending: goal 1: the target has the angle 90",
     "test/draws": "",
 }
 

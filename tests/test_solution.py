@@ -1,6 +1,5 @@
 """Executing and scoring solutions, whoever made them."""
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +19,6 @@ from coartic import (
     movements_of,
     trajectory,
 )
-from coartic.method import Information, Session
 from coartic.motion.trial import reach_kernel
 from coartic.runs.record import MOST_STEPS, execute_all
 from tests.support.strategies import make_trials, posture, tiny_task
@@ -105,20 +103,6 @@ def test_a_base_that_a_solver_moves_a_little_is_held():
     assert off[0, 1]
     with pytest.raises(SolutionError, match=r"base in y, which is locked, by 0\.02: entry 1 must"):
         execute(task, movements_of("LRLR", exact + 0.02))
-
-
-def test_targets_in_degrees_are_hinted_at():
-    """Which changes no result; targets that wind up no more than a joint can are none."""
-    task = load_task("ascending")
-    targets = corrective_trial(task, "RRR").configurations
-    with warnings.catch_warnings(action="error"):
-        due = execute(task, movements_of("RRR", targets))
-        session = Session(task, 0, Information)
-        degrees = np.hstack([targets[:, :2], np.degrees(targets[:, 2:])])
-        taken = session.trial(movements_of("RRR", degrees))
-    with pytest.warns(UserWarning, match=r"has the angle .* rad\. Did you mean .*° = 0\.\d{3}\?"):
-        execution = execute(task, movements_of("RRR", degrees))
-    assert execution.reward == taken.reward < due.reward
 
 
 def test_a_goal_is_hit_by_one_hand():

@@ -519,10 +519,6 @@ def test_no_wrong_question_to_a_study_gets_an_error_of_python(name, traced):
         (lambda: Provenance("chosen"), "Provenance takes arguments by name, such as status=..."),
         (lambda: Robot(*[(1.0,)] * 9), "Robot: .*; it takes 5 arguments"),
         (lambda: mean([1.0], [2.0]), "mean: it takes 1 argument$"),
-        (
-            lambda: coartic.problems("two-armed/v1", "test", 1, 0.5),
-            "problems: half_width is given without its name; write half_width=...",
-        ),
         (lambda: reach_goals(3, [TASK.q0], [0], [], 1.0), "it should be an instance of Robot"),
         (lambda: Task(goals=[(3.0, 2.0)], q0=TASK.q0 * np.nan), "Task: q0 is .*; needed are fin"),
         (

@@ -1,8 +1,7 @@
 """The command line ``coartic``.
 
-Each command is a function of :mod:`~coartic.cli.run`, :mod:`~coartic.cli.read` or
-:mod:`~coartic.cli.draw`. A command imports most packages only when it is called, so that help and
-completion are fast.
+Each command is a function of :mod:`~coartic.cli.run` or :mod:`~coartic.cli.read`. A command imports
+most packages only when it is called, so that help and completion are fast.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ import typer
 from typer.core import TyperCommand
 
 import coartic
-from coartic.cli import draw, read, run
+from coartic.cli import read, run
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, error_line, plain
@@ -68,14 +67,14 @@ class _Command(TyperCommand):
 
 
 COMMANDS = (
-    (draw.play, "two-armed-1 --out play.html"),
+    (read.play, "two-armed-1 --out play.html"),
     (run.list_, "comparison"),
     (run.run, "comparison --methods EC1,CMA-ES --tasks ascending --runs 5 --out results/mine"),
     (read.report, "results/quick --for-paper"),
     (read.verify, "results/quick --run 1a2b3c"),
     (run.new, "my-search"),
     (run.check, "my-search --method-file my_search.py"),
-    (draw.draw, "results/quick --run 1a2b3c --initial --out race.gif"),
+    (read.draw, "results/quick --run 1a2b3c --initial --out race.gif"),
     (read.cite, "results/comparison --analysis"),
 )
 """The commands in the order of the help, each with the arguments of its example."""

@@ -6,7 +6,7 @@ import keyword
 import os
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,7 +16,7 @@ import typer
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.limits import check_limits
-from coartic.internal.text import did_you_mean, unknown
+from coartic.internal.text import unknown
 
 if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry
@@ -97,55 +97,36 @@ def names_in(text: str | None) -> list[str]:
     return [] if text is None else [name.strip() for name in text.split(",")]
 
 
-def _id_named(name: str, names: Mapping[str, str]) -> str:
-    """Return the id for a name or id in any case, an id before a name; an unknown name is returned
-    unchanged. ``names`` has the name that people use for each id, or an empty text."""
-    called = {words.casefold(): each for each, words in names.items() if words}
-    ids = {each.casefold(): each for each in names}
-    return name if name in names else (called | ids).get(name.casefold(), name)
-
-
-def tasks_meant(names: Sequence[str]) -> list[str]:
-    """Return the ids of shipped tasks from ids or titles in any case; other names stay
-    unchanged."""
-    from coartic import builtin_tasks, load_task
-
-    known = {name: load_task(name).label for name in builtin_tasks()}
-    return [_id_named(name, known) for name in names]
-
-
-def method_names(registered: Registry) -> Mapping[str, str]:
-    """Return the name that people use for each registered method, by id, such as ``CMA-ES``, or an
-    empty text if it has none; conditions, such as ``EC4``, are ids, too, without such a name."""
+def method_titles(registered: Registry) -> dict[str, str]:
+    """Return the title of each registered method by id, such as ``CMA-ES``; empty where it is the
+    id."""
     from coartic.analysis.methods import title_of
-    from coartic.learner.conditions import EVERY_CONDITION
 
-    names = {name: title_of(name) for name in registered}
-    named = {name: words if words != name else "" for name, words in names.items()}
-    return named | dict.fromkeys(EVERY_CONDITION, "")
+    titles = {name: title_of(name) for name in registered}
+    return {name: title if title != name else "" for name, title in titles.items()}
 
 
 def methods_meant(names: Sequence[str], registered: Registry, *, expand: bool = True) -> list[str]:
-    """Return the ids of registered methods from ids, names and wildcards (``optimum/*``) that users
-    write; without ``expand`` a wildcard for several methods is returned unchanged. Raises
-    CoarticError for an unknown name."""
+    """Return the ids of the methods that users name by ids, titles, conditions (``EC4``) and
+    wildcards (``optimum/*``); without ``expand`` a wildcard for several methods is returned
+    unchanged. Raises CoarticError for an unknown name."""
     from coartic.benchmarks.registry import methods_named
     from coartic.benchmarks.suites import check_kind
+    from coartic.learner.conditions import EVERY_CONDITION
 
-    ids, meant = method_names(registered) if names else {}, list[str]()
+    titles, meant = method_titles(registered) if names else {}, list[str]()
+    ids = {title: name for name, title in titles.items() if title}
     for name in names:
         try:
-            found = methods_named(_id_named(name, ids), registered)
-            meant += found if expand or len(found) == 1 else [name]
+            found = methods_named(ids.get(name, name), registered)
         except CoarticError:
             check_kind(name)  # a thing of another kind has its own sentence
             if os.path.isfile(file := file_name(name)):
                 words = f"method {name!r} is not known: add --method-file {file}"
                 raise CoarticError(f"{words}, if it is defined there") from None
-            every = [*ids, *filter(None, ids.values())]
-            if did_you_mean(name, every):
-                raise CoarticError(unknown("method", name, every)) from None
-            raise
+            known = [*titles, *EVERY_CONDITION, *ids]
+            raise CoarticError(unknown("method", name, known)) from None
+        meant += found if expand or len(found) == 1 else [name]
     return meant
 
 

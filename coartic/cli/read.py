@@ -1,13 +1,16 @@
-"""Commands that read stored runs."""
+"""Commands that read and draw: reports, checks and citations of stored runs; pictures, films, and
+the page to play with."""
 
 from __future__ import annotations
 
 import sys
+import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from shlex import quote
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -80,76 +83,43 @@ def report(
         sys.exit(1)
 
 
-def _with_id(name: str, row: Mapping[Any, Any]) -> str:
-    """Return the name of a method; for a method from a file, unless the name begins with its id,
-    the id, a colon and the name: ``my-search: Random steps``. ``row`` of :attr:`.Study.methods` has
-    ``base``, the id, and ``built_in``."""
-    has_id = row["built_in"] or name.startswith(row["base"])
-    return name if has_id else f"{row['base']}: {name}"
-
-
-def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> None:
-    """Print the ranking of a study as a table, then pairs of a word and a text.
-
-    The table has ranked methods with the smallest gaps (all if a parameter is varied), the learner
-    and random search; and, ranked or not, if they have a gap, methods from files, and methods of
-    the labels ``asked``, except conditions that a ranked row joins. Settings and ablations of
-    built-in methods with a gap are left out. The pairs say why methods are not ranked, what was
-    found on coarticulation and cost, how runs differ from the paper's, how many failed, and
-    ``more``.
-    """
-    from coartic.analysis.method_frame import without_settings
-    from coartic.analysis.report.about import RUNS, finding, leading, limits
-    from coartic.analysis.sections import SECTIONS
+def say_ranking(study: Study, asked: Iterable[str], folder: Path) -> None:
+    """Print the ranking of a study, who is not ranked and why, to what the gaps are, why runs
+    failed, and where ``coartic report`` writes the page of ``folder``. ``asked`` has the labels of
+    methods that the command named."""
+    from coartic.analysis.report.about import limits
     from coartic.analysis.standings import board, common_tasks, not_ranked, reference, shown_name
     from coartic.analysis.words import interval, listed, number
-    from coartic.learner.learning import TRIALS
 
-    in_order = board(study).query("ranked")
-    joined = {part for parts in in_order.parts if len(parts) > 1 for part in parts}
-    also = frozenset(asked) - joined  # which the row of both conditions has
-    every = board(study, also)
-    is_shown = every.index.isin(without_settings(every).index) | ~every.built_in.astype(bool)
-    rows = every[is_shown].reset_index(names="method")
-    named = [row["method"] for row in leading(rows[rows.ranked])]
-    first = rows.method[rows.ranked][: None if study.varied[0] else 12 - len(named)]
-    rows = rows[rows.method.isin({*first, *named, *also}) | ~rows.built_in]
-    to = reference(study, common_tasks(study))
-    if study.question[0]:
-        say(": ".join(study.question))
+    also = frozenset(asked)
+    ranked, what = board(study, also).query("ranked"), limits(study)
     say_table(
-        ("method", f"gap to the {to} (%)", "share of the gain (%)", "runs"),
+        ("method", "gap (%)", "share of the gain (%)", "runs"),
         [
-            (_with_id(shown_name(study, row["method"]), row), interval(row, "gap", scale=100),
-             interval(row, "share", 0, 100), number(row["runs"]))
-            for row in rows.to_dict("records")
+            (
+                shown_name(study, str(method)),
+                interval(row, "gap", scale=100),
+                interval(row, "share", 0, 100),
+                number(row["runs"]),
+            )
+            for method, row in ranked.iterrows()
         ],
-    )  # fmt: skip
-    pairs = [("Answer", line) for line in finding(study, SECTIONS[0]) if study.varied[0]][:1]
-    pairs += [("Not ranked", sentence) for sentence in not_ranked(study, also)]
-    shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
-    pairs += [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
-    what = limits(study)
-    unlike = [f"{counted(what['few'], 'run')} of a task, not {RUNS}"] * bool(what["few"])
-    unlike += [f"{number(n)} trials a run, not {number(TRIALS)}" for n in what["trials"]]
-    if unlike:
-        pairs.append(("Unlike the paper", "; ".join(unlike)))
+    )
+    pairs = [("Not ranked", sentence) for sentence in not_ranked(study, also)]
+    if len(ranked):
+        pairs.append(("Reference", f"gaps are to the {reference(study, common_tasks(study))}"))
     if what["own"]:
-        text = (
-            f"Of {listed(what['own'])} only the best of this folder is known: gaps there are to it"
-        )
+        known = f"of {listed(what['own'])} only the best reward of this folder is known"
         again = "repeat the command with optimum/search among its --methods"
-        pairs.append(("Reference", f"{text}. To search for the optimum, {again}"))
+        pairs.append(("", f"{known}; to search for the optimum, {again}"))
     if what["unknown"]:
-        where = f"on {listed(what['unknown'])}, where fewer than two methods have a solution"
-        pairs.append(("No gaps", where))
-    if what["earlier"]:
-        pairs.append(("Of 4.0.0", f"runs of {', '.join(what['earlier'])}"))
-    pairs += [("‡", sentence) for sentence in what["late"]]
+        pairs.append(("", f"no reward is known of {listed(what['unknown'])}"))
     if what["failed"]:
         failed = f"{what['failed']} of {counted(what['runs'], 'run')}: {'; '.join(what['reasons'])}"
         pairs.append(("Failed", failed))
-    say_pairs([*pairs, *more])
+    pairs += [("‡", sentence) for sentence in what["late"]]
+    page = folder / "report" / "report.html"
+    say_pairs([*pairs, ("Report", f"coartic report {quote(str(folder))} writes {page}")])
 
 
 def verify(
@@ -274,3 +244,177 @@ def cite(
         declared = {job.cell.method.name: job.cell.method for job in plan}
         text = bibliography(declared, analysis=analysis, environment=made_with, imports=imports)
     say(*text.rstrip("\n").split("\n"))
+
+
+_PICTURED = 12
+"""Most tasks of a picture."""
+
+
+def draw(
+    tasks: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="TASK",
+            help="Tasks, task files, or long/v1/i000..i003; with --run a results folder.",
+        ),
+    ] = None,
+    run: Annotated[
+        list[str] | None, given.option("ID", "A run to film; two are side by side.", "--run")
+    ] = None,
+    initial: Annotated[
+        bool, typer.Option("--initial", help="Film the corrective process alone next to the run.")
+    ] = False,
+    recording: Annotated[
+        Path | None,
+        given.file_or_folder("FILE", "Recorded hits or markers (CSV) to draw.", "--recording"),
+    ] = None,
+    ticks_per_unit: Annotated[
+        float | None,
+        given.within("--ticks-per-unit", "Ticks in a unit of time of the recording.", 1e-9, 1e9),
+    ] = None,
+    width: Annotated[
+        int | None, given.within("--width", "Width of the film in pixels; 800.", 200, 3840)
+    ] = None,
+    out: Annotated[
+        Path | None,
+        given.file_or_folder(
+            "FILE", "Picture (.png, .svg, .pdf), or a folder; of runs a film (.gif, .mp4)."
+        ),
+    ] = None,
+    replace: given.Replace = False,
+) -> None:
+    """Draw tasks (a folder also gets their files), film runs, or draw a recording."""
+    if recording:
+        if run or initial or width is not None:
+            raise CoarticError("--run, --initial or --width has no effect with --recording")
+        if len(tasks := tasks or []) != 1:
+            raise CoarticError("--recording needs one task: coartic draw TASK --recording FILE")
+        return _draw_recording(tasks[0], recording, ticks_per_unit, out, replace)
+    if ticks_per_unit is not None:
+        raise CoarticError("--ticks-per-unit has no effect without --recording")
+    if run:
+        if len(tasks := tasks or []) != 1:
+            raise CoarticError("--run needs one results folder: coartic draw FOLDER --run ID")
+        film = out or Path("film.gif")
+        return _film(folder_named(tasks[0]), run, film, initial, width or 800, replace)
+    if initial or width is not None:
+        raise CoarticError("--initial or --width has no effect without --run, which names a run")
+    from coartic import builtin_tasks, load_task
+    from coartic.internal.files import check_ending, check_output, publish, write_output
+    from coartic.runs.plan import tasks_by_name
+    from coartic.tasks.families import named_by
+    from coartic.tasks.task import task_text
+
+    for folder in [name for name in tasks or () if Path(name).is_dir()]:
+        raise CoarticError(
+            f"{folder} is a folder: coartic draw {folder} --run ID films a run; coartic list "
+            f"{folder} has the ids"
+        )
+    out = out or Path("tasks.svg")
+    if replace and not out.suffix:
+        raise CoarticError("--replace has no effect on a folder, whose pictures are written again")
+    names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
+    chosen = [*tasks_by_name(map(load_task, names)).values()]
+    from coartic.analysis.figures.plot import FORMATS, picture  # slow imports, after the checks
+    from coartic.analysis.sections.tasks import picture_of_tasks
+
+    if out.suffix:
+        check_ending(out, FORMATS)
+        check_output(out, replace=replace)
+    drawing = picture_of_tasks(chosen[:_PICTURED])
+    if out.suffix:
+        write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
+    else:
+        files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
+        files |= {"tasks.svg": picture(drawing, ".svg")}
+        publish(out, files)
+    drawn = f", of which {_PICTURED} are drawn" if len(chosen) > _PICTURED else ""
+    return say(f"{out}: {counted(len(chosen), 'task')}{drawn}.")
+
+
+def _draw_recording(
+    task_name: str, recording: Path, ticks_per_unit: float | None, out: Path | None, replace: bool
+) -> None:
+    """Write a picture of a recording. Raises CoarticError if the recording cannot be read, and,
+    after the picture is written, if its hits do not fit the task."""
+    from coartic import load_task
+    from coartic.analysis.figures.plot import FORMATS, picture
+    from coartic.analysis.recordings import (
+        draw_recording,
+        hits_from_markers,
+        is_of_markers,
+        read_hits,
+    )
+    from coartic.internal.files import check_ending, check_output, write_output
+
+    out = out or Path("recording.svg")
+    check_ending(out, FORMATS)
+    check_output(out, replace=replace)
+    task = load_task(task_name)
+    if has_markers := is_of_markers(recording):
+        drawing = draw_recording(None, task, recording, ticks_per_unit=ticks_per_unit)
+    else:
+        drawing = draw_recording(recording, task, ticks_per_unit=ticks_per_unit)
+    write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
+    if has_markers:
+        hits = hits_from_markers(recording, task, ticks_per_unit=ticks_per_unit or 100.0)
+    else:
+        hits = read_hits(recording, task, ticks_per_unit=ticks_per_unit or 1.0)
+    trials = counted(len(hits.drop_duplicates(["subject", "trial"])), "trial")
+    say(f"{out}: {counted(len(hits), 'hit')} in {trials}.")
+
+
+def _film(
+    folder: Path, run_ids: Sequence[str], out: Path, initial: bool, width: int, replace: bool
+) -> None:
+    """Write a film (.gif, .mp4), ``width`` pixels wide (MP4: rounded down to even), of one or two
+    runs of a results folder side by side, or, with ``initial``, of one run next to the corrective
+    process alone. Raises CoarticError for more or unknown runs, and if the film cannot be made or
+    written."""
+    from coartic import corrective_trial, initial_hands, trajectory
+    from coartic.analysis.methods import title_of
+    from coartic.benchmarks.reproduce import find_run, trajectory_of
+    from coartic.pictures.film import write_film
+
+    if len(run_ids) + initial > 2:
+        raise CoarticError("a film shows at most two runs, or one run with --initial")
+    movements = []
+    for run_id in run_ids:
+        stored = find_run(run_id, folder)
+        movement = trajectory_of(stored)
+        title = f"{movement.task.label}\n{title_of(stored.cell.method)}, run {stored.number}"
+        movements.append((title, movement))
+    if initial:
+        on = movements[0][1].task
+        initial_solution = trajectory(on, corrective_trial(on, initial_hands(on)).movements)
+        movements.insert(0, (f"{on.label}\ncorrective process alone", initial_solution))
+    frames, ticks_a_second = write_film(movements, out, width=width, replace=replace)
+    say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
+
+
+def play(
+    task: Annotated[
+        str | None,
+        typer.Argument(metavar="TASK", help="Task to begin with, or a task file (.toml)."),
+    ] = None,
+    out: given.Out = None,
+    show: Annotated[bool, typer.Option("--open/--no-open", help="Open it in the browser.")] = True,
+    replace: given.Replace = False,
+) -> None:
+    """Write a page on which goals can be moved and the learner learns; open it in the browser."""
+    import webbrowser
+
+    from coartic import load_task
+    from coartic.internal.files import check_ending, check_output, write_output
+    from coartic.play.page import play_page
+
+    if replace and out is None:
+        raise CoarticError("--replace has no effect without --out")
+    if out is not None:
+        check_ending(out, [".html"])
+        check_output(out, replace=replace)
+    page = play_page(*map(load_task, [task] if task else [])).encode()
+    out = out or Path(tempfile.mkdtemp(prefix="coartic-"), "play.html")
+    write_output(out, page, replace=replace)
+    opened = show and webbrowser.open(out.absolute().as_uri())
+    say(f"{out}: {len(page) // 1000} kB" + ("." if opened else "; open it in a browser."))

@@ -113,7 +113,7 @@ def run(
         if include and not names:  # the user's own methods alone
             names = [name for name, info in registered.items() if info.where.endswith(".py")]
         request = request_for(
-            tasks=given.tasks_meant(given.names_in(tasks)),
+            tasks=given.names_in(tasks),
             methods=names,
             family_files=family_file or (),
             **{"runs": runs, "trials": trials, "seed": seed},
@@ -133,7 +133,7 @@ def run(
         part = f"--include {quote(str(out))}, with all other parts, joins them"
         say_pairs([("Next", f"{out} has runs {runs[0]} to {runs[-1]}: {part}")])
     else:
-        say_ranking(load(out), labels, ("Next", f"coartic report {quote(str(out))}"))
+        say_ranking(load(out), labels, out)
     if progress.crashed:
         sys.exit(1)
 
@@ -153,7 +153,7 @@ def list_(
 
     registered, families = registry(method_file or []), shipped_families()
     if name is None:  # all names, to fit one screen
-        names = given.method_names(registered)
+        titles = given.method_titles(registered)
         return say_pairs(
             [
                 ("Tasks", ""),
@@ -162,11 +162,10 @@ def list_(
                 ("Suites", ""),
                 *((f"  {suite}", content.title) for suite, content in suites().items()),
                 ("Methods", ""),
-                *((f"  {method}", names[method]) for method in registered),
+                *((f"  {method}", titles[method]) for method in registered),
                 ("More", "coartic list NAME, such as two-armed-1, comparison or CMA-ES"),
             ]
         )
-    (name,) = given.tasks_meant([name])
     if name.endswith(".toml"):
         check_kind(name, "suite", "task", "family")
     kind, methods = kind_of(name), list[str]()
@@ -282,11 +281,10 @@ def check(
     from coartic.benchmarks.suites import check_kind
     from coartic.tasks.task import address_of
 
-    (task,) = given.tasks_meant([subject])
-    if task in builtin_tasks() or address_of(task):
+    if subject in builtin_tasks() or address_of(subject):
         raise CoarticError(
-            f"{task} is a task, not a method. `coartic draw {task} --out FOLDER` writes its file, "
-            "which can be checked."
+            f"{subject} is a task, not a method. `coartic draw {subject} --out FOLDER` writes its "
+            "file, which can be checked."
         )
     registered = registry(method_file or [])
     if subject.endswith(".toml"):

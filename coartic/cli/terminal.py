@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import codecs
+import math
 import os
 import shutil
 import sys
 import textwrap
-import threading
 import time
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, TextIO
 
 from coartic.errors import CoarticError
-from coartic.internal.text import counted, one_line, plain
+from coartic.internal.text import counted, one_line
 
 if TYPE_CHECKING:
     from coartic.benchmarks.runner import Progress
@@ -87,94 +87,114 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 class Display:
-    """Progress of a command on standard error, such as runs done, failures and time left. On a
-    terminal one line changes; elsewhere a line appears about every ten seconds (:meth:`show`).
-    What takes longer is shown again, with its time so far."""
+    """What a command is doing, on standard error: a line that changes on a terminal; elsewhere a
+    line at most every ten seconds (:meth:`show`)."""
 
     EVERY_S = 10.0
 
     def __init__(self) -> None:
         self.others = ""
         """Number and seeds of the runs of earlier commands in the folder, in words."""
-        self._is_live = sys.stderr.isatty()
-        self._doing = self._end = ""
-        self._since = self._last = time.monotonic()  # begin of what is done, and last line
-        self._over, self._one_line = threading.Event(), threading.Lock()
+        self._doing: Callable[[], str] = str
+        self._last = time.monotonic()
+        self._bar: Any = None
 
     def __enter__(self) -> Display:
-        threading.Thread(target=self._remind, daemon=True).start()
+        if sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
+            self._bar = _progress_bar(lambda: self._doing())
+            self._bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self.line()
+        if self._bar:
+            self._bar.stop()
 
-    def show(self, doing: str, *, at_once: bool = False) -> None:
-        """Note what the command is ``doing`` from now on, and print it: on a terminal or with
-        ``at_once`` always, else if ten seconds have passed since the last such line or the
-        beginning. The time so far goes on where both texts begin with one word and a colon."""
-        now, (before, same, _) = time.monotonic(), self._doing.partition(":")
-        if not (same and doing.startswith(f"{before}:")):
-            self._since = now
-        self._doing = doing
-        if self._is_live or at_once or now - self._last >= self.EVERY_S:
-            self._print(doing)
+    def show(self, doing: str) -> None:
+        """Show what the command is doing from now on; without a terminal only if ten seconds have
+        passed since the last such line or the beginning."""
+        self._show(lambda: doing)
 
     def line(self, *texts: str) -> None:
-        """Print lines on stderr, below the line of progress, which stays as it is."""
-        with self._one_line:
-            say("", stream=sys.stderr, end=self._end)
-            self._end = ""
-            for text in texts:
-                say(text, stream=sys.stderr)
+        """Print lines that stay."""
+        for text in texts:  # rich prints them above its bar
+            say(text, stream=sys.stderr)
 
-    def _print(self, text: str) -> None:
-        self._last = time.monotonic()
-        if not self._is_live:
-            self.line(text)
-            return
-        with self._one_line:
-            width = shutil.get_terminal_size().columns - 1
-            say("", stream=sys.stderr, end="\r")
-            say(f"{plain(text, width):{width}}", stream=sys.stderr, end="")
-            self._end = "\n"
-
-    def _remind(self) -> None:
-        while not self._over.wait(self.EVERY_S / 10):
-            now = time.monotonic()
-            if self._doing and now - self._last >= self.EVERY_S:
-                self._print(f"{self._doing} ({now - self._since:.0f} s so far)")
+    def _show(self, doing: Callable[[], str], *, at_once: bool = False) -> None:
+        self._doing, now = doing, time.monotonic()
+        if not self._bar and (at_once or now - self._last >= self.EVERY_S):
+            self._last = now
+            self.line(doing())
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
-        """Show the progress, on a terminal with the cell of the last run, unless no run was
-        missing; before the first run (``cell`` None) first show which runs are there already."""
-        from coartic.analysis.methods import title_of
-
-        total = progress.total
+        """Show the progress of runs, unless no run was missing; before the first run (``cell``
+        None) first print which runs are there already."""
         if cell is None:
-            for sentence in progress.unused:
-                self.line(sentence)
-            if held := +progress.others:
-                seeds = " and ".join(map(str, sorted(held)))
-                self.others = f"{counted(held.total(), 'run')} of seed {seeds}"
-                words = "which this command does not ask for: they are kept, and not reported"
-                self.line(f"{progress.folder} holds {self.others}, {words}.")
-            if progress.present:
-                coming = counted(total - progress.present, "run")
-                self.line(f"Already there: {progress.present} of {total}; to come: {coming}.")
-                for sentences in progress.marks.values():
-                    self.line(f"{'; '.join(sentences)}.")
-        if progress.present == total:
+            self._say_what_is_there(progress)
+        if progress.present == progress.total:
             return
-        there, seconds, left = progress.present + progress.done, progress.time_left, ""
-        if seconds > 0:  # False for NaN
-            left = f"{seconds / 60:.0f} min left" if seconds > 99 else f"{seconds:.0f} s left"
+        made = progress.present + progress.done
+        if self._bar:
+            self._bar.update(self._bar.task_ids[0], completed=made, total=progress.total)
         failed = f"{progress.failed} failed" * bool(progress.failed)
         again = ""
         if progress.repeats:
             again = f"{counted(progress.repeats, 'run')} again, to see whether results repeat"
-        last = "starting processes"
-        if cell is not None:
-            last = f"{cell.task.label}, {title_of(cell.method)}"
-        parts = [f"Runs: {there}/{total}", failed, again, left, last * self._is_live]
-        self.show("  ".join(filter(None, parts)), at_once=there == total)
+        parts = [f"Runs: {made}/{progress.total}", failed, again]
+        self._show(
+            lambda: "  ".join(filter(None, [*parts, _time_left(progress.time_left.seconds)])),
+            at_once=made == progress.total,
+        )
+
+    def _say_what_is_there(self, progress: Progress) -> None:
+        self.line(*progress.unused)
+        if held := +progress.others:
+            seeds = " and ".join(map(str, sorted(held)))
+            self.others = f"{counted(held.total(), 'run')} of seed {seeds}"
+            words = "which this command does not ask for: they are kept, and not reported"
+            self.line(f"{progress.folder} holds {self.others}, {words}.")
+        if progress.present:
+            coming = counted(progress.total - progress.present, "run")
+            self.line(f"Already there: {progress.present} of {progress.total}; to come: {coming}.")
+            self.line(*(f"{'; '.join(sentences)}." for sentences in progress.marks.values()))
+
+
+def _progress_bar(doing: Callable[[], str]) -> Any:
+    """Return a bar of rich with the text that ``doing`` returns, asked twice a second; it is
+    removed in the end."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task
+    from rich.table import Column
+    from rich.text import Text
+
+    class Doing(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(one_line(doing()), no_wrap=True, overflow="ellipsis")
+
+    class Done(BarColumn):
+        def render(self, task: Task) -> Any:
+            return super().render(task) if task.total else Text()
+
+    bar = Progress(
+        SpinnerColumn(),
+        Done(20),
+        Doing(Column(ratio=1, no_wrap=True)),
+        console=Console(stderr=True),
+        refresh_per_second=2,
+        transient=True,
+        expand=True,
+    )
+    bar.add_task("", total=None)
+    return bar
+
+
+def _time_left(seconds: float) -> str:
+    """Return a time, s, as a person would estimate it: ``about 40 s left``; empty for NaN, and for
+    no time."""
+    if not seconds > 0:  # True for NaN
+        return ""
+    if seconds < 10:
+        return "less than 10 s left"
+    if seconds < 100:
+        return f"about {10 * round(seconds / 10)} s left"
+    minutes = math.ceil(seconds / 60)
+    return f"about {minutes} min left" if minutes < 100 else f"about {minutes / 60:.0f} h left"

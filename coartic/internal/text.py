@@ -11,13 +11,13 @@ import difflib
 import re
 import unicodedata
 from collections.abc import Iterable
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 LONGEST_LINE = 500
-"""Most characters of a title, a description, a citation or the ``repr`` of an object."""
+"""Most characters of a title, a description or a citation."""
 LONGEST_REASON = 2000
 """Most characters of a reason that is kept."""
 _MOST_NAMED = 12  # in a sentence
@@ -64,13 +64,6 @@ def escape(c: str) -> str:
 def counted(count: int, thing: str) -> str:
     """Return a count with its noun, such as ``1 run`` or ``2 runs``."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
-
-
-def short_repr(thing: object, /, **facts: Any) -> str:
-    """Return ``Class(fact=value)`` for an object, in one line, cut to :data:`LONGEST_LINE`
-    characters, with the ``repr`` of each of ``facts`` cut to 80 characters."""
-    parts = (f"{name}={plain(repr(value), 80)}" for name, value in facts.items())
-    return plain(f"{type(thing).__name__}({', '.join(parts)})", LONGEST_LINE)
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
 from coartic.internal.limits import brief_value, plain_values
-from coartic.internal.text import counted, did_you_mean, plain, short_repr
+from coartic.internal.text import counted, did_you_mean, plain
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -86,20 +86,6 @@ class FileData(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     __eq__ = equal_contents
-
-    def __repr__(self) -> str:
-        """Return, in one line (:func:`.short_repr`), the class with the values that are not
-        defaults."""
-        changed = {
-            name: getattr(self, name)
-            for name, field in type(self).model_fields.items()
-            if field.is_required()
-            or getattr(self, name) != field.get_default(call_default_factory=True)
-        }
-        return short_repr(self, **changed)
-
-    def __str__(self) -> str:
-        return repr(self)
 
 
 def explain_file(source: str, error: ValidationError, keys: Iterable[str] = ()) -> str:

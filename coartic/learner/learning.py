@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
@@ -41,7 +40,6 @@ from coartic.motion.solution import (
     Movement,
     corrective_movements,
     hands_in,
-    hint_of,
     initial_hands,
     movements_by_goal,
     movements_in,
@@ -198,8 +196,6 @@ def learn_many(
     ordered = [int(seed) for seed in ordered]
     if start:
         first = [movements[0] for movements in movements_by_goal(task, start)]
-        if hint := hint_of(first):
-            warnings.warn(hint, stacklevel=2)
         for movement in first:
             if movement.hand not in condition.hands:
                 raise NotApplicableError(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import CoarticError
-from coartic.internal.text import counted, short_repr
+from coartic.internal.text import counted
 from coartic.internal.validation import equal_contents
 from coartic.learner.conditions import ExplorationCondition
 from coartic.method import Meter
@@ -63,19 +63,6 @@ class LearningRun:
     wall_s: float = field(compare=False)
     """Share of this run in the time of the runs made together, s."""
     __eq__ = equal_contents
-
-    def __repr__(self) -> str:
-        return short_repr(
-            self,
-            task=self.task.name,
-            condition=self.condition.id,
-            seed=self.seed,
-            trials=len(self.rewards),
-            hands=self.hands,
-            reward=self.reward,
-            initial_reward=self.initial_reward,
-            replay_reward=self.replay_reward,
-        )
 
     @property
     def completed(self) -> NDArray[np.bool_]:

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from abc import abstractmethod
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from coartic.errors import CoarticError
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_TRIALS, WIDTHS, brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.learner.learning import TRIALS
@@ -36,10 +34,7 @@ from coartic.method import (
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.solution import (
-    WHOLE_TURNS,
     Movement,
-    corrective_trial,
-    hint_of,
     movements_of,
 )
 from coartic.motion.trial import (
@@ -52,7 +47,6 @@ from coartic.motion.trial import (
 )
 from coartic.robot import HANDS, Array, Configs, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
-from coartic.tasks.families import instance_names
 from coartic.tasks.optima import KnownOptimum, best_shipped
 from coartic.tasks.task import Task, letters_of
 
@@ -68,8 +62,7 @@ CHUNK = 8192
 """Points that are evaluated at a time, so that many take no more memory."""
 NO_COPIES = (
     "an objective is neither copied nor sent to another process, where its trials would not be "
-    "counted: in place of workers use vectorized=True or objective.many(points), and for another "
-    "run objective.fresh()"
+    "counted: in place of workers use vectorized=True or objective.many(points)"
 )
 
 
@@ -101,11 +94,9 @@ def sequences_of(session: Session) -> list[str]:
 
 
 def _entries_of(name: str, points: ArrayLike) -> Array:
-    """Return points as an array (:func:`real_array`). Raises ValueError, which calls them ``name``,
-    for other values and for objects of pandas, whose names could say another order."""
-    if hasattr(points, "iloc"):
-        raise ValueError(f"{name} has names of pandas: give {name}.to_numpy(), in order of entries")
-    return real_array(name, points)
+    """Return points as an array (:func:`real_array`), also of objects with ``to_numpy``, whose
+    labels do not count. Raises ValueError, which calls them ``name``, for other values."""
+    return real_array(name, points.to_numpy() if hasattr(points, "to_numpy") else points)
 
 
 class Objective:
@@ -132,7 +123,7 @@ class Objective:
     """
 
     __slots__ = (
-        *("joints", "configurations", "dim", "bounds", "_asked", "_best_cost", "_best_hands"),
+        *("joints", "configurations", "dim", "bounds", "_best_cost", "_best_hands"),
         *("_best_targets", "_best_x", "_better", "_codes", "_end", "_entries", "_evaluations"),
         *("_hands", "_process", "_session", "_targets", "_task"),
     )  # no others are set by mistake, such as a budget
@@ -148,7 +139,6 @@ class Objective:
     ) -> None:
         check_limits("half_width", half_width, *WIDTHS)
         self._session, self._task, self._process = session, task, os.getpid()
-        self._asked: dict[str, Any] = {"hands": hands, "half_width": half_width, "trials": trials}
         limits = [limit for limit in (trials, session.trials_left) if limit is not None]
         self._end = session.trials_made + min(limits, default=MOST_COUNT)
         sequences = sequences_of(session) if hands is None else [hands]
@@ -157,11 +147,7 @@ class Objective:
         alone = session.trials(sequences, np.full(shape, np.nan))
         best = int(alone.rewards.argmax())
         if not alone.completed[best]:
-            reason = "the corrective process completes no hand sequence"
-            if task is not None:  # outside of a method
-                alone_again = corrective_trial(task, sequences[best], model=session.model)
-                reason += f"; with {sequences[best]}, {alone_again.reason}"
-            raise MethodError("infeasible", reason)
+            raise MethodError("infeasible", "the corrective process completes no hand sequence")
         self._hands = sequences[best]
         self.joints = np.tile(explored_joints(session), (session.goals_count, 1))
         """True for entries that have a target in a point, shape ``(G, dof)``."""
@@ -183,16 +169,6 @@ class Objective:
 
     def __reduce__(self) -> Any:
         raise CoarticError(NO_COPIES)
-
-    def __repr__(self) -> str:
-        facts = [
-            f"Objective({self._session.task_name}, hands {self.hands}, {self.dim} parameters",
-            counted(self.evaluations, "evaluation"),
-            f"best cost {self.best_cost:g}",
-        ]
-        if self._task is not None and (known := self._known) is not None:
-            facts.append(f"best known {-known.reward} with hands {known.hands}")
-        return ", ".join(facts) + ")"
 
     @property
     def hands(self) -> str:
@@ -334,12 +310,6 @@ class Objective:
         after = np.isnan(targets) & given  # goals after one where the trial failed
         return movements_of(chosen, np.where(after, task.q0, targets))
 
-    def fresh(self) -> Objective:
-        """Return a new objective of the same task and options, with no point evaluated and a budget
-        of its own, for another run. Raises UndeclaredError in a method."""
-        session = Session(self.task, 0, OPTIMISER_INFORMATION, model=self._session.model)
-        return Objective(session, task=self.task, **self._asked)
-
     # Evaluation.
 
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
@@ -369,7 +339,6 @@ class Objective:
             self._evaluations += 1
             if cost < self._best_cost:
                 self._keep(cost, self._evaluations, point, self._codes[0], made, 0)
-            self._warn_of_degrees(cost, made, 0)
         return cost
 
     def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
@@ -404,19 +373,9 @@ class Objective:
                         at = self._evaluations + n + 1
                         self._keep(float(some[n]), at, points[n], hand_codes[n], made, n)
                 self._evaluations += len(points)
-                worst = int(some.argmax())
-                self._warn_of_degrees(some[worst], made, worst)
         if left < len(array):
             raise BudgetError("all trials of the budget are made")
         return costs
-
-    def _warn_of_degrees(self, cost: float, made: Accounts, trial: int) -> None:
-        """Warn, except in a method, if :func:`.hint_of` has a hint on targets of trial ``trial``
-        (from 0) of ``made``, and ``cost``, ticks, exceeds the number of steps in 20 rad."""
-        if self._task is not None and cost > WHOLE_TURNS / self._session.model.step:
-            targets = self._targets_in(made, trial)
-            if hint := hint_of(movements_of(self.hands, targets)):
-                warnings.warn(hint, stacklevel=3)
 
     def _keep(
         self, cost: float, evaluations: int, point: Array, codes: Hands, made: Accounts, trial: int
@@ -527,53 +486,6 @@ def objective(
         )
     session = Session(chosen, 0, OPTIMISER_INFORMATION, model=model)
     return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)
-
-
-@checked_arguments
-def problems(
-    family: str,
-    split: Literal["test", "development"] = "test",
-    count: int = 15,
-    *,
-    half_width: float = HALF_WIDTH,
-    model: MotionModel = PAPER,
-    budget: int | None = None,
-) -> list[Objective]:
-    """Return the first instances of a family of random tasks as objectives.
-
-    Parameters
-    ----------
-    family : str
-        Its name with its version, ``"two-armed/v1"``, or its file.
-    split : {"test", "development"}
-        Instances to report on (``"test"``), or to tune on (``"development"``).
-    count : int
-        Number of instances, from 1 to 10,000.
-    half_width : float
-    model : MotionModel
-    budget : int, optional
-        Most trials of each problem (:func:`objective`).
-
-    Returns
-    -------
-    list of Objective
-        Instances 0, 1, ... of the split; ``best_known`` of the first 40 test instances of shipped
-        families is known under the paper's model.
-
-    Raises
-    ------
-    TaskError
-        There is no such family, or its file cannot be used.
-    ValueError
-        The split is neither of these, the count is not from 1 to 10,000, or :func:`objective`
-        refuses an option.
-    MethodError
-        The corrective process completes no sequence of an instance, or there are more than 4096.
-    """
-    return [
-        objective(name, half_width=half_width, model=model, budget=budget)
-        for name in instance_names(family, split, count)
-    ]
 
 
 class OptimiserParameters(Parameters):

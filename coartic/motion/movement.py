@@ -57,7 +57,6 @@ _CLEARANCE, _ROUNDING = 1e-9, 1e-15
 _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
-_SLOW = 0.1  # gain × |J|² of the stretched arm; the paper's has 1.55
 _RANK = 1e-12  # square of the ratio of singular values up to which the smaller counts as 0
 _IN_GOAL, _MISSED = 1.0, 2.0  # statuses of a slot that has moved
 _AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # and of one that has been corrected
@@ -552,43 +551,6 @@ def correct(
     locked = tuple(map(str, locked_base if isinstance(locked_base, Collection) else [locked_base]))
     _correct_kernel(robot_parameters(robot, locked_base=locked, model=check_model(model)), batch)
     return Correction(run["target"][figures].copy(), bool(run["converged"]), int(run["iterations"]))
-
-
-def explain_failure(
-    robot: Robot,
-    q: Array,
-    hand: Hand,
-    goal: tuple[float, float],
-    locked_base: Collection[str],
-    model: MotionModel,
-) -> str:
-    """Return the end of a sentence, from its colon on, on why the corrective process may have
-    failed from ``q``, shape ``(dof,)``; an empty text if none of the causes below applies.
-
-    One cause is a hand that no free joint or base coordinate moves nearer. Other causes are a long
-    and a short arm: near a goal, errors shrink by the factor ``1 - gain σ²`` an iteration, with the
-    singular values σ of the Jacobian J, so that the descent is stable while gain × |J|² of the
-    stretched arm is below 2, and slow where it is small. A free base adds the gain to it, whatever
-    the lengths are.
-    """
-    free = [k for k in range(BASE_DOF) if "xy"[k] not in locked_base]
-    arm = robot.joints(hand)
-    error = np.subtract(goal, robot.forward_kinematics(q, hand))
-    slopes = error @ robot.jacobian(q, hand)[:, [*free, *range(arm.start, arm.stop)]]
-    reaches = np.cumsum(robot.arm(hand).links[::-1])
-    square = float(reaches @ reaches)
-    if np.abs(slopes).max() <= 1e-12 * math.sqrt(square) * math.hypot(*error):
-        return ": the arm is straight and points at the goal; bend it"
-    if _SLOW <= (largest := model.gain * (square + bool(free))) < 2.0:
-        return ""
-    advice = "take a gain below 1"
-    if model.gain * bool(free) < 1.0:
-        factor = 1.0 / math.sqrt(model.gain * square)
-        advice = f"multiply all lengths, those of links, goals and radius, by {factor:.2g}"
-    return (
-        f": gain × |J|² of the stretched arm is {largest:.3g}; below {_SLOW:g} the descent is slow "
-        f"and above 2 it can be unstable: {advice}"
-    )
 
 
 def follow(

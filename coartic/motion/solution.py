@@ -9,7 +9,6 @@ of this execution.
 from __future__ import annotations
 
 import math
-import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.text import short_repr
 from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import width_of
@@ -36,14 +34,12 @@ from coartic.motion.trial import (
     search_initial_hands,
     sequences_with,
 )
-from coartic.robot import BASE_DOF, HANDS, Array, Configs, Hand
+from coartic.robot import HANDS, Array, Configs, Hand
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, hands_of, letters_of
 
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-WHOLE_TURNS = 20.0
-"""Angle of a target, rad, beyond which the angle may be meant in degrees."""
 HELD = 1e-6
 """Largest distance of a locked base coordinate of a target from its value at the start, length
 unit; solvers leave less."""
@@ -81,9 +77,6 @@ class Movement:
             if given is not None:
                 real_array(name, given)
 
-    def __repr__(self) -> str:
-        return short_repr(self, **{k: v for k, v in vars(self).items() if v is not None})
-
 
 @dataclass(frozen=True, eq=False)
 class Execution:
@@ -106,13 +99,6 @@ class Execution:
     reason: str = ""
     """Sentence on why the task was not completed; empty if it was."""
     __eq__ = equal_contents
-
-    def __repr__(self) -> str:
-        names = ("hands", "reward", "ticks", "corrections")
-        facts = {name: getattr(self, name) for name in names}
-        facts |= {"reason": self.reason} if self.reason else {}
-        alone = goals_without_target(self.movements)
-        return short_repr(self, **facts | ({"goals_without_target": alone} if alone else {}))
 
     @property
     def completed(self) -> bool:
@@ -187,23 +173,7 @@ def execute(
     (execution,) = execute_many(compiled_task(as_task(task), model), [solution])
     if isinstance(execution, Exception):
         raise execution
-    if execution.ticks > WHOLE_TURNS / model.step and (hint := hint_of(execution.movements)):
-        warnings.warn(hint, stacklevel=2)
     return execution
-
-
-def hint_of(movements: Iterable[Movement]) -> str:
-    """Return a question on the first movement that is not corrective and whose target has a joint
-    angle beyond 20 rad, as if it were meant in degrees; an empty text without such a movement."""
-    for movement in movements:
-        if movement.kind != "corrective" and movement.target is not None:
-            angle = max(movement.target[BASE_DOF:].tolist(), key=abs)
-            if abs(angle) > WHOLE_TURNS:
-                return (
-                    f"goal {movement.goal}: the target has the angle {angle:.4g}; angles are in "
-                    f"rad. Did you mean {angle:.4g}° = {math.radians(angle):.3f}?"
-                )
-    return ""
 
 
 def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:

@@ -51,7 +51,6 @@ from coartic.motion.movement import (
     check_goal,
     configuration,
     correct_slots,
-    explain_failure,
     finite_array,
     move_slots,
     pull_slots,
@@ -545,17 +544,15 @@ def make_trials(
 
 
 def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
-    """Return a sentence on the first goal that a trial missed, and, where it is known, why, from
-    the accounts of its goals, shape ``(G,)``; empty if the trial hit every goal."""
+    """Return a sentence on the first goal that a trial missed, from the accounts of its goals,
+    shape ``(G,)``; empty if the trial hit every goal."""
     if goals["hit"][-1]:
         return ""
     number = int(goals["hit"].argmin())
-    goal, task = goals[number], compiled.task
-    hand, q = HANDS[goal["hand"]], goal["q"][: task.robot.dof]
-    why = explain_failure(task.robot, q, hand, task.goals[number], task.locked_base, compiled.model)
+    goal = goals[number]
     return (
-        f"goal {number + 1}: the corrective process did not converge with the {hand} hand in "
-        f"{counted(int(goal['iterations']), 'iteration')}{why}"
+        f"goal {number + 1}: the corrective process did not converge with the "
+        f"{HANDS[goal['hand']]} hand in {counted(int(goal['iterations']), 'iteration')}"
     )
 
 

@@ -14,7 +14,6 @@ from pydantic import Field
 from coartic.errors import SolutionError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import check_limits
-from coartic.internal.text import short_repr
 from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel
 from coartic.motion.movement import line_points, path_points
@@ -44,16 +43,6 @@ class Trajectory:
     """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
     of its own has the row in which the robot stood; 0 before the first tick."""
     __eq__ = equal_contents
-
-    def __repr__(self) -> str:
-        return short_repr(
-            self,
-            task=self.task.name,
-            hands=self.execution.hands,
-            reward=self.execution.reward,
-            configurations=self.configurations,
-            hits=self.hits,
-        )
 
     @property
     def hands(self) -> tuple[Hand, ...]:

@@ -8,7 +8,8 @@ import ioh
 import coartic
 
 logger = ioh.logger.Analyzer(root=".", folder_name="ioh-pycma", algorithm_name="pycma")
-for number, cost in enumerate(coartic.problems("one-armed/v1", count=10, budget=2000)):
+for number in range(10):
+    cost = coartic.objective(f"one-armed/v1/i{number:03}", budget=2000)
     limits = {"lb": cost.bounds.min(), "ub": cost.bounds.max()}
 
     def gap(x, cost=cost):  # from 0 on all instances

@@ -178,18 +178,6 @@ class Draws(Lucky):
     stochastic = True
 
 
-class Degrees(Good):
-    """Moves to targets in degrees."""
-
-    name = "test/degrees"
-
-    def solve(self, session):
-        q, goals = session.q0, range(1, session.goals_count + 1)
-        q[-4:] = 90.0, -30.0, 10.0, 5.0
-        by_correction(session)
-        return Result(tuple(Movement(goal, "right", "planned", q) for goal in goals))
-
-
 class NoTarget(Good):
     """Has an inverse kinematics that fails, which looks like a solution."""
 

@@ -1,0 +1,104 @@
+"""Estimate how long the missing runs of a plan take, from runs that were made before."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping
+from functools import cache
+
+from coartic.learner.learning import TRIALS
+from coartic.runs.plan import Cell, Job, trials_in
+from coartic.runs.record import Run
+from coartic.runs.shipped import open_shipped
+
+_Kind = tuple[str, str, int]
+"""Method, task and number of trials (0 without): runs that are alike in these take equally long."""
+_EARLY = 0.1
+"""Share of the work before which there is no estimate: processes only begin."""
+
+
+class TimeLeft:
+    """An estimate of the time until all expected runs are made; threads may ask for it.
+
+    A run is expected to take as long as the shipped runs of its method on its task, or, on another
+    task, of its method, times a factor: how many times as long the method's runs take here. The
+    work left is divided by the work that was done in a second so far, which counts the times in
+    which processes begin or have nothing to do.
+    """
+
+    def __init__(self) -> None:
+        self._waiting, self._made = Counter[_Kind](), Counter[_Kind]()
+        self._took_s = defaultdict[str, float](float)
+        self._begun = self._last = time.monotonic()
+        self._lock = threading.Lock()
+
+    def expect(self, jobs: Iterable[Job]) -> None:
+        """Set the runs to be made from now on."""
+        with self._lock:
+            self._waiting.clear()
+            for job in jobs:
+                self._waiting[_kind_of(job.cell)] += len(job.numbers)
+
+    def finish(self, run: Run) -> None:
+        """Count an expected run that was made."""
+        kind, seconds = _kind_of(run.cell), run.outcome.times.wall_s
+        with self._lock:
+            self._last = time.monotonic()
+            self._waiting[kind] -= 1
+            if seconds is not None:
+                self._made[kind] += 1
+                self._took_s[kind[0]] += seconds
+
+    @property
+    def seconds(self) -> float:
+        """Time left, s; NaN until a tenth of the work is done, and while a method waits of which no
+        run is known. If no run ends for long, the time left grows again."""
+        with self._lock:
+            factors, done_s = self._factors(), sum(self._took_s.values())
+            work_s = sum(
+                _shipped_s(kind) * factors.get(kind[0], math.nan) * count
+                for kind, count in (+self._waiting).items()
+            )
+            if not done_s >= _EARLY * (done_s + work_s):  # True for NaN
+                return math.nan
+            left = work_s * (self._last - self._begun) / done_s if work_s else 0.0
+            since = time.monotonic() - self._last
+        return max(left - since, since / 4) if left else 0.0
+
+    def _factors(self) -> dict[str, float]:
+        """Return, by method, how many times as long as :func:`_shipped_s` its runs take here: as
+        measured, or else, of a shipped method, as of all shipped methods together."""
+        due_s = defaultdict[str, float](float)
+        for kind, count in self._made.items():
+            due_s[kind[0]] += _shipped_s(kind) * count
+        shipped = due_s.keys() & _shipped_means()
+        all_due = sum(due_s[method] for method in shipped)
+        mean = sum(self._took_s[method] for method in shipped) / all_due if all_due else math.nan
+        return dict.fromkeys(_shipped_means(), mean) | {
+            method: self._took_s[method] / due for method, due in due_s.items()
+        }
+
+
+def _kind_of(cell: Cell) -> _Kind:
+    trials = trials_in(cell.parameters)
+    return cell.method.name, cell.task.name, min(trials, cell.trial_budget or trials)
+
+
+def _shipped_s(kind: _Kind) -> float:
+    """Return the mean time of a shipped run of this kind, s, for its number of trials; 1 in place
+    of the time if its method is not shipped."""
+    method, task, trials = kind
+    by_task = _shipped_means().get(method, {})
+    mean = by_task.get(task) or sum(by_task.values()) / (len(by_task) or 1) or 1.0
+    return mean * (trials / TRIALS if trials else 1.0)
+
+
+@cache
+def _shipped_means() -> Mapping[str, Mapping[str, float]]:
+    """Return the mean time of the shipped runs, s, by method and task."""
+    with open_shipped("comparison") as store:
+        means = store.runs().groupby(["method", "task"]).wall_s.mean()
+    return {str(method): dict(of[method]) for method, of in means.groupby("method")}
