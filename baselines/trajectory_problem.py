@@ -36,7 +36,6 @@ from itertools import pairwise
 from threading import RLock
 from typing import Any, Literal
 
-import casadi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -152,6 +151,8 @@ class TrajectoryProblem:
     number of ``goals``."""
 
     def __init__(self, robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost) -> None:
+        import casadi  # which few commands need
+
         self._dof, self._goals, self._cost = robot.dof, goals, cost
         self._order = _RATES.get(cost, 0)
         dof, order = robot.dof, self._order
@@ -306,6 +307,8 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     both kinds of jerk pair of the accelerations, ``(dof,)`` each. Squared displacement ignores time
     and rates.
     """
+    import casadi
+
     if cost == "squared-displacement":
         return casadi.sumsqr(step)
     v0, v1 = rates[0]
@@ -329,6 +332,8 @@ def _hand_jerks(
     segments, a CasADi column, along quintics between the end states: start ``q0``, changes
     ``steps``, ``(dof, G)``, ``durations``, ``(G,)``, and ``rates``, velocities and accelerations at
     start and goals, ``(dof, G + 1)`` each."""
+    import casadi
+
     powers = np.arange(6)
     integrals, here = [], q0
     for g in range(steps.shape[1]):

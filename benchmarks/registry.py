@@ -14,7 +14,6 @@ from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 
-from coartic.benchmarks.method_files import begin_reader
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, plain, unknown
 from coartic.internal.toml_files import check_file
@@ -116,6 +115,8 @@ def _methods_of_file(path: Path) -> Iterator[MethodInfo]:
     """Yield the declaration of each method of a file, which a separate process imports; the
     function that asks this process is added to ``READERS``, by path. Raises CoarticError for an
     unusable file."""
+    from coartic.benchmarks.method_files import begin_reader  # which few commands need
+
     shown = plain(str(path), LONGEST_LINE)
     check_file(path)
     if path.suffix != ".py":

@@ -241,6 +241,7 @@ def perform(
         missing = _missing_jobs(plan, store, progress)
         own = {job.cell.method.name: job for job in missing if not job.cell.method.is_ours}
         repeats = [replace(job, numbers=job.numbers[:1]) for job in own.values()]
+        progress.time_left = TimeLeft(executor.workers)
         progress.time_left.expect([*missing, *repeats])
         tell(None)
         jobs, chosen = _divided(missing, executor.workers), dict[str, Run]()

@@ -23,15 +23,16 @@ _EARLY = 0.1
 class TimeLeft:
     """An estimate of the time until all expected runs are made; threads may ask for it.
 
-    A run is expected to take as long as the shipped runs of its method on its task, or, on another
-    task, of its method, times a factor: how many times as long the method's runs take here. The
-    work left is divided by the work that was done in a second so far, which counts the times in
-    which processes begin or have nothing to do.
+    A run is expected to take as long as the shipped runs of its method on its task (on another
+    task: of its method), times how much longer runs take here. For other methods, the mean time of
+    their runs here counts. ``workers`` runs are made at once, or more if the times of runs add up
+    to more than that.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, workers: int = 1) -> None:
+        self._workers = workers
         self._waiting, self._made = Counter[_Kind](), Counter[_Kind]()
-        self._took_s = defaultdict[str, float](float)
+        self._took_s = defaultdict[_Kind, float](float)
         self._begun = self._last = time.monotonic()
         self._lock = threading.Lock()
 
@@ -44,13 +45,13 @@ class TimeLeft:
 
     def finish(self, run: Run) -> None:
         """Count an expected run that was made."""
-        kind, seconds = _kind_of(run.cell), run.outcome.times.wall_s
+        kind, took_s = _kind_of(run.cell), run.outcome.times.wall_s
         with self._lock:
             self._last = time.monotonic()
             self._waiting[kind] -= 1
-            if seconds is not None:
+            if took_s is not None:
                 self._made[kind] += 1
-                self._took_s[kind[0]] += seconds
+                self._took_s[kind] += took_s
 
     @property
     def seconds(self) -> float:
@@ -58,28 +59,31 @@ class TimeLeft:
         run is known. If no run ends for long, the time left grows again."""
         with self._lock:
             factors, done_s = self._factors(), sum(self._took_s.values())
-            work_s = sum(
-                _shipped_s(kind) * factors.get(kind[0], math.nan) * count
-                for kind, count in (+self._waiting).items()
-            )
-            if not done_s >= _EARLY * (done_s + work_s):  # True for NaN
-                return math.nan
-            left = work_s * (self._last - self._begun) / done_s if work_s else 0.0
-            since = time.monotonic() - self._last
-        return max(left - since, since / 4) if left else 0.0
+            run_s = {
+                kind: _shipped_s(kind) * factors.get(kind[0], math.nan)
+                for kind, count in self._waiting.items()
+                if count > 0
+            }
+            left_s = sum(run_s[kind] * self._waiting[kind] for kind in run_s)
+            at_once = max(self._workers, done_s / max(self._last - self._begun, 1.0))
+            since_s = time.monotonic() - self._last
+        if not left_s:
+            return 0.0
+        if not done_s >= _EARLY * (done_s + left_s):  # True for NaN
+            return math.nan
+        return max(left_s / at_once - since_s, max(run_s.values()) - since_s, since_s / 4)
 
     def _factors(self) -> dict[str, float]:
-        """Return, by method, how many times as long as :func:`_shipped_s` its runs take here: as
-        measured, or else, of a shipped method, as of all shipped methods together."""
-        due_s = defaultdict[str, float](float)
+        """Return, by method, how many times as long as :func:`_shipped_s` its runs take here: one
+        factor for all shipped methods, which is of the machine, and one for each other method."""
+        took_s, due_s = defaultdict[str, float](float), defaultdict[str, float](float)
         for kind, count in self._made.items():
-            due_s[kind[0]] += _shipped_s(kind) * count
-        shipped = due_s.keys() & _shipped_means()
-        all_due = sum(due_s[method] for method in shipped)
-        mean = sum(self._took_s[method] for method in shipped) / all_due if all_due else math.nan
-        return dict.fromkeys(_shipped_means(), mean) | {
-            method: self._took_s[method] / due for method, due in due_s.items()
-        }
+            group = "" if kind[0] in _shipped_means() else kind[0]
+            due_s[group] += _shipped_s(kind) * count
+            took_s[group] += self._took_s[kind]
+        factors = {group: took_s[group] / due for group, due in due_s.items()}
+        machine = factors.pop("", math.nan)
+        return dict.fromkeys(_shipped_means(), machine) | factors
 
 
 def _kind_of(cell: Cell) -> _Kind:

@@ -16,7 +16,7 @@ from coartic.analysis.report import about, build, render
 from coartic.analysis.report.about import attempt, limits
 from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.player import methods_played, player
-from coartic.analysis.sections import FIGURES, TABLES, coarticulation
+from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, coarticulation
 from coartic.analysis.study import Study, load
 from tests.support.made_up import runs_of, study_of
 from tests.support.processes import ROOT
@@ -190,7 +190,7 @@ def no_files(monkeypatch):
 
 @pytest.mark.usefixtures("ranked", "no_files")
 def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
-    """The suite of the page on own suites: heading, question, answer, all rows, and the figure."""
+    """The suite of the page on own suites: all settings in order, question, answer and figure."""
     page = (ROOT / "docs" / "howto" / "task.md").read_text("utf-8")
     (text,) = re.findall(r"```toml\n# noise.toml\n(.*?)```", page, re.DOTALL)
     suite, out = tmp_path / "noise.toml", tmp_path / "noise"
@@ -199,17 +199,14 @@ def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
     seen = load(out)
     means = seen.runs.groupby(["noise_sd", "task"]).gap.mean().groupby("noise_sd").mean()
     best, other, *_ = means.sort_values().index
-    lines = printed.splitlines()
-    heading = lines.index("Noise: How much exploration noise?")
-    name = r"learner EC1 \(σ ([\d.]+)[^)]*\) "
-    rows = [re.match(name, line) for line in lines[heading + 2 :]]
-    assert [float(row[1]) for row in rows[:3]] == means.sort_values().index.tolist()
-    answer = " ".join(" ".join(lines).partition("Answer ")[2].split())
+    rows = re.findall(r"^learner EC1 \(σ ([\d.]+)[^)]*\) ", printed, re.MULTILINE)
+    assert [*map(float, rows)] == means.sort_values().index.tolist()
     papers = {0.05: ", the paper's"}
     begin = (
         f"learner EC1 (σ {best}{papers.get(best, '')}) comes nearest to the optimum: its gap is "
         f"{100 * means[best]:.1f} %"
     )
+    answer = " ".join(about.finding(seen, SECTIONS[0])).replace("\xa0", " ")
     assert answer.startswith(begin)
     assert f"Next is learner EC1 (σ {other}{papers.get(other, '')}), " in answer
     plot = FIGURES["ranking"](seen)

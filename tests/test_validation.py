@@ -288,7 +288,7 @@ OF_ANOTHER_PROGRAM = "arm.urdf: coartic reads no .urdf file; a task is a TOML fi
         (["list", "two-armed/v2/i003"], "two-armed/v1"),
         (["check", "two-armed-1"], "two-armed-1 is a task, not a method. `coartic draw"),
         (["check", "mine.py"], "coartic check METHOD --method-file mine.py"),
-        (["run", "paper", "--runs", "two"], "--runs is 'two'; it must be a whole number from 1"),
+        (["run", "paper", "--runs", "two"], "runs is 'two'; it must be a whole number from 1"),
         (["list", "--method-file", NO_METHOD], "the name of a method file ends in .py"),
         (["run"], "name a suite: ablations, "),
         (["run", "paper", "--family-file", TASK_FILE], "is a task: coartic run SUITE --tasks"),

@@ -1,7 +1,6 @@
 """Versions of built-in methods: folders of version 4.0.0, whose runs have hashes, and later."""
 
 import lzma
-import re
 import sqlite3
 from contextlib import closing
 
@@ -128,17 +127,6 @@ def test_a_run_of_another_version_is_performed_again_and_named(old, coartic, in_
     text = coartic("verify", old, "--run", run_id)[1]
     assert "Another version of the method made the run (1.1; here is 1.2)." in text
     assert "1 run performed again: " in text
-
-
-def test_the_terminal_says_that_a_folder_is_of_4_0_0(old, coartic, ranked):
-    code, text, error = coartic(
-        "run", "comparison", "--tasks", "ascending", "--methods", ",".join([*SAME, *CHANGED]),
-        "--runs", 3, "--trials", 200, "--out", old,
-    )  # fmt: skip
-    assert code == 0, error
-    text = " ".join(text.split())
-    assert re.search("Of 4.0.0 .*learner EC1 1.1", text), text
-    assert "3 runs of cma-es/bandit by version 1.1, and here it is 1.2" in " ".join(error.split())
 
 
 SLOW = {"receding-horizon"}

@@ -15,7 +15,6 @@ import typer
 
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
-from coartic.internal.limits import check_limits
 from coartic.internal.text import unknown
 
 if TYPE_CHECKING:
@@ -48,47 +47,17 @@ MethodFiles = Annotated[
 
 def within(option: str, what: str, least: float, most: float) -> Any:
     """Return a command-line option, with the flag ``option`` and the help ``what``, for a number
-    from ``least`` to ``most``, whole if ``least`` is an int. Reading any other value raises
-    CoarticError."""
-
-    def read(text: str) -> Any:
-        value = _value_in(text)
-        try:
-            check_limits(option, value, least, most)
-        except ValueError as error:
-            raise CoarticError(str(error)) from None
-        return value
-
-    return typer.Option(option, parser=read, metavar="N", help=what)
+    from ``least`` to ``most``."""
+    return typer.Option(option, min=least, max=most, metavar="N", help=what)
 
 
-def _value_in(text: str) -> Any:
-    """Return the int, or else the float, that an option states, or the range ``50..99``, both ends
-    included; any other text is returned unchanged."""
-    ends = re.fullmatch(r"([0-9]{1,9})\.\.([0-9]{1,9})", str(text))  # a default is no text
-    value: Any = range(int(ends[1]), int(ends[2]) + 1) if ends else text
-    for kind in (float, int):
-        with suppress(ValueError):
-            value = kind(text)
-    return value
-
-
-def request_option(name: str, what: str, unit: str = "N") -> Any:
-    """Return a command-line option for a value, a number or ``50..99``, that :func:`.request_for`
-    takes by ``name``, such as ``time_limit_s``; ``what`` is its help, ``unit`` names its value in
-    the help. Its flag is the name without ``_s``: ``--time-limit``. Reading a value that is refused
-    raises CoarticError."""
-    option = f"--{name.removesuffix('_s').replace('_', '-')}"
-
-    def read(text: str) -> Any:
-        from coartic.benchmarks.planning import request_for
-
-        try:
-            return getattr(request_for(**{name: _value_in(text)}), name)
-        except CoarticError as error:
-            raise CoarticError(str(error).replace(name, option, 1)) from None
-
-    return typer.Option(option, parser=read, metavar=unit, help=what)
+def runs_named(text: str) -> Any:
+    """Return the number of runs, or their range, that ``20`` or ``50..99``, both ends included,
+    stands for; any other text is returned unchanged, for the plan to refuse."""
+    first, is_range, last = text.partition("..")
+    with suppress(ValueError):
+        return range(int(first), int(last) + 1) if is_range else int(first)
+    return text
 
 
 def names_in(text: str | None) -> list[str]:

@@ -91,20 +91,14 @@ def say_ranking(study: Study, asked: Iterable[str], folder: Path) -> None:
     from coartic.analysis.standings import board, common_tasks, not_ranked, reference, shown_name
     from coartic.analysis.words import interval, listed, number
 
-    also = frozenset(asked)
+    also, rows = frozenset(asked), list[tuple[str, ...]]()
     ranked, what = board(study, also).query("ranked"), limits(study)
-    say_table(
-        ("method", "gap (%)", "share of the gain (%)", "runs"),
-        [
-            (
-                shown_name(study, str(method)),
-                interval(row, "gap", scale=100),
-                interval(row, "share", 0, 100),
-                number(row["runs"]),
-            )
-            for method, row in ranked.iterrows()
-        ],
-    )
+    for method, row in ranked.iterrows():
+        name = shown_name(study, str(method))
+        has_id = row["built_in"] or name.startswith(row["base"])
+        gap, share = interval(row, "gap", scale=100), interval(row, "share", 0, 100)
+        rows.append((name if has_id else f"{row['base']}: {name}", gap, share, number(row["runs"])))
+    say_table(("method", "gap (%)", "share (%)", "runs"), rows)
     pairs = [("Not ranked", sentence) for sentence in not_ranked(study, also)]
     if len(ranked):
         pairs.append(("Reference", f"gaps are to the {reference(study, common_tasks(study))}"))

@@ -41,13 +41,15 @@ def run(
     ] = None,
     runs: Annotated[
         Any,
-        given.request_option(
-            "runs", "Runs of each method on each task, or a part of them, such as 50..99."
+        typer.Option(
+            parser=given.runs_named,
+            metavar="N",
+            help="Runs of each method on each task, or a part of them, such as 50..99.",
         ),
     ] = None,
     trials: Annotated[
-        Any,
-        given.request_option("trials", "Trials of each run, for methods that have this parameter."),
+        int | None,
+        given.option("N", "Trials of each run, for methods that have this parameter."),
     ] = None,
     jobs: Annotated[
         int | None, given.within("--jobs", "Processes; by default one a core.", 1, MOST_JOBS)
@@ -62,12 +64,10 @@ def run(
     family_file: Annotated[
         list[Path] | None, given.option("FILE", "A family of your own (TOML).")
     ] = None,
-    seed: Annotated[Any, given.request_option("seed", "Seed of the suite.")] = 0,
-    time_limit_s: Annotated[
-        Any, given.request_option("time_limit_s", "Most CPU time of a run.", "SECONDS")
-    ] = None,
+    seed: Annotated[int, given.option("N", "Seed of the suite.")] = 0,
+    time_limit: Annotated[float | None, given.option("SECONDS", "Most CPU time of a run.")] = None,
     trial_budget: Annotated[
-        Any, given.request_option("trial_budget", "Most trials of a run, whatever its method.")
+        int | None, given.option("N", "Most trials of a run, whatever its method.")
     ] = None,
     scheduler: Annotated[
         str | None, given.option("ADDRESS", "Dask scheduler to use instead of this machine.")
@@ -77,7 +77,7 @@ def run(
         given.option("FOLDER", "Include the runs of a folder, or of the 'shipped' results."),
     ] = None,
 ) -> None:
-    """Run the missing part of a suite; print the findings, unless --runs names a part.
+    """Run the missing part of a suite; print the ranking, unless --runs names a part.
 
     If it is interrupted, repeat the command: it resumes where it stopped, and repeats runs that
     crashed.
@@ -103,11 +103,10 @@ def run(
         there = "no run yet"
         with suppress(CoarticError), open_store(out) as store:
             there = counted(len(store.present()), "run")
-        others = f" To report {display.others} there, repeat the earlier command."
-        kept = others if display.others else ""
-        return one_line(f"Saved in {out}: {there}; repeat the command to resume.{kept}")
+        return one_line(f"Saved in {out}: {there}; repeat the command to resume.")
 
     with interruptible(saved), display:
+        display.show(f"Planning the runs of {chosen.name}")
         registered = registry(method_file or ())
         names = given.methods_meant(given.names_in(methods), registered, expand=False)
         if include and not names:  # the user's own methods alone
@@ -117,7 +116,7 @@ def run(
             methods=names,
             family_files=family_file or (),
             **{"runs": runs, "trials": trials, "seed": seed},
-            **{"time_limit_s": time_limit_s, "trial_budget": trial_budget},
+            **{"time_limit_s": time_limit, "trial_budget": trial_budget},
         )
         asked = plan(chosen, request, registered)
         labels = {job.cell.label for job in asked} if names else set[str]()

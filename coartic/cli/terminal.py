@@ -78,12 +78,16 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
 
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print rows of text below their headings, the first column to the left, other columns to the
-    right; nothing without rows."""
-    if rows:
-        widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
-        for first, *others in (headings, *rows):
-            cells = [f"{text:>{width}}" for text, width in zip(others, widths[1:], strict=True)]
-            say("  ".join([f"{first:{widths[0]}}", *cells]))
+    right; on a narrow terminal the first column is wrapped. Nothing without rows."""
+    if not rows:
+        return
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
+    widths[0] = min(widths[0], max(_READABLE, width - sum(widths[1:]) - 2 * len(widths[1:])))
+    for first, *others in (headings, *rows):
+        line, *more = textwrap.wrap(first, widths[0]) or [""]
+        cells = [f"{text:>{width}}" for text, width in zip(others, widths[1:], strict=True)]
+        say("  ".join([f"{line:{widths[0]}}", *cells]), *more)
 
 
 class Display:
@@ -93,8 +97,6 @@ class Display:
     EVERY_S = 10.0
 
     def __init__(self) -> None:
-        self.others = ""
-        """Number and seeds of the runs of earlier commands in the folder, in words."""
         self._doing: Callable[[], str] = str
         self._last = time.monotonic()
         self._bar: Any = None
@@ -147,11 +149,9 @@ class Display:
 
     def _say_what_is_there(self, progress: Progress) -> None:
         self.line(*progress.unused)
-        if held := +progress.others:
-            seeds = " and ".join(map(str, sorted(held)))
-            self.others = f"{counted(held.total(), 'run')} of seed {seeds}"
+        if others := (+progress.others).total():
             words = "which this command does not ask for: they are kept, and not reported"
-            self.line(f"{progress.folder} holds {self.others}, {words}.")
+            self.line(f"{progress.folder} holds {counted(others, 'run')}, {words}.")
         if progress.present:
             coming = counted(progress.total - progress.present, "run")
             self.line(f"Already there: {progress.present} of {progress.total}; to come: {coming}.")

@@ -1,0 +1,84 @@
+"""The time that missing runs take, on a clock that the test sets."""
+
+import heapq
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from coartic import load_task
+from coartic.benchmarks import time_left
+from coartic.runs.plan import Job, cell_of
+from tests.support.suites import KNOWN
+
+METHODS = {
+    "random-search": {"ascending": 0.05, "descending": 0.05},
+    "cma-es/bandit": {"ascending": 0.3, "descending": 0.4},
+    "trajectory-optimisation/jerk": {"ascending": 1.5, "descending": 2.5},
+}
+"""Times of runs, s, on a machine a little unlike the one that made the shipped runs."""
+
+
+def truth_and_estimates(methods, runs, slower, monkeypatch):
+    """Pairs of the true and estimated time left after each run of two processes, which take jobs in
+    turn, ``slower`` times as long as in :data:`METHODS`."""
+    clock = [0.0]
+    monkeypatch.setattr(time_left.time, "monotonic", lambda: clock[0])
+    tasks = [load_task(name) for name in ("ascending", "descending")]
+    jobs = [
+        Job(cell_of(task, KNOWN[name], {}), 0, (number,))
+        for name in methods
+        for task in tasks
+        for number in range(runs)
+    ]
+    estimate = time_left.TimeLeft(2)
+    estimate.expect(jobs)
+    free, ends = [0.0, 0.0], []
+    for job in jobs:
+        took = slower * METHODS[job.cell.method.name][job.cell.task.name]
+        end = heapq.heappop(free) + took
+        heapq.heappush(free, end)
+        ends.append((end, took, job))
+    last, pairs = max(free), []
+    for end, took, job in sorted(ends, key=lambda each: each[0]):
+        clock[0] = end
+        times = SimpleNamespace(wall_s=took)
+        estimate.finish(SimpleNamespace(cell=job.cell, outcome=SimpleNamespace(times=times)))
+        pairs.append((last - end, estimate.seconds))
+    return pairs
+
+
+@pytest.mark.parametrize("slower", [1.0, 5.0])
+@pytest.mark.parametrize("order", [1, -1])
+def test_in_the_last_third_the_time_left_is_true(monkeypatch, slower, order):
+    """Whether quick or slow methods come last."""
+    pairs = truth_and_estimates([*METHODS][::order], 20, slower, monkeypatch)
+    total = pairs[0][0]
+    late = [(left, shown) for left, shown in pairs if 0.03 * total < left < total / 3]
+    assert late
+    for left, shown in late:
+        assert left / 1.5 < shown < 1.5 * left
+    assert pairs[-1] == (0.0, 0.0)
+
+
+def test_before_runs_of_each_method_are_known_there_is_no_estimate(monkeypatch):
+    monkeypatch.setattr(time_left, "_shipped_means", lambda: {})
+    pairs = truth_and_estimates(["cma-es/bandit", "random-search"], 10, 1.0, monkeypatch)
+    assert math.isnan(pairs[0][1])
+    assert not math.isnan(pairs[-5][1])
+
+
+def test_a_run_that_takes_longer_than_expected_is_not_about_to_end(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(time_left.time, "monotonic", lambda: clock[0])
+    cell = cell_of(load_task("ascending"), KNOWN["cma-es/bandit"], {})
+    estimate = time_left.TimeLeft()
+    estimate.expect([Job(cell, 0, range(2))])
+    clock[0] = 10.0
+    run = SimpleNamespace(cell=cell, outcome=SimpleNamespace(times=SimpleNamespace(wall_s=10.0)))
+    estimate.finish(run)
+    assert estimate.seconds == pytest.approx(10.0)
+    clock[0] = 14.0
+    assert estimate.seconds == pytest.approx(6.0)
+    clock[0] = 70.0
+    assert estimate.seconds >= 10.0
