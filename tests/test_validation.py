@@ -456,8 +456,10 @@ def test_a_name_and_a_path_stand_for_the_task(call):
     usual = dict(CALLS)[call]
     first = next(iter(usual))
     for given in (usual[first], str(TASK_FILE), TASK_FILE):
-        due = call(**usual | {first: "ascending"})
-        assert repr(call(**usual | {first: given})) == repr(due)
+        due, found = (call(**usual | {first: each}) for each in ("ascending", given))
+        if call is coartic.objective:
+            due, found = ([each.task, each.bounds.tolist()] for each in (due, found))
+        assert found == due
     for wrong in (None, ["ascending"], {"name": "ascending"}):
         with pytest.raises(TypeError, match=r"task is .*; it must be .* path of a task file"):
             call(**usual | {first: wrong})

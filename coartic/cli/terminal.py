@@ -179,6 +179,7 @@ def _progress_bar(doing: Callable[[], str]) -> Any:
         Done(20),
         Doing(Column(ratio=1, no_wrap=True)),
         console=Console(stderr=True),
+        redirect_stdout=sys.stdout.isatty(),
         refresh_per_second=2,
         transient=True,
         expand=True,
