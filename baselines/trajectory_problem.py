@@ -51,7 +51,6 @@ MODEL_BASED = KINEMATICS | {Information.KINEMATIC_MODEL}
 Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk", "hand-jerk"]
 JOINT_WEIGHT = 0.1
 """Weight of joint jerk relative to jerk of the hand, (length unit / rad)²."""
-_NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(6)  # on [-1, 1], of each segment
 
 _ONE_AT_A_TIME = RLock()
 """Held while CasADi builds a programme and IPOPT solves it: two threads cannot do so at once."""
@@ -334,8 +333,8 @@ def _hand_jerks(
     start and goals, ``(dof, G + 1)`` each."""
     import casadi
 
-    powers = np.arange(6)
-    integrals, here = [], q0
+    powers, integrals, here = np.arange(6), [], q0
+    nodes, weights = np.polynomial.legendre.leggauss(6)  # on [-1, 1], of each segment
     for g in range(steps.shape[1]):
         step, time = steps[:, g], durations[g]
         (v0, v1), (a0, a1) = ((r[:, g], r[:, g + 1]) for r in rates)
@@ -347,7 +346,7 @@ def _hand_jerks(
             6 * step - 3 * (v0 + v1) - 0.5 * (a0 - a1),
         ]  # fmt: skip
         total = casadi.SX(0)
-        for node, weight in zip((1 + _NODES) / 2, _NODE_WEIGHTS / 2, strict=True):
+        for node, weight in zip((1 + nodes) / 2, weights / 2, strict=True):
             derivatives = []
             for d in range(4):
                 falling = np.prod([powers - k for k in range(d)], axis=0) * np.ones(6)

@@ -1,5 +1,6 @@
 """``coartic`` and ``python -m coartic``: the command line."""
 
+import gc
 import sys
 
 from coartic.internal.interruption import catch_signals, end_if_interrupted
@@ -9,6 +10,7 @@ def main() -> None:
     """Run the command that the command line asks for; exit with code 130 after Ctrl-C, 143 after
     SIGTERM or SIGHUP."""
     catch_signals()
+    gc.set_threshold(100_000, 50, 1_000)  # imported modules stay: collect garbage rarely
     try:
         from coartic.cli import main as run_command
 

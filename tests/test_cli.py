@@ -429,7 +429,7 @@ def test_help_has_no_types_of_python_and_examples_have_options_that_there_are(
     coartic, commands, command, example
 ):
     name = command.__name__.removesuffix("_")
-    assert "<" not in coartic(name, "--help")[1]
+    assert not re.search("<[a-z]", coartic(name, "--help")[1])
     options = {opt for parameter in commands.commands[name].params for opt in parameter.opts}
     assert {word for word in example.split() if word.startswith("--")} <= options
 

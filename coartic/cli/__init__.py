@@ -7,7 +7,6 @@ most packages only when it is called, so that help and completion are fast.
 from __future__ import annotations
 
 import contextlib
-import gc
 import io
 import logging
 import os
@@ -86,7 +85,6 @@ for command, example in COMMANDS:
 def main() -> None:
     """Run the command line, and exit: with code 2 after a CoarticError or wrong usage, with code 1
     after an error of the system, or if the command found something wrong."""
-    gc.set_threshold(100_000, 50, 1_000)  # imported modules stay: collect garbage rarely
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:  # closed: one of our files would get its number
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
