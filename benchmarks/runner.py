@@ -156,7 +156,7 @@ def run_suite(
     Returns
     -------
     Progress
-        Counts of runs, shown as a sentence.
+        Counts of runs; ``str`` of it is a sentence.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def run_suite(
 
     Examples
     --------
-    >>> run_suite("paper", "results/first", tasks=["ascending"], runs=3)  # doctest: +SKIP
+    >>> print(run_suite("paper", "results/first", tasks=["ascending"], runs=3))  # doctest: +SKIP
     3 runs in 4 s, none failed: results/first
     """
     for name in _EXECUTORS.keys() & options.keys():
@@ -205,7 +205,7 @@ def perform(
     Returns
     -------
     Progress
-        Counts of runs, shown as a sentence.
+        Counts of runs; ``str`` of it is a sentence.
 
     Raises
     ------

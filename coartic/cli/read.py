@@ -67,16 +67,10 @@ def report(
         files, failures = write_report(
             study, out, for_paper=for_paper, width=width, watch=display.show
         )
-    made, what = Counter(Path(name).suffix for name in files), "CSV"
-    if for_paper:
-        what = f"CSV, {made['.tex']} as LaTeX) and {counted(made['.svg'], 'figure')} (SVG and PDF"
-    say(
-        f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
-        f"{counted(made['.csv'], 'table')} ({what})."
-    )
-    if not for_paper:
-        again = f"coartic report {study.folder_in_commands} --for-paper"
-        say_pairs([("More", f"{again} adds figures as SVG and PDF, and tables as LaTeX")])
+    made = Counter(Path(name).suffix for name in files)
+    figures = f" and {counted(made['.svg'], 'figure')}" * for_paper
+    say(f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
+        f"{counted(made['.csv'], 'table')}{figures}.")  # fmt: skip
     for part, reason in failures.items():
         complain("Error", f"{part} could not be made, by a fault of coartic: {reason}")
     if failures:

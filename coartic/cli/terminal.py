@@ -144,7 +144,7 @@ class Display:
         parts = [f"Runs: {made}/{progress.total}", failed, again]
         self._show(
             lambda: "  ".join(filter(None, [*parts, _time_left(progress.time_left.seconds)])),
-            at_once=made == progress.total,
+            at_once=made == progress.total and progress.time_left.seconds == 0,
         )
 
     def _say_what_is_there(self, progress: Progress) -> None:
