@@ -104,7 +104,6 @@ TASKS = [
     ("hands = ['left']\n" + GOOD, "needed is a text with L for each of 2 goals, or one of best-"),
     (task("right = [0.0, 0.0, 0.0, 0.0]", "right = [0.0, 0.0]"), "start.right"),
     (task('"mine"', '"my task"'), "name is 'my task'; it begins with a letter or digit"),
-    ("locked_base = ['x', 'y', 'x']\n" + GOOD, "it may have at most 2 items"),
     ("start = 1\n" + GOOD.partition("[start]")[0], "start is 1; it should be a table"),
     ('title = "a\\nb"' + GOOD, "it should be one line of printable text"),
     (task("goals = [[", "goals = [[["), "line"),
@@ -112,26 +111,21 @@ TASKS = [
 ]
 FAMILIES = [
     (family("[2, 3]", "[1, 3]"), "goals[0] is 1; it should be at least 2"),
-    (family("[4, 4]", "[3, 9]"), "links[1] is 9; it should be at most 8"),
     (family("[2, 3]", "[5, 3]"), "goals is [5, 3]; it should have the lower number first"),
     (family("[-5, 5]", "[-5, 1e306]"), "region.x[1] is 1e+306; it should be a finite number"),
     (
         family("[-5, 5]", "[-5, 5]\nscale = [0.5, 1.5]"),
         "scale is [0.5, 1.5]; it should be from 0 to",
     ),
-    (f"reach = 1{400 * '0'}" + FAMILY, "it should be a finite number"),
     ("reach = 4.0001" + FAMILY, "4.0001 should have at most three decimals"),
 ]
 SUITES = [
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
-    (SUITE + "grid = {noise_sd = [-1.0]}", "noise_sd is -1.0; it should be at least 0"),
     (SUITE + f"grid = {{noise_sd = [1{400 * '0'}]}}", "a finite number, a text"),
-    (suite('["dual-process/EC1"]', "[]"), "blocks[0].methods is []; it needs at least 1 item"),
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5; it should be a whole number"),
     (suite('["ascending"]', "3"), "blocks[0].tasks is 3; it should be a list"),
     (SUITE + "move = {goal = 4, by = [[0, 1]]}", "has no goal 4 to move"),
-    (SUITE + "move = {goal = 2, by = [[0, 1e9]]}", "it should be at most 10000"),
 ]
 METHODS = [
     ("import nothing_like_this", "cannot be imported: ModuleNotFoundError"),
