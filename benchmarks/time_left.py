@@ -34,6 +34,7 @@ class TimeLeft:
         self._waiting, self._made = Counter[_Kind](), Counter[_Kind]()
         self._took_s = defaultdict[_Kind, float](float)
         self._begun = self._last = time.monotonic()
+        self._job_s = 0.0
         self._lock = threading.Lock()
 
     def expect(self, jobs: Iterable[Job]) -> None:
@@ -45,13 +46,14 @@ class TimeLeft:
 
     def finish(self, run: Run) -> None:
         """Count an expected run that was made."""
-        kind, took_s = _kind_of(run.cell), run.outcome.times.wall_s
+        kind, times = _kind_of(run.cell), run.outcome.times
         with self._lock:
             self._last = time.monotonic()
             self._waiting[kind] -= 1
-            if took_s is not None:
+            if times.wall_s is not None:
                 self._made[kind] += 1
-                self._took_s[kind] += took_s
+                self._took_s[kind] += times.wall_s
+                self._job_s = times.wall_s * times.together
 
     @property
     def seconds(self) -> float:
@@ -71,7 +73,9 @@ class TimeLeft:
             return 0.0
         if not done_s >= _EARLY * (done_s + left_s):  # True for NaN
             return math.nan
-        return max(left_s / at_once - since_s, max(run_s.values()) - since_s, since_s / 4)
+        half_done_s = min((at_once - 1) * self._job_s, left_s) / 2  # by the other workers
+        expected_s = max((left_s - half_done_s) / at_once, *run_s.values())
+        return max(expected_s - since_s, since_s / 4)
 
     def _factors(self) -> dict[str, float]:
         """Return, by method, how many times as long as :func:`_shipped_s` its runs take here: one

@@ -42,7 +42,7 @@ def truth_and_estimates(methods, runs, slower, monkeypatch):
     last, pairs = max(free), []
     for end, took, job in sorted(ends, key=lambda each: each[0]):
         clock[0] = end
-        times = SimpleNamespace(wall_s=took)
+        times = SimpleNamespace(wall_s=took, together=1)
         estimate.finish(SimpleNamespace(cell=job.cell, outcome=SimpleNamespace(times=times)))
         pairs.append((last - end, estimate.seconds))
     return pairs
@@ -75,7 +75,9 @@ def test_a_run_that_takes_longer_than_expected_is_not_about_to_end(monkeypatch):
     estimate = time_left.TimeLeft()
     estimate.expect([Job(cell, 0, range(2))])
     clock[0] = 10.0
-    run = SimpleNamespace(cell=cell, outcome=SimpleNamespace(times=SimpleNamespace(wall_s=10.0)))
+    run = SimpleNamespace(
+        cell=cell, outcome=SimpleNamespace(times=SimpleNamespace(wall_s=10.0, together=1))
+    )
     estimate.finish(run)
     assert estimate.seconds == pytest.approx(10.0)
     clock[0] = 14.0

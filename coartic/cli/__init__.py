@@ -12,16 +12,15 @@ import logging
 import os
 import sys
 import warnings
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperCommand
 
 import coartic
 from coartic.cli import read, run
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
-from coartic.internal.text import LONGEST_LINE, error_line, plain
+from coartic.internal.text import LONGEST_LINE, plain
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -48,23 +47,6 @@ def _options(
     pass
 
 
-class _Command(TyperCommand):
-    """A command whose help shows arguments by their names: without braces, which would look like a
-    choice, and without types of Python."""
-
-    def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write the command's arguments, without types, and options into the help,
-        ``formatter``."""
-        for parameter in self.params:
-            if parameter.param_type_name == "argument":
-                vars(parameter)["display_type_rich"] = lambda *_, **__: ""
-        super().format_options(ctx, formatter)
-
-    def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Return the words after the command's name in its line of usage, without braces around."""
-        return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
-
-
 COMMANDS = (
     (read.play, "two-armed-1 --out play.html"),
     (run.list_, "comparison"),
@@ -79,7 +61,7 @@ COMMANDS = (
 """The commands in the order of the help, each with the arguments of its example."""
 for command, example in COMMANDS:
     name = command.__name__.removesuffix("_")
-    app.command(name=name, cls=_Command, epilog=f"Example: coartic {name} {example}")(command)
+    app.command(name=name, epilog=f"Example: coartic {name} {example}")(command)
 
 
 def main() -> None:
@@ -111,10 +93,4 @@ def main() -> None:
     except OSError as error:
         place = f": {plain(str(error.filename), LONGEST_LINE)}" if error.filename else ""
         complain("Error", f"{error.strerror or error}{place}")
-        sys.exit(1)
-    except ModuleNotFoundError:
-        raise
-    except (MemoryError, ImportError) as error:  # a library that finds no room is not loaded
-        words = "Is memory limited (`ulimit -v`)? What was written is kept; repeat the command"
-        complain("Error", f"{error_line(error)}. {words}")
         sys.exit(1)
