@@ -114,6 +114,7 @@ def _draw_recording(
         hits_from_markers,
         is_of_markers,
         read_hits,
+        solutions_of,
     )
     from coartic.internal.files import check_ending, check_output, write_output
 
@@ -126,12 +127,14 @@ def _draw_recording(
     else:
         drawing = draw_recording(recording, task, ticks_per_unit=ticks_per_unit)
     write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
+    say(f"{out}: {recording}.")  # also where the hits are refused
     if has_markers:
         hits = hits_from_markers(recording, task, ticks_per_unit=ticks_per_unit or 100.0)
     else:
         hits = read_hits(recording, task, ticks_per_unit=ticks_per_unit or 1.0)
-    trials = counted(len(hits.drop_duplicates(["subject", "trial"])), "trial")
-    say(f"{out}: {counted(len(hits), 'hit')} in {trials}.")
+    solutions = solutions_of(task, hits)
+    finished = counted(len(solutions.runs), "trial")
+    say(f"{finished} with all goals hit, {solutions.unfinished} with a goal missed.")
 
 
 def _film(
