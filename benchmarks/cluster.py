@@ -123,8 +123,8 @@ def _remote(job: Job) -> list[Outcome]:
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method = job.cell.method
     here = current_code(method)
-    if here != method.version:
-        text = f"method {method.name!r} is {here} on a Dask worker and {method.version} where "
+    if here != method.code:
+        text = f"method {method.name!r} is {here} on a Dask worker and {method.code} where "
         raise CoarticError(f"{text}the suite was started; install the same version everywhere")
     if not hasattr(_kept, "workers"):
         _kept.workers = Workers(Local(1), stays=True)

@@ -110,7 +110,7 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
             plan[position].run_id(number)
             for position, number, *_ in store.present()
             if (method := plan[position].cell.method).name in registered
-            and registered[method.name].code == method.version
+            and registered[method.name].code == method.code
         ]
         if not ids:
             raise CoarticError(

@@ -69,9 +69,9 @@ class Progress:
     """Runs of the plan that crashed."""
     marks: dict[str, list[str]] = field(default_factory=dict)
     """Sentences on methods against which runs of the folder speak (:meth:`Store.marks`)."""
-    others: Counter[int] = field(default_factory=Counter)
+    others: int = 0
     """Runs of earlier commands in the folder that the plan does not ask for, without :attr:`stale`
-    runs, by the seed of their suite."""
+    runs."""
     wall_s: float = 0.0
     """Wall time of the call, s; 0 until it ends."""
     waiting: Counter[str] = field(default_factory=Counter)
@@ -136,7 +136,7 @@ class Progress:
             f"{counted(count, 'run')} {what}"
             for count, what in (
                 (self.stale.total(), "by another version of their method"),
-                (self.others.total(), "of earlier commands, which are kept"),
+                (self.others, "of earlier commands, which are kept"),
             )
             if count > 0
         ]
@@ -255,8 +255,8 @@ def perform(
         raise CoarticError(f"plan is {brief_value(plan)}; it must be a list of jobs of plan_suite")
     with writing(folder) as store:
         store.replace_plan(plan, made_with())
-        progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())
-        progress.others[plan[0].seed] -= progress.stale.total()
+        progress = Progress(folder, size_of(plan), stale=store.stale())
+        progress.others = store.others() - progress.stale.total()
         progress.marks = store.marks()
         missing = _missing_jobs(plan, store, progress)
         for job in missing:

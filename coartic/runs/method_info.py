@@ -25,30 +25,8 @@ from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
 """Origin of this project's methods."""
-_OF_4_0_0 = frozenset(
-    {
-        *("a376743cb1ef", "292a8ac3c3d1", "091fc0a85706", "92d917aefff4", "e170d8157b57"),
-        *("c78f0b6537fb", "87012e34e985", "1463a2ac660d", "4e5457291651", "c3960228006c"),
-        "e69d581d1096",
-    }
-)
-"""Hashes by which coartic 4.0.0 knew the code of its methods."""
 VERSION = re.compile(r"\d+\.\d+")
 """Code of a built-in method, versions of model and method, in place of a hash."""
-
-
-def version_of(code: str) -> str:
-    """Return the version that a stored ``code`` of a method stands for: the code itself, except for
-    the hashes of coartic 4.0.0, whose methods are version 1.1 each."""
-    return "1.1" if code in _OF_4_0_0 else code
-
-
-def run_identity(run_id: str) -> tuple[str, str]:
-    """Return what identifies a run, from its id: the hex digits at its beginning, and the version
-    for which the code at its end stands (:func:`version_of`). Ids of equal pairs name the same
-    run."""
-    digits, _, code = run_id.partition("-")
-    return digits, version_of(code)
 
 
 @dataclass(frozen=True)
@@ -79,12 +57,6 @@ class MethodInfo:
     def is_ours(self) -> bool:
         """True for a built-in method of coartic."""
         return self.origin == BUILT_IN
-
-    @property
-    def version(self) -> str:
-        """The code, in which ``1.1`` stands for the hashes of coartic 4.0.0: codes are compared in
-        this form."""
-        return version_of(self.code)
 
     @property
     def key(self) -> tuple[str, str, str]:

@@ -40,9 +40,7 @@ EARLIER = "earlier_runs"
 _MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
 _MOST_NUMBERS = 400_000
-"""Most numbers in the start, targets and waypoints of a solution, of at most 25 characters each."""
-LONGEST_SOLUTION = 25 * _MOST_NUMBERS
-"""Most characters of the stored paths of a solution."""
+"""Most numbers in the start, targets and waypoints of a solution."""
 MOST_STEPS = 1_000_000
 """Most movement steps of a solution from the start straight through its targets and waypoints."""
 
