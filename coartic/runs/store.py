@@ -37,14 +37,12 @@ from coartic.robot import Array
 from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
-    EARLIER,
-    LATE,
     PREFIXES,
+    UNREPEATED,
     Outcome,
     Run,
     Score,
     Times,
-    mark_of,
     movement_from,
     reward_bytes,
 )
@@ -207,24 +205,44 @@ class Store:
         return Counter({(name, old, now): count for name, old, now, count in self._rows(query)})
 
     def marks(self) -> dict[str, list[str]]:
-        """Return, by id of a method, warnings about its runs of the plan, in sentences
-        (:func:`.mark_of`): that files were loaded too late, or results depend on earlier runs."""
+        """Return, by id of a method, warnings about its runs of the plan, in sentences: that a run
+        gave another result when it was made again, and that packages which its file imports had
+        other versions."""
         found = defaultdict[str, list[str]](list)
-        for kind in (LATE, EARLIER):
-            query = f"""SELECT DISTINCT method, value FROM asked, json_each(details, '$.{kind}')
-                ORDER BY method, value"""
-            for method, rows in groupby(self._rows(query), itemgetter(0)):
-                found[method].append(mark_of(method, kind, [str(value) for _, value in rows]))
+        query = f"""SELECT DISTINCT method, task FROM asked
+            WHERE json_extract(details, '$.{UNREPEATED}') IS NOT NULL ORDER BY method, task"""
+        for method, rows in groupby(self._rows(query), itemgetter(0)):
+            tasks = ", ".join(task for _, task in rows)
+            found[method].append(f"{method}: another result when a run was made again ({tasks})")
+        for method, made, last in self._packages():
+            older = ", ".join(f"{name} {made[name]}" for name in made if made[name] != last[name])
+            if older:
+                newer = ", ".join(
+                    f"{name} {last[name]}" for name in made if made[name] != last[name]
+                )
+                found[method].append(f"{method}: runs were made with {older}; now it has {newer}")
         return dict(found)
 
     def imports(self) -> dict[str, list[str]]:
         """Return, by id of a method from a file, the packages that its file imports, over all runs
         of the plan, each as a name with a version."""
-        query = """SELECT DISTINCT method, value FROM asked
-            JOIN environments ON environments.id = environment, json_each(content, '$.imports')
-            ORDER BY method, value"""
-        rows = groupby(self._rows(query), itemgetter(0))
-        return {method: [plain(str(value), 100) for _, value in of] for method, of in rows}
+        found = defaultdict[str, dict[str, None]](dict)
+        for method, made, _ in self._packages():
+            found[method] |= dict.fromkeys(f"{name} {version}" for name, version in made.items())
+        return {method: sorted(packages) for method, packages in found.items()}
+
+    def _packages(self) -> Iterator[tuple[str, dict[str, str], dict[str, str]]]:
+        """Yield, for each method from a file and each environment of its runs, the id of the method
+        and the versions of the packages that its file imports: as the runs were made, and as the
+        last ``coartic run`` had them."""
+        query = """SELECT DISTINCT asked.method, json_extract(environments.content, '$.imports'),
+            json_extract(cells.content, '$.method.packages') FROM asked
+            JOIN cells ON cells.id = asked.cell JOIN environments ON environments.id = environment
+            WHERE json_extract(environments.content, '$.imports') IS NOT NULL ORDER BY 1, 2"""
+        for method, made, last in self._rows(query):
+            with explain_errors(self.folder):
+                versions = json.loads(made), json.loads(last)
+            yield method, *versions
 
     def others(self) -> int:
         """Return the number of runs in the folder that the plan does not ask for, with the runs of
