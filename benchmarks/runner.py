@@ -21,13 +21,7 @@ from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import made_with
-from coartic.benchmarks.reproduce import (
-    AFTER_ANOTHER,
-    LONG_S,
-    doubts_of,
-    perform_in_order,
-    repeats_of,
-)
+from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.errors import CoarticError
@@ -36,7 +30,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, error_line
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
-from coartic.runs.record import EARLIER, Run
+from coartic.runs.record import UNREPEATED, Run
 from coartic.runs.store import Store, writing
 
 _EXECUTORS = {
@@ -69,9 +63,9 @@ class Progress:
     """Runs of the plan that crashed."""
     marks: dict[str, list[str]] = field(default_factory=dict)
     """Sentences on methods against which runs of the folder speak (:meth:`Store.marks`)."""
-    others: Counter[int] = field(default_factory=Counter)
+    others: int = 0
     """Runs of earlier commands in the folder that the plan does not ask for, without :attr:`stale`
-    runs, by the seed of their suite."""
+    runs."""
     wall_s: float = 0.0
     """Wall time of the call, s; 0 until it ends."""
     waiting: Counter[str] = field(default_factory=Counter)
@@ -136,7 +130,7 @@ class Progress:
             f"{counted(count, 'run')} {what}"
             for count, what in (
                 (self.stale.total(), "by another version of their method"),
-                (self.others.total(), "of earlier commands, which are kept"),
+                (self.others, "of earlier commands, which are kept"),
             )
             if count > 0
         ]
@@ -205,9 +199,9 @@ def perform(
 
     The plan replaces the plan of the folder; other runs stay there, and no report shows them. Runs
     that fail are stored and counted, and raise nothing; runs that crashed, or timed out under a
-    lower limit, are performed again by the next call. An interruption keeps finished runs. For each
-    method of a file, an ok run of this call is made again after a run with another seed (alone if
-    all take more than a minute); warnings say what is doubtful, such as other results.
+    lower limit, are performed again by the next call. An interruption keeps finished runs. Of each
+    method of a file, the quickest ok run of this call is made again in another process; a warning,
+    and a mark in reports, say if the result differs.
 
     Parameters
     ----------
@@ -245,7 +239,7 @@ def perform(
             warnings.warn(f"watch is not called again: {error_line(error)}", stacklevel=3)
 
     def seconds(run: Run) -> float:
-        return max(run.outcome.times.wall_s or math.inf, LONG_S)
+        return run.outcome.times.wall_s or math.inf
 
     executor = Local() if executor is None else executor
     if not isinstance(executor, Local | Dask):
@@ -255,14 +249,14 @@ def perform(
         raise CoarticError(f"plan is {brief_value(plan)}; it must be a list of jobs of plan_suite")
     with writing(folder) as store:
         store.replace_plan(plan, made_with())
-        progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())
-        progress.others[plan[0].seed] -= progress.stale.total()
+        progress = Progress(folder, size_of(plan), stale=store.stale())
+        progress.others = store.others() - progress.stale.total()
         progress.marks = store.marks()
         missing = _missing_jobs(plan, store, progress)
         for job in missing:
             progress.waiting[job.cell.method.name] += len(job.numbers)
         for name in {job.cell.method.name for job in missing if not job.cell.method.is_ours}:
-            progress.waiting[name] += 2  # which show whether its results repeat
+            progress.waiting[name] += 1  # which shows whether its results repeat
         progress.workers = executor.workers
         tell(None)
         jobs, chosen = _divided(missing, executor.workers), dict[str, Run]()
@@ -282,27 +276,23 @@ def perform(
                         progress.finish(run)
                         tell(run.cell)
             jobs = alone
-        again, doubts = defaultdict[str, list[Run]](list), list[str]()
-        repeats = [job for run in chosen.values() for job in repeats_of(run)]
-        progress.waiting = Counter(job.cell.method.name for job in repeats)
-        progress.repeats, progress.workers = len(repeats), min(executor.workers, Local().workers)
-        for job in repeats[:1]:
-            tell(job.cell)
-        for run in perform_in_order(repeats, progress.workers):
-            again[run.cell.method.name].append(run)
-            progress.waiting[run.cell.method.name] -= 1
-            progress.repeats -= 1
+        progress.waiting = Counter(dict.fromkeys(chosen, 1))
+        progress.repeats, progress.workers = len(chosen), min(executor.workers, Local().workers)
+        for run in list(chosen.values())[:1]:
             tell(run.cell)
-        for name, run in chosen.items():
-            of_run = [*doubts_of(run, again[name])]
-            doubts += of_run
-            if any(AFTER_ANOTHER in doubt for doubt in of_run):
-                details = run.outcome.details | {EARLIER: [run.cell.task.name]}
+        for again in perform_in_order([run.job for run in chosen.values()], progress.workers):
+            name = again.cell.method.name
+            run = chosen[name]
+            if changes := compare_runs(run, again)[:1]:
+                details = run.outcome.details | {UNREPEATED: changes[0]}
                 store.write([replace(run, outcome=replace(run.outcome, details=details))])
+            progress.waiting[name] -= 1
+            progress.repeats -= 1
+            tell(again.cell)
         known, progress.marks = {*chain(*progress.marks.values())}, store.marks()
-        new = [mark for mark in chain(*progress.marks.values()) if mark not in known]
-        for doubt in (*new, *doubts):
-            warnings.warn(doubt, stacklevel=2)
+        for mark in chain(*progress.marks.values()):
+            if mark not in known:
+                warnings.warn(mark, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
 

@@ -77,8 +77,7 @@ def not_repeated():
     from coartic.benchmarks import runner
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(runner, "repeats_of", lambda run: [])
-        patch.setattr(runner, "doubts_of", lambda *_: ())
+        patch.setattr(runner, "perform_in_order", lambda *_: ())
         yield
 
 

@@ -318,8 +318,8 @@ def test_one_kinematic_module():
 
 def test_processes_that_compute_are_started_in_one_place():
     """Others would round as their processor does."""
-    home = {f"benchmarks/{name}.py" for name in ("pool", "method_files", "cluster", "provenance")}
-    home |= {"coartic/internal/threads.py", "benchmarks/reproduce.py"}
+    home = {f"benchmarks/{name}.py" for name in ("pool", "processes", "method_files", "cluster")}
+    home |= {"coartic/internal/threads.py"}
     pattern = re.compile(r"ProcessPoolExecutor\(|\bPool\(|\bProcess\(|import multiprocessing")
     paths = [*sources(), *(ROOT / "studies").rglob("*.py"), *(ROOT / "docs").rglob("*.py")]
     for path in paths:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections import Counter
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -33,8 +34,7 @@ from tests.support.suites import (
     Failing,
     cell_on,
     edit,
-    edit_plan,
-    moved,
+    edit_movement,
     paper_cells,
     run_and_write,
 )
@@ -121,8 +121,7 @@ def test_no_command_is_silent_for_long(coartic, tmp_path, monkeypatch):
     asked = ("--tasks", "ascending", "--methods", "slow", "--runs", 1, "--out", own[1])
     shown = coartic("run", "quick", *asked, "--method-file", own[0])[2]
     assert re.search(r"Runs: 0/1 \(\d+ s so far\)\n", shown)
-    assert re.search(r"Runs: 1/1  2 runs again, to see whether results repeat.*\n", shown)
-    assert re.search(r"Runs: 1/1  1 run again, .*so far\)\n", shown)
+    assert re.search(r"Runs: 1/1  1 run again, to see whether results repeat.*so far\)\n", shown)
     shown = coartic("check", "slow", "--method-file", own[0])[2]
     assert "Performing runs of slow (0 s so far)" in shown
     shown = coartic("verify", own[1], "--again", 1, "--method-file", own[0])[2]
@@ -163,8 +162,7 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     edit(out, "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?", second)
     code, text, _ = coartic("verify", out, "--again", 2)
     assert (code, "2 runs performed again: 1 with another result." in text) == (1, True)
-    first_movement = """WHERE "order" = 0 AND part = 'replay'"""
-    edit(out, f"UPDATE movements SET path = {moved('$[6]', 1e-12)} {first_movement}")
+    edit_movement(out, 2, lambda movement: movement[4].reverse(), "replay")
     code, text, _ = coartic("verify", out, "--run", second)
     assert code == 1
     assert f"Run {second}, performed again: movement_ticks: " in text
@@ -172,7 +170,9 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     code, _, error = coartic("verify", out, "--run", "")
     assert code == 2
     assert "is not a run id" in error
-    edit_plan(out, "UPDATE cells SET code = 'other'")
+    cells = [cell_on(load_task("ascending"), replace(KNOWN["dual-process/EC1"], code="other"))]
+    run_and_write(tmp_path / "other", cells, runs=1, trials=3)
+    out = tmp_path / "other"
     code, _, error = coartic("verify", out, "--again", 1)
     assert code == 2
     assert "has no run of a method that has the same version or code here" in error
@@ -260,9 +260,8 @@ def test_what_a_folder_holds_besides_is_said_before_the_first_run(coartic, tmp_p
 
     monkeypatch.setattr("coartic.cli.run.interruptible", interruptible)
     error = coartic(*SMALL, "--out", out, "--seed", 7)[2]
-    assert f"{out} holds 2 runs of seed 0" in error.partition("Runs: ")[0]
+    assert f"{out} holds 2 other runs" in error.partition("Runs: ")[0]
     assert f"Saved in {out}: 2 runs; " in sentences[0]()
-    assert "To report 2 runs of seed 0 there, repeat the earlier command" in sentences[0]()
     edit(out, "DELETE FROM results")
     assert f"Saved in {out}: 0 runs; " in sentences[0]()
 

@@ -9,7 +9,7 @@ import pytest
 from coartic import corrective_trial, load_task
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
-from coartic.benchmarks.pool import CONTEXT
+from coartic.benchmarks.processes import CONTEXT
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import perform_job
 from coartic.method import Information, Session

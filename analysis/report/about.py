@@ -118,9 +118,8 @@ def limits(study: Study) -> dict[str, Any]:
     are ``reconstructed``, and whose best reward is ``unproven``, ``unknown`` or known from this
     folder alone (``own``); numbers of ``trials`` of the learner other than the paper's; ``few``,
     the fewest runs of the learner on a task, if fewer than the paper's; ``seed``; ``processor`` and
-    ``cores``; True for runs ``side_by_side`` and code that is ``dirty``; ``earlier``, methods with
-    runs by coartic 4.0.0; ``late``, all :attr:`.Study.marks`; ``imports`` by method. 0, False or
-    empty where a limit does not apply."""
+    ``cores``; True for runs ``side_by_side`` and code that is ``dirty``; ``late``, all
+    :attr:`.Study.marks`; ``imports`` by method. 0, False or empty where a limit does not apply."""
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
@@ -146,13 +145,6 @@ def limits(study: Study) -> dict[str, Any]:
         "side_by_side": bool(runs.together.max() > 1),
         "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
         "processor": made_with["processor"],
-        "earlier": sorted(
-            {
-                f"{title_of(m.name)} {m.version}"
-                for m in study.declared.values()
-                if m.code != m.version
-            }
-        ),
         "late": [*chain.from_iterable(study.marks.values())],
         "cores": made_with["cores"],
         "imports": {

@@ -143,8 +143,6 @@ def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> N
     if what["unknown"]:
         where = f"on {listed(what['unknown'])}, where fewer than two methods have a solution"
         pairs.append(("No gaps", where))
-    if what["earlier"]:
-        pairs.append(("Of 4.0.0", f"runs of {', '.join(what['earlier'])}"))
     pairs += [("‡", sentence) for sentence in what["late"]]
     if what["failed"]:
         failed = f"{what['failed']} of {counted(what['runs'], 'run')}: {'; '.join(what['reasons'])}"
@@ -173,7 +171,7 @@ def verify(
         raise CoarticError("--method-file has no effect without --again or --run")
     is_right = True
     if not alone:
-        with Display() as display, open_store(folder), explain_errors(folder):  # explain an error
+        with Display() as display, open_store(folder), explain_errors(folder):
             display.show(f"Executing the solutions of {folder}")
             report = check_runs(folder)
         is_right = not (report.wrong or report.unfinished)
@@ -182,8 +180,6 @@ def verify(
             f"{counted(report.movements, 'movement')} executed.",
             *(report.wrong or ["Nothing differs."]),
             *report.unfinished,
-            "Not checked:",
-            *(f"- {words}" for words in report.unchecked if not (again and "--again" in words)),
         )
     unlike = _perform_again(folder, again, run, method_file) if again or alone else 0
     if unlike or not is_right:
@@ -244,8 +240,8 @@ def _describe_run(run: Run, code: str) -> None:
             ("Result", result),
         ]
     )
-    if code != cell.method.version:
-        say(f"Another version of the method made the run ({cell.method.version}; here is {code}).")
+    if code != cell.method.code:
+        say(f"Another version of the method made the run ({cell.method.code}; here is {code}).")
 
 
 def cite(

@@ -103,9 +103,7 @@ def run(
         there = "no run yet"
         with suppress(CoarticError), open_store(out) as store:
             there = counted(len(store.present()), "run")
-        others = f" To report {display.others} there, repeat the earlier command."
-        kept = others if display.others else ""
-        return one_line(f"Saved in {out}: {there}; repeat the command to resume.{kept}")
+        return one_line(f"Saved in {out}: {there}; repeat the command to resume.")
 
     with interruptible(saved), display:
         registered = registry(method_file or ())

@@ -94,8 +94,6 @@ class Display:
     EVERY_S = 10.0
 
     def __init__(self) -> None:
-        self.others = ""
-        """Number and seeds of the runs of earlier commands in the folder, in words."""
         self._is_live = sys.stderr.isatty()
         self._doing = self._end = ""
         self._since = self._last = time.monotonic()  # begin of what is done, and last line
@@ -154,11 +152,10 @@ class Display:
         if cell is None:
             for sentence in progress.unused:
                 self.line(sentence)
-            if held := +progress.others:
-                seeds = " and ".join(map(str, sorted(held)))
-                self.others = f"{counted(held.total(), 'run')} of seed {seeds}"
+            if progress.others:
+                others = counted(progress.others, "other run")
                 words = "which this command does not ask for: they are kept, and not reported"
-                self.line(f"{progress.folder} holds {self.others}, {words}.")
+                self.line(f"{progress.folder} holds {others}, {words}.")
             if progress.present:
                 coming = counted(total - progress.present, "run")
                 self.line(f"Already there: {progress.present} of {total}; to come: {coming}.")

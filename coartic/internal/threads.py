@@ -85,9 +85,9 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     """Make this process a worker: the leader of a new group of processes, with the
-    first ``streams`` of input, output and errors connected to the null device. When its parent by
-    ``multiprocessing`` has ended, a thread removes ``folder``, if given, and kills this process
-    with its group."""
+    first ``streams`` of input, output and errors connected to the null device. SIGTERM kills the
+    process with its group. When its parent by ``multiprocessing`` has ended, a thread removes
+    ``folder``, if given, and does the same."""
 
     def end_with_parent() -> None:
         if (parent := multiprocessing.parent_process()) is not None:
@@ -100,6 +100,7 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     for stream in range(streams):
         os.dup2(nobody, stream)
     os.setpgid(0, 0)
+    signal.signal(signal.SIGTERM, lambda *_: end_group(os.getpid()))
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
     threading.Thread(target=end_with_parent, daemon=True).start()
 
