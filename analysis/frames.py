@@ -10,23 +10,21 @@ corrective process alone with its best hands. Rewards are negative ticks; the co
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterable, Sequence, Set
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
 
-from coartic.analysis.method_frame import with_joined_learners
 from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics import running_times
 from coartic.analysis.statistics.instances import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.text import plain
+from coartic.internal.text import counted, plain
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
@@ -182,10 +180,10 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     return frame.assign(key=run if keys else np.arange(len(frame)))
 
 
-def _scored_runs(frame: pd.DataFrame) -> pd.DataFrame:
+def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """Return a user's frame of runs, checked, with the gap of each (:func:`scored`). Raises
     CoarticError as :func:`scored` does, and for two rows of a run."""
-    runs = scored(frame)
+    runs = scored(frame, *more)
     _refuse_rows(runs, "method", runs.duplicated("key"), f"{_TWICE}; needed is a row for a run")
     return runs
 
@@ -345,89 +343,97 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     return table.reset_index()
 
 
-def compared_tasks(on: Iterable[tuple[Hashable, Set[Any]]]) -> Set[Any]:
-    """Return the tasks over which algorithms are ranked. ``on`` has, for each method, its algorithm
-    and the tasks on which it ran.
-
-    Candidates are the sets of tasks of single methods. The set is returned for which (number of
-    tasks) x (number of algorithms with a method that ran on all of them) is largest; of equals the
-    set with more tasks, then the first. Empty for no method.
-    """
-    pairs = [*on]
-
-    def size(tasks: Set[Any]) -> tuple[int, int]:
-        there = len({algorithm for algorithm, others in pairs if others >= tasks})
-        return len(tasks) * there, len(tasks)
-
-    return max((tasks for _, tasks in pairs), key=size, default=frozenset())
-
-
 def ranking(frame: pd.DataFrame) -> pd.DataFrame:
-    """Rank methods by their mean gap over tasks.
+    """Rank the methods that solved all tasks of a frame by their mean gap.
 
     Parameters
     ----------
     frame : DataFrame
-        With columns ``method``, ``task`` (names, numbers or tuples), ``reward`` and ``best_known``
-        (negative ticks); for shares also ``corrective_best``. With a column ``setting``, a method
-        with several settings has a row for each setting, ``"cma-es/bandit noise=0.1"``.
+        A row for each run, with columns ``method``, ``task`` (names, numbers or tuples), ``reward``
+        and ``best_known`` (negative ticks). Optional columns:
+
+        - ``setting``: a method with several settings has a row for each setting,
+          ``"cma-es/bandit noise=0.1"``;
+        - ``ranked_as``: names of rows, in place of ``method`` and ``setting``;
+        - ``corrective_best``: for shares;
+        - ``budget``: the number of trials that was asked for, missing for a method without trials.
+
+        ``load(folder).runs`` has all of them.
 
     Returns
     -------
     DataFrame
-        A row for each method, by its name, the smallest gap first: ``gap``, the mean over the
-        compared tasks (:func:`compared_tasks`: many tasks that many methods share) of the mean over
-        runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
-        (NaN with fewer than three runs on a task); the numbers of compared ``tasks`` that it solved
-        in every run, of ``missing`` tasks (other compared tasks), of ``runs`` and of ``failed``
-        runs on all tasks. A method with missing tasks has no gap and is last. The paper's learner
-        on tasks for one arm and for two has a further row, ``"dual-process (EC1, EC4)"``. With
-        ``corrective_best`` also the ``share`` of the possible gain (:func:`shares`) with
-        ``share_low`` and ``share_high``, a mean over the tasks on which something can be gained,
-        and ``without_gain``, the number of other tasks.
+        A row for each method, by its name: first the ranked methods, the smallest gap first, then
+        the others.
+
+        - ``gap``: mean over tasks of the mean over runs, with its 95 % interval ``gap_low`` to
+          ``gap_high`` for other runs on the same tasks (NaN with fewer than three runs on a task);
+          NaN for a method that is not ranked;
+        - ``share``, ``share_low``, ``share_high``: share of the possible gain (:func:`shares`), a
+          mean over the tasks on which something can be gained, and ``without_gain``, the number of
+          other tasks; only for a frame with ``corrective_best``;
+        - ``tasks``: number of tasks that it solved in every run; ``runs`` and ``failed``: numbers
+          of runs and of failed runs;
+        - ``why``: why it is not ranked, ``"1 of 2 tasks"`` or ``"6 of 9 runs failed"``; empty for a
+          ranked method.
+
+        Tasks without a best known reward do not count.
 
     Raises
     ------
     CoarticError
         A column or a name is missing, a reward is wrong (:func:`gaps`), a task has several best
-        known rewards, or a run has two rows.
+        known rewards, a run has two rows, or methods have different budgets.
 
     Examples
     --------
     >>> frame = pd.DataFrame(
-    ...     {"method": ["mine", "mine", "yours"], "task": "ascending",
-    ...      "reward": [-300, -296, -310], "best_known": -292}
+    ...     {"method": ["mine", "mine", "yours"], "task": ["ascending", "descending", "ascending"],
+    ...      "reward": [-300, -320, -310], "best_known": [-292, -304, -292]}
     ... )
-    >>> ranking(frame)[["gap", "missing", "failed"]].round(3)
-              gap  missing  failed
+    >>> ranking(frame)[["gap", "failed", "why"]].round(3)
+              gap  failed           why
     method
-    mine    0.021        0       0
-    yours   0.062        0       0
+    mine     0.04       0
+    yours     NaN       0  1 of 2 tasks
     """
-    frame = _scored_runs(frame)
-    by_method = with_joined_learners(dict([*frame.groupby("method", sort=False)]))
-    known = [of_method[of_method.best_known.notna()] for of_method in by_method.values()]
-    every = compared_tasks(zip(by_method, ({*runs.task} for runs in known), strict=True))
+    there = {*getattr(frame, "columns", ())}
+    if "ranked_as" in there:
+        frame = frame.drop(columns=["method", "setting"], errors="ignore")
+        frame = frame.rename(columns={"ranked_as": "method"})
+    runs = _scored_runs(frame, *["budget"] * ("budget" in there))
+    asked = sorted(runs.budget.dropna().unique()) if "budget" in there else []
+    if len(asked) > 1:
+        budgets = [f"{budget:.0f}" for budget in asked]
+        raise CoarticError(
+            f"column budget has {' and '.join(budgets)} trials: methods are only ranked with equal "
+            "numbers of trials. Rank those with one number, and methods without trials: "
+            f"frame[frame.budget.isna() | (frame.budget == {budgets[0]})]"
+        )
+    known = runs[runs.best_known.notna()]
+    tasks = known.task.nunique()
+    by_method = dict([*known.groupby("method", sort=False)])
     rows = []
-    for of_method, runs in zip(by_method.values(), known, strict=True):
-        of_tasks = runs[runs.task.isin(every)]
-        has_failed = of_tasks.gap.isna().groupby(of_tasks.task).transform("any")
-        solved = of_tasks[~has_failed]
-        by_task = dict([*solved.groupby("task").gap])
-        solved_all = by_task and by_task.keys() == every
-        row = (task_mean(by_task.values()) if solved_all else Estimate(np.nan)).columns("gap")
-        if "share" in frame.columns:
-            of_task = dict([*solved.dropna(subset="share").groupby("task").share])
-            estimated = task_mean(of_task.values()) if solved_all and of_task else Estimate(np.nan)
-            row |= {**estimated.columns("share"), "without_gain": len(by_task) - len(of_task)}
-        rows.append({
-            **row,
-            "tasks": len(by_task),
-            "missing": len(every) - len(by_task),
-            "runs": len(of_method),
-            "failed": int(of_method.reward.isna().sum()),
-        })  # fmt: skip
-    methods = pd.Index([*by_method], name="method", tupleize_cols=False)
+    for method, of_method in runs.groupby("method", sort=False):
+        of_tasks = by_method.get(method, known[:0])
+        failed = of_tasks.gap.isna()
+        solved = of_tasks[~of_tasks.task.isin(of_tasks.task[failed])]
+        reasons = [
+            f"{of_tasks.task.nunique()} of {counted(tasks, 'task')}"
+            * (of_tasks.task.nunique() < tasks),
+            f"{failed.sum()} of {counted(len(of_tasks), 'run')} failed" * bool(failed.any()),
+            "no best known reward" * (not tasks),
+        ]
+        why = "; ".join(filter(None, reasons))
+        by_task = [part for _, part in solved.groupby("task").gap]
+        row = (Estimate(np.nan) if why else task_mean(by_task)).columns("gap")
+        if "share" in runs:
+            parts = [part for _, part in solved.dropna(subset="share").groupby("task").share]
+            row |= (Estimate(np.nan) if why or not parts else task_mean(parts)).columns("share")
+            row["without_gain"] = len(by_task) - len(parts)
+        counts = {"tasks": len(by_task), "runs": len(of_method)}
+        rows.append(row | counts | {"failed": int(of_method.reward.isna().sum()), "why": why})
+    methods = pd.Index([*runs.method.unique()], name="method", tupleize_cols=False)
     return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Set
+from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -14,6 +14,8 @@ from coartic.analysis.methods import (
     COLORS,
     CONDITION_OF,
     EC1,
+    EC3,
+    EC4,
     INFORMED_LEARNERS,
     KNOWN_METHODS,
     LEARNERS,
@@ -22,7 +24,7 @@ from coartic.analysis.methods import (
     title_of,
 )
 from coartic.internal.text import one_line
-from coartic.learner.conditions import CONDITIONS, METHOD_PREFIX
+from coartic.learner.conditions import METHOD_PREFIX
 from coartic.method import Information
 from coartic.runs.plan import in_words
 
@@ -47,10 +49,10 @@ MARK = " ‡"
 def methods_of(
     runs: pd.DataFrame, declared: Mapping[str, MethodInfo], marked: Collection[str] = ()
 ) -> pd.DataFrame:
-    """Return a row for each method with its setting, and for each pair of learners that
-    :func:`_joined_learners` joins: built-in methods in the order of ``methods.toml``, then methods
-    from files in the order of the suite. The row of a pair stands for the runs of the second
-    learner, and of the first on other tasks; most columns are as in the row of the second.
+    """Return a row for each method with its setting, and for two conditions of the learner that
+    are ranked as one (:func:`ranked_as`): built-in methods in the order of ``methods.toml``, then
+    methods from files in the order of the suite. Most columns of two conditions are those of the
+    second.
 
     Parameters
     ----------
@@ -84,7 +86,6 @@ def methods_of(
             "base": base,
             "condition": CONDITION_OF.get(base, ""),
             "setting": setting,
-            "parts": (label,),
             "title": title_of(called, named) + MARK * (base in marked),
             "short": title_of(base, named, short=True) + MARK * (base in marked),
             "algorithm": facts.algorithm if facts else one_line(label),
@@ -97,12 +98,12 @@ def methods_of(
             "under": under,
             "look": tuple(facts.look) if facts and not setting else (),
         }
-    tasks = {label: {*of_method.task} for label, of_method in by_label.items()}
-    for label, (one, two) in _joined_learners(tasks):
-        conditions = label.partition(" ")[2].replace("-informed", "")
-        names = {"title": f"{rows[two]['algorithm']} {conditions}"}
-        names["short"] = f"{rows[two]['short'].rpartition(' ')[0]} {conditions}"
-        rows[label] = rows[two] | {"parts": (one, two)} | names
+    for label, joined in runs[runs.ranked_as != runs.label].groupby("ranked_as"):
+        second = rows[max(joined.label, key=[*KNOWN_METHODS].index)]
+        conditions = str(label).partition(" ")[2].replace("-informed", "")
+        names = {"title": f"{second['algorithm']} {conditions}"}
+        names["short"] = f"{second['short'].rpartition(' ')[0]} {conditions}"
+        rows[str(label)] = second | names
     for label, look in _looks_of(rows):
         rows[label]["look"] = look
     place = {name: number for number, name in enumerate(KNOWN_METHODS)}
@@ -142,36 +143,24 @@ def _group_of(runs: pd.DataFrame) -> str:
     return BY_FORMULA if Information.REWARD_FORMULA.value in information else WITHOUT_REWARD
 
 
-def _joined_learners(tasks: Mapping[Any, Set[Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the label of each row that joins two methods of the learner, with their ids: EC1 and a
-    condition that draws hands at random; or both informed learners.
-
-    ``tasks``: names of the tasks on which each method ran, by label. A row needs tasks of its
-    second method, and tasks of its first on which the second did not run.
-    """
-    drawing = [x for x in LEARNERS if CONDITIONS[CONDITION_OF[x]].hand_exploration == "random"]
-    for one, two in (*((EC1, label) for label in drawing), INFORMED_LEARNERS):
-        one_armed, two_armed = (tasks.get(each, set()) for each in (one, two))
-        if two_armed and one_armed - two_armed:
-            yield joined_label(one, two), (one, two)
+def ranked_as(runs: pd.DataFrame) -> pd.Series:
+    """Return the name of the row of the ranking in which each run counts: its label, except that
+    two conditions of the learner are one row, :func:`joined_label`, if one ran on tasks for one arm
+    and the other on tasks for two. Column ``label`` of ``runs`` has labels."""
+    tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
+    names = runs.label
+    for one, others in ((EC1, (EC4, EC3)), (INFORMED_LEARNERS[0], INFORMED_LEARNERS[1:])):
+        for two in others:
+            if one in tasks and two in tasks and not tasks[one] & tasks[two]:
+                names = names.mask(names.isin([one, two]), joined_label(one, two))
+                break
+    return names
 
 
 def joined_label(one: str, two: str) -> str:
     """Return the label of the row that joins the methods ``one`` and ``two`` (ids) of the learner,
     such as ``dual-process (EC1, EC4)``."""
     return f"{METHOD_PREFIX.rstrip('/')} ({CONDITION_OF[one]}, {CONDITION_OF[two]})"
-
-
-def with_joined_learners(by_method: dict[Any, pd.DataFrame]) -> dict[Any, pd.DataFrame]:
-    """Return runs by label: first the runs of joined learners (:func:`_joined_learners`), by
-    :func:`joined_label` (runs of the first method on tasks on which the second did not run, and all
-    runs of the second), then the runs of each given method."""
-    tasks = {method: {*runs.task} for method, runs in by_method.items()}
-    joined = {
-        label: pd.concat([by_method[one][~by_method[one].task.isin(tasks[two])], by_method[two]])
-        for label, (one, two) in _joined_learners(tasks)
-    }
-    return joined | by_method
 
 
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
@@ -202,12 +191,8 @@ def headline_methods(rows: pd.DataFrame) -> list[str]:
     """Return the labels of the rows that represent their algorithms (column ``headline``), among
     ``rows``, some rows of :attr:`.Study.methods`; all labels if no row does.
 
-    Settings count as in :func:`without_settings`. A row that joins conditions of the learner takes
-    the place of all rows of its algorithm; of several such rows only the last counts, with the
-    condition that explores most.
+    Settings count as in :func:`without_settings`.
     """
     kept = without_settings(rows)
     kept = kept[kept.headline]
-    joined = kept[kept.parts.map(len) > 1].groupby("algorithm").tail(1)
-    kept = kept[~kept.algorithm.isin(joined.algorithm) | kept.index.isin(joined.index)]
     return [*(kept if len(kept) else rows).index]

@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences, initial_hands
-from coartic.analysis.method_frame import methods_of, parameter_varied
+from coartic.analysis.method_frame import methods_of, parameter_varied, ranked_as
 from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
 from coartic.analysis.signatures.measures import SIGNATURES
 from coartic.analysis.solutions import Solutions
@@ -30,11 +30,12 @@ from coartic.internal.arguments import Asked, Computed, checked_arguments
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
+from coartic.method import Information
 from coartic.motion.solution import initial_reward
 from coartic.motion.trial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, label_of, size_of
+from coartic.runs.plan import Job, label_of, size_of, trials_in
 from coartic.runs.record import execute_all
 from coartic.runs.shipped import open_results
 from coartic.runs.store import explain_errors
@@ -182,52 +183,6 @@ class Study:
         )
         return f"<p>{html.escape(repr(self))}</p>{counts.reset_index().to_html(index=False)}"
 
-    @checked_arguments
-    def only(
-        self, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-    ) -> Study:
-        """Return a study of some methods on some tasks alone.
-
-        Parameters
-        ----------
-        methods : sequence of str, optional
-            Ids, labels with a setting, or labels of the ranking, such as ``"dual-process (EC1,
-            EC4)"``; by default all.
-        tasks : sequence of str, optional
-            Names of tasks; by default all.
-
-        Returns
-        -------
-        Study
-            A new study. Its gaps are the same as here: best known rewards are of all methods here.
-
-        Raises
-        ------
-        CoarticError
-            The folder has no such method or task, or no run of them.
-        """
-        jobs, labels = list(self.plan), {*self.methods.index, *self.methods.base}
-        for kind, names, there in (("method", methods, labels), ("task", tasks, {*self.tasks})):
-            for name in names or ():
-                if name not in there:
-                    raise CoarticError(unknown(kind, name, sorted(there)))
-        if methods is not None:
-            rows = self.methods[self.methods.index.isin(methods) | self.methods.base.isin(methods)]
-            labels = {label for parts in rows.parts for label in parts}
-            jobs = [job for job in jobs if job.cell.label in labels]
-        if tasks is not None:
-            jobs = [job for job in jobs if job.cell.task.name in tasks]
-        if not jobs:
-            raise CoarticError("the folder has no runs of these methods on these tasks")
-        kept = pd.MultiIndex.from_tuples([(job.cell.task.name, job.cell.label) for job in jobs])
-        of = pd.MultiIndex.from_frame(self.runs[["task", "label"]])
-        stored = self.stored[of.isin(kept)]
-        part = replace(self, plan=jobs, stored=stored)
-        vars(part)["optima"] = {
-            name: self.optima[name] for name in part.tasks if name in self.optima
-        }
-        return part
-
     @property
     def suite(self) -> str:
         """Name of the suite that was run."""
@@ -299,7 +254,10 @@ class Study:
     def runs(self) -> pd.DataFrame:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
-        Further columns: ``label``, the method with its setting; ``family``, ``split``, number of
+        Further columns: ``label``, the method with its setting; ``ranked_as``, the name of its row
+        in the ranking, which differs from ``label`` where two conditions of the learner, for one
+        arm and for two, are one row; ``budget``, the number of trials that was asked for, missing
+        for methods that do not use the reward of each trial; ``family``, ``split``, number of
         ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task (missing without one, and
         for a search with another base) and :attr:`corrective_best`; ``gap``, a share of the best
         known reward; and a column for each parameter of methods, unless its name is taken:
@@ -307,6 +265,7 @@ class Study:
         """
         labels = [*map(label_of, self.stored.method, self.stored.setting)]
         runs, cells = self.stored.assign(label=labels), [job.cell for job in self.plan]
+        runs["ranked_as"] = ranked_as(runs)
         rows = [
             {
                 **cell.method.defaults,
@@ -315,12 +274,15 @@ class Study:
                 "split": cell.task.split,
                 "goals": len(cell.task.goals),
                 "arms": len(cell.task.hands),
+                "budget": trials_in(cell.parameters) or None,
             }
             for cell in cells
         ]
         keys = pd.MultiIndex.from_tuples([(cell.task.name, cell.label) for cell in cells])
         more = pd.DataFrame(rows, keys)
         runs = runs.join(more[[name for name in more if name not in runs]], on=["task", "label"])
+        by_trial = runs.information.str.contains(Information.REWARD_BY_TRIAL.value, regex=False)
+        runs["budget"] = runs.budget.where(by_trial).astype("Int64")
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task
         best = {name: each.reward for name, each in self.optima.items()}
         runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
@@ -334,16 +296,13 @@ class Study:
     def methods(self) -> pd.DataFrame:
         """A row for each method with its setting, by label, in the order of lists and figures.
 
-        Two conditions of the learner can make a further row, the second on its tasks, the first on
-        others (mostly for one arm): EC1 with EC4, EC1 with EC3, and the informed EC1 and EC4. Most
-        columns of this row are as in the row of the second. Columns:
+        Two conditions of the learner that are ranked as one, such as EC1 on tasks for one arm and
+        EC4 on tasks for two, have a further row, with most columns of the second. Columns:
 
         - ``base``: id of the method without a setting;
         - ``condition``: id of the learner's condition, such as ``EC4``, also of an informed one or
           an ablation; empty for an own condition and other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
-        - ``parts``: labels of its runs, a tuple of one text, or two of a joined row, in which runs
-          of the second label count on a task with runs of both;
         - ``title``: name on the page, in tables and figures;
         - ``short``: name in figures of one column;
         - ``algorithm``: algorithm that the method is a form of;
@@ -393,15 +352,13 @@ class Study:
     @cached_property
     def solutions(self) -> pd.DataFrame:
         """A row for each movement of the solutions: ``run_id``, ``order``, ``goal``, ``hand``,
-        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder's plan, also in a
-        study by :meth:`only`."""
+        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder's plan."""
         with open_results(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the id of each run with rewards of trials, with these rewards, negative
-        ticks, shape ``(trials,)``, NaN for a trial that failed or whose reward is not kept; of all
-        runs of the folder's plan, also in a study by :meth:`only`."""
+        ticks, shape ``(trials,)``, NaN for a trial that failed or whose reward is not kept."""
         with open_results(self.folder) as store:
             yield from store.rewards()
 
@@ -531,8 +488,7 @@ class Study:
     @cached
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` by run id, of the first 500 solved
-        runs of each method on each task of the folder, also in a study by :meth:`only`; for
-        ``replay`` runs without a replay are left out."""
+        runs of each method on each task; for ``replay`` runs without a replay are left out."""
         with open_results(self.folder) as store:
             return store.movements(part, MOST_EXECUTED)
 

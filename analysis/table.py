@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL, WITHOUT_REWARD
-from coartic.analysis.standings import common_tasks, reference, shown_name
+from coartic.analysis.standings import ranked_tasks, reference
 from coartic.analysis.study import Study, cached, solved
 from coartic.analysis.words import id_of, marked
 from coartic.estimates import standard_deviation
@@ -151,14 +151,13 @@ def _shown_names(study: Study) -> dict[Hashable | None, Any]:
     are taken; ``compared``: number of compared tasks, such as ``3 tasks``.
     """
     methods, tasks = study.methods, study.tasks
-    names = {label: shown_name(study, label) for label in methods.index}
     families = {str(task.family): str(task.family).partition("/")[0] for task in tasks.values()}
     marks = {name: marked(task) for name, task in tasks.items()}
     return {
-        "titles": {**families, **marks, **names, **_USES},
+        "titles": {**families, **marks, **methods.title, **_USES},
         "under": methods.under[methods.under != ""].to_dict(),
         "own": [*methods.index[~methods.built_in]],
-        "compared": counted(len(common_tasks(study)), "task"),
+        "compared": counted(len(ranked_tasks(study)), "task"),
         "reference": reference(study, study.optima),
     }
 

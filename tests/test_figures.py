@@ -100,20 +100,13 @@ def test_a_caption_names_what_its_figure_shows(method, task, named):
     assert [words for words in absent if words in caption] == named
 
 
-def test_a_figure_has_chosen_methods_tasks_and_style(shipped, tmp_path):
-    chosen = {"methods": ["cma-es/bandit", "dual-process (EC1, EC4)"], "tasks": ["ascending"]}
-    plot = FIGURES["ranking"](shipped, style={"axes.labelsize": 20.0}, **chosen)
-    every = FIGURES["ranking"](shipped, tasks=["ascending"])
-    assert plot.data.method.tolist() == ["cma-es/bandit", "dual-process/EC1"]
-    gaps = every.data.set_index("method").gap
-    assert plot.data.gap.tolist() == gaps[plot.data.method].tolist()
+def test_a_figure_has_chosen_style(shipped, tmp_path):
+    plot = FIGURES["ranking"](shipped, style={"axes.labelsize": 20.0})
     assert plot.figure.axes[0].xaxis.label.get_fontsize() == 20.0
     plot.save(tmp_path / "mine.pdf")
     assert (tmp_path / "mine.pdf").read_bytes().startswith(b"%PDF")
     with pytest.raises(CoarticError, match=r"ends in \.svg, \.pdf, \.png; not in '\.doc'"):
         plot.save(tmp_path / "mine.doc")
-    with pytest.raises(CoarticError, match="unknown method 'cma-es/bandits'.*cma-es/bandit"):
-        FIGURES["ranking"](shipped, methods=["cma-es/bandits"])
 
 
 def test_the_gallery_shows_every_figure():

@@ -192,23 +192,22 @@ def test_a_task_that_a_method_lacks_is_not_reached():
         frames.ecdf(unknown.assign(best_known=np.nan), [0.05])
 
 
-def test_one_more_task_of_one_method_changes_no_other_gap():
-    """Three methods share two tasks; one of them ran on a third. A fourth failed on a task, and a
-    fifth lacks it: they have no gap."""
-    rewards = {"a": [-110, -120, -100], "b": [-105, -130], "c": [-101, -102]}
-    rewards |= {"d": [-100, np.nan], "e": [-100]}
+def test_ranked_is_who_solved_all_tasks_of_the_frame():
+    """A failed run counts on its task; a task without a best known reward counts for nobody."""
+    rewards = {"a": [-110, -120], "b": [-105, -130], "c": [-101, np.nan], "d": [-100]}
     frame = pd.DataFrame(
         {"method": method, "task": task, "reward": reward, "best_known": -100}
         for method, of_method in rewards.items()
-        for task, reward in zip("xyz", of_method, strict=False)
+        for task, reward in zip("xy", of_method, strict=False)
     )
-    ranked = frames.ranking(frame)
-    assert ranked.gap.dropna().to_dict() == pytest.approx({"c": 0.015, "a": 0.15, "b": 0.175})
-    assert ranked.index.tolist() == ["c", "a", "b", "d", "e"]
-    assert ranked.tasks.tolist() == [2, 2, 2, 1, 1]
-    assert ranked.missing.tolist() == [0, 0, 0, 1, 1]
-    assert ranked.runs.to_dict() == {"a": 3, "b": 2, "c": 2, "d": 2, "e": 1}
-    assert ranked.failed["d"] == 1
+    unknown = {"method": "a", "task": "z", "reward": -1, "best_known": np.nan}
+    ranked = frames.ranking(pd.concat([frame, pd.DataFrame([unknown])], ignore_index=True))
+    assert ranked.gap.dropna().to_dict() == pytest.approx({"a": 0.15, "b": 0.175})
+    why = {"a": "", "b": "", "c": "1 of 2 runs failed", "d": "1 of 2 tasks"}
+    assert ranked.why.to_dict() == why
+    assert ranked.tasks.tolist() == [2, 2, 1, 1]
+    assert ranked.runs.to_dict() == {"a": 3, "b": 2, "c": 2, "d": 1}
+    assert ranked.failed["c"] == 1
 
 
 CARRIED = [-3, -2, -1, 0, 1, 1, 2, 2, 3, 4, 5, 9]

@@ -58,8 +58,8 @@ def test_gaps_are_to_the_best_known_reward():
     study = rewarded(RISING, families=ONE + TWO)
     runs = on_instances(study)
     gaps = runs[runs.task == "two-armed/v1/i000"].groupby("method").gap.mean()
-    assert gaps[[EC4, "dual-process (EC1, EC4)"]].tolist() == pytest.approx([40 / 500] * 2)
-    assert EC1 not in gaps
+    assert gaps["dual-process (EC1, EC4)"] == pytest.approx(40 / 500)
+    assert not {EC1, EC4} & {*gaps.index}
     assert not study.optima["two-armed/v1/i000"].proven
     assert study.optima["two-armed/v1/i001"].proven
     assert list(runs.family.unique()) == [*ONE, *TWO]

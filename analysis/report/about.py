@@ -13,17 +13,10 @@ from typing import Any, TypeVar
 import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
-from coartic.analysis.method_frame import GROUPS, joined_label, without_settings
+from coartic.analysis.method_frame import GROUPS, joined_label
 from coartic.analysis.methods import EC1, EC4, RANDOM_SEARCH, title_of
 from coartic.analysis.sections import SECTIONS, Section
-from coartic.analysis.standings import (
-    board,
-    common_tasks,
-    equal_trials,
-    not_ranked,
-    reference,
-    trials_of,
-)
+from coartic.analysis.standings import ranked_tasks, reference, standings
 from coartic.analysis.study import Study, cached, one_by_one
 from coartic.analysis.table import is_setting
 from coartic.analysis.words import (
@@ -87,15 +80,12 @@ def finding(study: Study, section: Section) -> list[str]:
     )
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "commonest": commonest, "listed": listed}
-    standings = without_settings(board(study))
-    is_unequal = standings.index.map(trials_of(study)) != equal_trials(study)
-    rows = rows[~rows.method.isin(standings.index[~standings.ranked.astype(bool)])]
     environment.globals |= {
-        "not_ranked": not_ranked(study), "unequal": {*standings.information[is_unequal]},
         "interval": interval, "number": number, "p_value": p_value, "leading": leading,
         "infinite": math.inf,
-        "uses": GROUPS, "first": next(iter(standings.index), ""), "titles": frame.attrs["titles"],
-        "reference": reference(study, common_tasks(study)),
+        "uses": GROUPS, "first": next(iter(standings(study).index), ""),
+        "titles": frame.attrs["titles"],
+        "reference": reference(study, ranked_tasks(study)),
         "LEVEL": LEVEL, "varied": study.varied[0] and not study.against,
         "papers": study.methods.index[study.methods.is_learner & (study.methods.setting == "")],
         "rivals": "other" if study.against else "built-in",
@@ -106,7 +96,7 @@ def finding(study: Study, section: Section) -> list[str]:
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
     """Return rows of a table, each as a dict: the rows of the first two rows' methods, of the
-    paper's learner (EC1, EC4, both joined), of random search and of methods from files."""
+    paper's learner, of random search and of methods from files."""
     always = [joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH, *rows.attrs.get("own", [])]
     return rows[rows.method.isin([*rows.method[:2], *always])].to_dict("records")
 

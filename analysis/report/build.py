@@ -130,7 +130,7 @@ def _parts_of(study: Study, section: Section) -> dict[str, Any]:
     tables = []
     for table in section.tables:
         frame = table(study)
-        if table.id not in ("ranking", "contexts", "methods"):
+        if table.id not in ("ranking", "not-ranked", "contexts", "methods"):
             frame = frame[~is_setting(frame)]
         if len(frame):
             settings = sum("setting" in names for names in classes_of(table, frame))

@@ -7,7 +7,7 @@ from typing import Any
 
 from coartic.analysis.control import contexts_of_control
 from coartic.analysis.sections.coarticulation import shared_goal
-from coartic.analysis.standings import cells_of, compared, own_methods, shown_name
+from coartic.analysis.standings import cells_of, runs_by_method, standings
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, solved, typical_run
 from coartic.analysis.table import SHORT_ID
 from coartic.play.page import player_figure, preset_of
@@ -21,8 +21,8 @@ def player(study: Study) -> str:
     straight has a solution, with the run of each such method nearest the median reward. If goal 1
     is the :func:`.shared_goal` and such a method solved both tasks, this goal is the first preset,
     with the standardised posture difference of random search there, if any. The method shown first
-    is the first of :func:`.own_methods` in a preset, or else the method at the shared goal, if it
-    is in the first preset, or the first one there.
+    is the first method from a file, in the order of :func:`.standings`, in a preset, or else the
+    method at the shared goal, if it is in the first preset, or the first one there.
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
@@ -48,7 +48,7 @@ def player(study: Study) -> str:
     ids = [[run["id"] for run in preset["runs"]] for preset in presets]
     own = (
         {"preset": number, "who": method}
-        for method in own_methods(study)
+        for method in standings(study).query("not built_in").index
         for number, there in enumerate(ids)
         if method in there
     )
@@ -60,7 +60,7 @@ def player(study: Study) -> str:
         first=next(own, {"who": first if first in ids[0] else ids[0][0]}),
         cells=[
             (method, f"on {task}", {"preset": where[task], "who": label})
-            for method, runs in compared(study).items()
+            for method, runs in runs_by_method(study).items()
             for task, label in cells_of(runs)
             if task in where and label in {run["id"] for run in alone[task]["runs"]}
         ],
@@ -82,7 +82,7 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
             if len(tasks) > 1:
                 for film, name in zip(films, tasks, strict=True):
                     film["reached"] = study.configurations(name, label)[:, 0].round(3).tolist()
-            runs.append({"id": label, "name": shown_name(study, label), "films": films})
+            runs.append({"id": label, "name": study.methods.title[label], "films": films})
     return runs
 
 

@@ -30,7 +30,8 @@ from coartic.internal.text import one_line
 
 IN_LATEX = {
     "contexts": "place, method, runs, distance, p_holm, control, p_random_search",
-    "ranking": "method, gap, share, on *",
+    "ranking": "method, gap, share, on *, note",
+    "not-ranked": "method, why, on *, note",
     "differences": "against, method, difference, p_holm, tasks",
     "runtimes": "method, reached, trials_to_half, forward_kinematics_to_half",
     "learning": "task, method, runs, after_*",

@@ -31,9 +31,9 @@ class Section:
     folds all figures except the first."""
     sentence: str = ""
     """Jinja template of the finding in words, or empty. Its names are ``every``, the first table;
-    ``rows``, this table with the ``title`` of each method, without settings, ablations and methods
-    below the ranking; ``others``, the other tables with titles, without settings and ablations
-    (further names: :func:`.finding`)."""
+    ``rows``, this table with the ``title`` of each method, without settings and ablations;
+    ``others``, the other tables with titles, without settings and ablations (further names:
+    :func:`.finding`)."""
     note: str = ""
     """Explanation of figures and tables."""
     single: bool = True
@@ -46,14 +46,14 @@ SECTIONS = (
     Section(
         "ranking",
         "Ranking",
-        (ranking.list_ranking, ranking.list_differences),
+        (ranking.list_ranking, ranking.list_not_ranked, ranking.list_differences),
         (ranking.draw_ranking,),
         sentence="""\
 {% if varied %}
-{% for best in leading(rows[rows.missing == 0])[:1] %}
+{% for best in leading(rows)[:1] %}
 {{ best.title }} comes nearest to the {{ reference }}: its gap is \
 {{ interval(best, "gap", scale=100, unit=" %") }}.
-{%- for next in others[0].to_dict("records")[:1] %}
+{%- for next in others[1].to_dict("records")[:1] %}
  Next is {{ next.title }}, {{ interval(next, "difference", scale=100) }} percentage points behind\
 {{ ": %s chance (%s)" % ("beyond" if next.p_holm < LEVEL else "not beyond", p_value(next.p_holm)) \
 if next.p_holm >= 0 else ", too few runs to test" }}.
@@ -64,15 +64,15 @@ if next.p_holm >= 0 else ", too few runs to test" }}.
 
 {% endfor %}
 {% else %}
-{% set complete = rows[rows.missing == 0].dropna(subset=["gap"]) %}
 {% for use in uses %}
-{% set of_use = complete[complete.information == use] %}
+{% set of_use = rows[rows.information == use] %}
 {% for row in leading(of_use) %}
-{% set place = of_use.method.tolist().index(row.method) + 1 %}
+{% set place = (of_use.gap < row.gap).sum() + 1 %}
+{% set tied = (of_use.gap == row.gap).sum() > 1 %}
 {% if loop.first %}
-{{ use | capitalize }}{{ ", not with equal trials" if use in unequal }}, {{ row.title }} leaves \
-{{ "a" if loop.last else "the smallest" }} gap to the {{ reference }}\
-{{ " of" if loop.last else "," }} \
+{{ use | capitalize }}, {{ row.title }} leaves \
+{{ "a" if loop.last or tied else "the smallest" }} gap to the {{ reference }}\
+{{ " of" if loop.last or tied else "," }} \
 {% else %}
 {{ row.title }} leaves {% endif %}
 {{ interval(row, "gap", scale=100, unit=" %") }}\
@@ -82,11 +82,7 @@ if next.p_holm >= 0 else ", too few runs to test" }}.
 
 {% endfor %}
 {% endif %}
-{% for sentence in not_ranked %}
-{{ sentence }}
-
-{% endfor %}
-{% for against, group in others[0].groupby("against", sort=False) if not varied %}
+{% for against, group in others[1].groupby("against", sort=False) if not varied %}
 {{ titles[against] }} against {{ rivals }} methods, percentage points by which its gap is \
 smaller on the tasks that it solved: \
 {% for row in leading(group) %}
@@ -102,10 +98,9 @@ smaller on the tasks that it solved: \
         "100 % the {reference}; tasks on which both are equal have none. Intervals describe "
         "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
-        "by two-tailed tests, corrected for the tasks of the method (table "
-        "against-learner). Empty: the runs are too few, or too alike, to tell. Ranked are methods "
-        "that solved all tasks in at most as many trials as the others; own methods that did not "
-        "stand below. What an own method uses is as its "
+        "by two-tailed tests, corrected for the tasks of the method. Empty: the runs are too few, "
+        "or too alike, to tell. Ranked are the methods that solved all tasks in as many trials as "
+        "were asked for; planners count with any number. What an own method uses is as its "
         "author declares; own methods are bold.",
         single=False,
     ),
@@ -202,8 +197,7 @@ interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them with
     ),
 )
 TABLES = {table.id: table for section in SECTIONS for table in section.tables}
-TABLES["against-learner"] = ranking.list_against_learner
 TABLES["saved"] = coarticulation.list_saved
-"""Tables by id; ``against-learner`` and ``saved`` are CSV files without a section."""
+"""Tables by id; ``saved`` is a CSV file without a section."""
 FIGURES = {id_of(draw): draw for section in SECTIONS for draw in section.figures}
 """Figures by id."""

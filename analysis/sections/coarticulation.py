@@ -64,8 +64,7 @@ def shared_goal(study: Study) -> TwoContexts | None:
     """
     rows = study.methods
     subjects = rows.index[rows.is_learner], rows.index[~rows.built_in]
-    single = rows[rows.parts.map(len) == 1]
-    order = [*LEARNERS, *itertools.chain(*subjects), *headline_methods(single), *rows.index]
+    order = [*LEARNERS, *itertools.chain(*subjects), *headline_methods(rows), *rows.index]
     every = (_shared_goals(study, label) for label in dict.fromkeys(order))
     return next(itertools.chain.from_iterable(every), None)
 

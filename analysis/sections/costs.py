@@ -114,19 +114,13 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 
 def _runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
-    """Return, by label, the runs of each compared method on each of :func:`.common_tasks` that has
-    targets (:func:`spans`).
-
-    A method without runs on all these tasks (:func:`.runs_on`) is left out; a method from a file
-    then has its runs on all its tasks with targets.
-    """
-    common = [task for task in standings.common_tasks(study) if task in spans(study)]
+    """Return, by label, the runs of each method that ran on all tasks with targets (:func:`spans`)
+    among the ranked tasks."""
+    tasks = [task for task in standings.ranked_tasks(study) if task in spans(study)]
     of_methods = {}
-    for method, every in standings.compared(study).items():
-        runs = standings.runs_on(study, method, common) if common else every[:0]
-        if not (len(runs) or study.methods.built_in[method]):
-            runs = every[every.task.isin(spans(study).keys())]
-        if len(runs):
+    for method, every in standings.runs_by_method(study).items():
+        runs = every[every.task.isin(tasks)]
+        if len(runs) and runs.task.nunique() == len(tasks):
             of_methods[method] = runs
     return of_methods
 
@@ -145,8 +139,8 @@ def runtimes(
     """Return the share of reward targets that methods reach within a budget: the ECDF of running
     times.
 
-    Methods are compared methods that ran on all compared tasks that have targets, and other methods
-    from files, on the tasks on which they ran. Tasks have the same weight.
+    Methods are those that ran on all ranked tasks that have targets; a failed run reaches none.
+    Tasks have the same weight.
 
     Parameters
     ----------
@@ -195,7 +189,7 @@ def runtimes(
 
 @table(
     "Cost of reaching shares of the targets",
-    "method; reached: targets reached (%) .0; tasks: number of tasks; "
+    "method; reached: targets reached (%) .0; "
     "trials_to_quarter[]: trials to a quarter of the targets; "
     "trials_to_half[]: trials to half of the targets; "
     "forward_kinematics_to_half[]: forward-kinematics evaluations to half of the targets; "
@@ -213,15 +207,14 @@ def list_runtimes(study: Study) -> Rows:
         if not all(map(len, times["trials"])):
             continue
         reached = running_times.share_reached(times["trials"])
-        row: Row = {"method": method, "reached": reached, "tasks": runs.task.nunique()}
+        row: Row = {"method": method, "reached": reached}
         for name, spend, share in COSTS:
             if all(map(len, times[spend])):
                 row |= running_times.budget_for(times[spend], share).columns(name)
         if study.methods.information[method] == BY_TRIAL:
-            for task, label in standings.cells_of(standings.compared(study)[method]):
-                if task in spans(study):
-                    half = times_of(study, task, label, "trials", (0.5,))
-                    row[f"half on {task}"] = float(np.quantile(half, 0.5, method="inverted_cdf"))
+            for task, label in standings.cells_of(runs):
+                half = times_of(study, task, label, "trials", (0.5,))
+                row[f"half on {task}"] = float(np.quantile(half, 0.5, method="inverted_cdf"))
         yield method, row | run_ids(runs)
 
 
@@ -285,7 +278,7 @@ def draw_runtimes(study: Study) -> Parts | None:
                 x, low, high, step="post", color=look["color"], alpha=0.22, linewidth=0
             )
             (drawn,) = axes.step(x, y, where="post", **look)
-            name = standings.shown_name(study, str(label))
+            name = study.methods.title[str(label)]
             style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
         axes.set_xlim(edge, most)
         axes.set_ylim(-2, 102)
@@ -310,4 +303,4 @@ def draw_runtimes(study: Study) -> Parts | None:
         )  # fmt: skip
     shares = spoken(study, ends, "{title} {share:.0f} %")
     alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
-    return drawing, data, alt, " Means over all tasks." * bool(tabled.tasks.max() > 1)
+    return drawing, data, alt, " Means over all tasks." * (len(spans(study)) > 1)

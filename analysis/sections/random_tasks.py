@@ -12,7 +12,7 @@ import pandas as pd
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, figure, looks_in, name_in_figure, spoken
 from coartic.analysis.method_frame import without_settings
-from coartic.analysis.standings import compared, reference, solved_tasks, together
+from coartic.analysis.standings import compared_runs, reference, runs_by_method
 from coartic.analysis.statistics.instances import Scores, other_tasks
 from coartic.analysis.study import Study, cached
 from coartic.analysis.table import Row, Rows, run_ids, table
@@ -31,17 +31,16 @@ def _instances(study: Study) -> dict[str, list[str]]:
 
 @cached
 def on_instances(study: Study) -> pd.DataFrame:
-    """Return the runs of compared methods on those instances with a best known reward on which the
-    method solved every run, sorted by family and instance as in :func:`_instances`. Column
-    ``method`` has the label of the method's row; runs of a condition are there again under the
-    label of a joined learner. Do not change the frame: it is kept."""
-    parts = {method: runs[runs.task.isin(solved_tasks(study, method))]
-             for method, runs in compared(study).items()}  # fmt: skip
-    every = together(study, parts)
+    """Return the runs of methods on those instances with a best known reward on which the method
+    solved every run, sorted by family and instance as in :func:`_instances`. Column ``method`` has
+    the label of the method's row in the ranking. Do not change the frame: it is kept."""
+    runs = compared_runs(study)
     names = [*itertools.chain.from_iterable(_instances(study).values())]
-    every = every[every.task.isin(names)]
-    place = pd.Categorical(every.task, names)
-    return every.assign(place=place).sort_values("place", kind="stable")
+    failed = runs.reward.isna().groupby([runs.ranked_as, runs.task]).transform("any")
+    runs = runs[runs.task.isin(names) & ~failed]
+    place = pd.Categorical(runs.task, names)
+    runs = runs.assign(place=place, method=runs.ranked_as)
+    return runs.sort_values("place", kind="stable")
 
 
 def _by_family(study: Study, runs: pd.DataFrame) -> Scores:
@@ -72,7 +71,7 @@ def list_family_gaps(study: Study) -> Rows:
     """
     every, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {each for each in families if len(study.tasks[families[each][0]].hands) > 1}
-    for method, of_method in compared(study).items():
+    for method, of_method in runs_by_method(study).items():
         runs, ran = every[every.method == method], {*of_method.family.dropna()}
         scores, over = _by_family(study, runs), two_armed if two_armed & ran else ran
         solved = runs[runs.family.isin(over)].task.nunique()
@@ -98,10 +97,10 @@ def list_family_gaps(study: Study) -> Rows:
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
     """Draw the gap to the best known reward, mean over runs, of each instance that a method solved
-    in every run, a panel for each family and a row for each method, without joined learners and
-    settings whose method is there; None without such runs."""
+    in every run, a panel for each family and a row for each method, without settings whose method
+    is there; None without such runs."""
     runs, rows = on_instances(study), study.methods
-    methods = without_settings(rows[rows.index.isin(runs.method) & (rows.parts.map(len) == 1)])
+    methods = without_settings(rows[rows.index.isin(runs.method)])
     runs = runs[runs.method.isin(methods.index)]
     if not len(runs):
         return None

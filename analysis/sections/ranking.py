@@ -12,21 +12,19 @@ import pandas as pd
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.plot import Parts, Plot, figure, looks_in, name_in_figure, spoken
-from coartic.analysis.frames import ranking
 from coartic.analysis.method_frame import GROUPS, without_settings
 from coartic.analysis.methods import EC1, EC4
+from coartic.analysis.optima import gap_share
 from coartic.analysis.sections.costs import best_after, improvements
 from coartic.analysis.standings import (
-    board,
-    cells_of,
-    common_runs,
-    common_tasks,
-    compared,
-    own_methods,
+    compared_runs,
+    ranked_tasks,
+    ranking_budget,
     reference,
+    runs_by_method,
     runs_on,
-    shown_name,
     solved_tasks,
+    standings,
 )
 from coartic.analysis.statistics.hypotheses import (
     bootstrap_test,
@@ -34,7 +32,7 @@ from coartic.analysis.statistics.hypotheses import (
     holm,
     stratified_test,
 )
-from coartic.analysis.study import Study, one_by_one, solved
+from coartic.analysis.study import Study, cached, one_by_one, solved
 from coartic.analysis.table import Row, Rows, run_ids, table
 from coartic.analysis.words import capital, interval, listed, marked, number
 from coartic.estimates import FEWER_RESAMPLES, LEVEL, Estimate, mean_of_means
@@ -45,22 +43,19 @@ _EARLY = 1_000
 """Number of trials after which the ranking has a further gap, ``gap_early``."""
 
 
-@table(
-    "Mean rewards of methods and of the learner that explores most, by task",
-    "task; method; runs; reward .1; learner: learner's reward .1; p_holm: p (corrected) .p; "
-    "least_p: -",
-)
-def list_against_learner(study: Study) -> Rows:
-    """Yield a row for each method, except searches and this learner, and each task of
-    :func:`.one_by_one`: mean rewards, negative ticks, of the method and of the learner (EC1, with
-    two arms EC4), and p of their difference.
+@cached
+def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
+    """Return, by label, on how many tasks of :func:`.one_by_one` the mean reward of a method is
+    ``better`` and ``worse`` than that of the learner that explores most (EC1, with two arms EC4).
 
-    Only for tasks on which both solved every run. p is two-sided, of the exchange test, or, for a
-    deterministic method, whose reward counts as exact, of the bootstrap test, and is corrected over
-    the tasks of a method (Holm). Runs with the same seed are not compared as pairs.
+    A task counts if both solved every run and the rewards differ significantly: by the two-sided
+    exchange test, or for a deterministic method, whose reward counts as exact, by the bootstrap
+    test, corrected over the tasks of the method (Holm). Runs with the same seed are not compared as
+    pairs. A method is left out if no test could have found a difference.
     """
-    for label, method in study.methods[~study.methods.is_search].iterrows():
-        cells, tests = [], []
+    counts = dict[str, dict[str, int]]()
+    for label, stochastic in study.methods.stochastic.items():
+        ahead, tests = list[bool](), list[Estimate]()
         for name, task in one_by_one(study).items():
             runs = study.cells.get((name, str(label)))
             learner = study.cells.get((name, EC4 if len(task.hands) > 1 else EC1))
@@ -70,84 +65,91 @@ def list_against_learner(study: Study) -> Rows:
                 solved(each).reward.to_numpy(np.float64) for each in (runs, learner)
             )
             if len(rewards) == len(runs) and len(learned) == len(learner):
+                ahead.append(bool(rewards.mean() > learned.mean()))
                 tests.append(
                     exchange_test(learned, rewards, "two-sided")
-                    if method.stochastic
+                    if stochastic
                     else bootstrap_test(learned, float(rewards[0]), "two-sided")
                 )
-                row: Row = {"task": marked(task), "method": label, "runs": len(runs)}
-                row |= {"reward": rewards.mean(), "learner": learned.mean()}
-                cells.append((name, row | run_ids(runs, learner)))
-        p = holm([test.p for test in tests])
-        for (name, row), test, adjusted in zip(cells, tests, p, strict=True):
-            yield f"{name} {label}", row | {"p_holm": adjusted, "least_p": test.least_p}
+        least = [test.least_p for test in tests if not math.isnan(test.least_p)]
+        if least and len(least) * min(least) < LEVEL:
+            sure = [
+                better
+                for better, p in zip(ahead, holm([test.p for test in tests]), strict=True)
+                if p < LEVEL
+            ]
+            counts[str(label)] = {"better": sum(sure), "worse": len(sure) - sum(sure)}
+    return counts
 
 
-def _after(study: Study, runs: pd.DataFrame, trials: int) -> pd.DataFrame:
-    """Return a copy of runs, without their status, whose ``reward`` is the best of their first
-    ``trials`` trials, NaN if none of these succeeded or the run failed; runs without rewards of
-    trials keep their reward. Column ``gap`` stays as it is."""
-    learned, best = improvements(study), list[float]()
-    rewards = runs.reward.to_numpy(np.float64, na_value=math.nan)
-    for run_id, reward in zip(runs.run_id, rewards, strict=True):
-        steps = None if math.isnan(reward) else learned.get(run_id)
-        best.append(float(best_after(steps, trials)) if steps and len(steps[0]) else reward)
-    return runs.drop(columns="status").assign(reward=best)
+def _gaps_after(study: Study, trials: int) -> pd.Series:
+    """Return the mean gap over tasks of the best of the first ``trials`` trials of each ranked
+    method, by label: NaN if a run had no solution by then. Runs without rewards of trials keep
+    their gap."""
+    learned, runs = improvements(study), compared_runs(study)
+    best = [
+        float(best_after(learned[run_id], trials))
+        if not math.isnan(reward) and len(learned.get(run_id, ((),))[0])
+        else reward
+        for run_id, reward in zip(runs.run_id, runs.reward.astype(float), strict=True)
+    ]
+    gaps = pd.Series(gap_share(best, runs.best_known.astype(float)), runs.index)
+    by_task = gaps.groupby([runs.ranked_as, runs.task]).agg(pd.Series.mean, skipna=False)
+    return by_task.groupby(level=0).agg(pd.Series.mean, skipna=False)
+
+
+def _standing_rows(study: Study, *, ranked: bool) -> Rows:
+    """Yield a row for each method of :func:`.standings` that is ``ranked``, or for the others."""
+    rows = standings(study)
+    rows = rows[(rows.why == "") == ranked]
+    single = [task for task in ranked_tasks(study) if study.tasks[task].family is None]
+    early = _gaps_after(study, _EARLY).to_dict() if len(rows) else {}
+    for label, row in rows.iterrows():
+        runs = runs_by_method(study)[str(label)]
+        gaps = runs.groupby("task").gap.mean()
+        counts = [
+            counts
+            for each in runs.label.unique()
+            if (counts := _counts_against_learner(study).get(each))
+        ]
+        entries: Row = {
+            **{str(name): value for name, value in row.items()},
+            "method": label,
+            **{f"on {task}": gaps.get(task, math.nan) for task in single},
+            "gap_early": early[label] if ranked else math.nan,
+            "forward_kinematics": runs.forward_kinematics.mean(),
+            "cpu_s": runs.cpu_s.mean(),
+        }
+        if counts:
+            entries |= {name: sum(of[name] for of in counts) for name in ("better", "worse")}
+        yield str(label), entries | run_ids(runs)
 
 
 @table(
     "Gap and share of the possible gain, means over {tasks}, and gap on each",
     "method; gap[]: gap (%) .1; share[]: share of the gain (%) .0; information: use of the reward; "
     "better: better than the learner on (tasks); worse: worse on (tasks); "
-    "gap_early: -; ranked: -; on *: {} (%) .1; tasks; missing: -; without_gain: -; "
-    "forward_kinematics: -; cpu_s: -; runs; failed: -",
+    "gap_early: -; on *: {} (%) .1; note; without_gain: -; "
+    "forward_kinematics: -; cpu_s: -; runs",
 )
 def list_ranking(study: Study) -> Rows:
-    """Yield a row for each method: its gap and share of the gain over tasks, and its gap on each
-    task that is not random; in the order of :func:`_ranked`, settings after their method.
-
-    ``gap`` is over the tasks of :func:`.common_tasks`; for a method from a file that lacks some of
-    them, which is not ``ranked``, over the ``tasks`` that it solved. Also the gap after a thousand
-    trials, and means of what a run costs.
-    """
-    tested, runs = list_against_learner(study), common_runs(study)
-    scores = [f"{score}{end}" for score in ("gap", "share") for end in ("", "_low", "_high")]
-    wide = board(study).reindex(columns=[*scores, "tasks", "without_gain", "ranked"])
-    if len(runs):
-        wide["gap_early"] = ranking(_after(study, runs, _EARLY)).gap
-    wide = wide.join(runs.groupby("method")[["forward_kinematics", "cpu_s"]].mean())
-    over: dict[Any, Any] = wide.to_dict("index")
-    single = [t for t in study.tasks if t in study.optima and study.tasks[t].family is None]
-    for method in _ranked(study):
-        of_method = compared(study)[method]
-        gaps = {task: solved(runs).gap.mean() for task, runs in of_method.groupby("task")}
-        row: Row = {"method": method, "information": study.methods.information[method]}
-        row |= {f"on {task}": gaps.get(task, math.nan) for task in single}
-        row |= {"runs": len(of_method), "failed": len(of_method) - len(solved(of_method))}
-        row |= over.get(method, {})
-        on = {*solved_tasks(study, method)}
-        row |= {"missing": sum(task not in on for task in common_tasks(study))}
-        tests = tested[tested.index.isin([" ".join(cell) for cell in cells_of(of_method)])]
-        # With Holm's correction over its tasks: could any of its tests have distinguished them?
-        if tests.least_p.count() * tests.least_p.min() < LEVEL:
-            sure = tests[tests.p_holm < LEVEL]
-            row |= {"better": sum(sure.reward > sure.learner)}
-            row |= {"worse": sum(sure.reward < sure.learner)}
-        yield method, row | run_ids(of_method)
+    """Yield a row for each ranked method (:func:`.standings`), the smallest gap first: its gap and
+    share of the gain over tasks, its gap on each task that is not random, its gap after a thousand
+    trials, and means of what a run costs."""
+    return _standing_rows(study, ranked=True)
 
 
-def _ranked(study: Study) -> list[str]:
-    """Return the labels of :func:`.board` in its order, then of other compared methods, without
-    joined learners, in the order of :attr:`.Study.methods`; each setting or ablation is moved to
-    after its method, if that method is in the list."""
-    single = [method for method in compared(study) if len(study.methods.parts[method]) == 1]
-    names = [*dict.fromkeys((*board(study).index, *single))]
-
-    def places(method: str) -> list[int]:  # of the methods above it, and its own
-        above = study.methods.under[method]
-        return [*(places(above) if above in names else ()), names.index(method)]
-
-    return sorted(names, key=places)
+@table(
+    "Methods that are not ranked",
+    "method; why: why not; gap[]: gap (%) .1; information: use of the reward; "
+    "better: better than the learner on (tasks); worse: worse on (tasks); on *: {} (%) .1; note; "
+    "tasks: solved tasks; runs; failed: failed runs",
+)
+def list_not_ranked(study: Study) -> Rows:
+    """Yield a row for each method that is not ranked (:func:`.standings`), with the reason, the gap
+    if it solved all tasks in another number of trials, and its gap on each task that is not
+    random."""
+    return _standing_rows(study, ranked=False)
 
 
 @table(
@@ -160,34 +162,42 @@ def list_differences(study: Study) -> Rows:
     """Yield a row for each other method: its gap less the gap of :attr:`.Study.against`, on the
     tasks on which the latter solved every run; the smallest difference first.
 
-    If :attr:`.Study.against` is empty, the compared method is the first of :func:`.board` where one
+    If :attr:`.Study.against` is empty, the compared method is the first of the ranking where one
     parameter is varied; otherwise each method from a file is compared with the built-in methods
-    with the same use of the reward. Methods that lack or failed a run there, and settings and
-    ablations of methods that ran (:attr:`.Study.methods`, ``under``), are left out. Intervals are
-    for other runs on the same tasks; p is two-sided (:func:`.stratified_test`), corrected over the
-    rows of the compared method (Holm).
+    with the same use of the reward. Methods that lack or failed a run there or were asked for
+    another number of trials, and settings and ablations of methods that ran
+    (:attr:`.Study.methods`, ``under``), are left out. Intervals are for other runs on the same
+    tasks; p is two-sided (:func:`.stratified_test`), corrected over the rows of the compared method
+    (Holm).
     """
-    methods = study.methods
-    chosen = [study.against] if study.against in compared(study) else []
+    methods, rows = study.methods, standings(study)
+    solved_some = [label for label in rows.index if solved_tasks(study, str(label))]
+    chosen = [study.against] if study.against else []
     if study.varied[0] and not study.against:
-        rows = board(study)
-        chosen = [*rows.index[rows.ranked][:1]]
-    for against in chosen if study.against or chosen else own_methods(study):
+        chosen = [*rows.index[rows.why == ""][:1]]
+    own = [label for label in solved_some if not methods.built_in[label]]
+    for against in chosen or own:
         tasks, found = solved_tasks(study, against), list[tuple[Estimate, str]]()
+        asked = {*runs_on(study, against, tasks).budget.dropna()}
         alike = methods.built_in & (methods.information == methods.information[against])
         if chosen:
             alike = methods.index != against
-        for name in methods.index[alike & (methods.under == "")].intersection([*compared(study)]):
-            runs = runs_on(study, name, tasks)
-            if len(runs) and runs.reward.notna().all():
+        for row in methods.index[alike & (methods.under == "")].intersection(rows.index):
+            runs = runs_on(study, row, tasks) if tasks else compared_runs(study)[:0]
+            names = runs.label.unique()
+            name = names[0] if len(names) == 1 else row
+            budgets = {*runs.budget.dropna()}
+            is_fair = budgets == asked or not (budgets and asked) or ranking_budget(study) is None
+            if len(runs) and runs.reward.notna().all() and is_fair and name != against:
                 found.append((_difference_of_gaps(study, name, against, tasks), name))
         adjusted = holm([each.p for each, _ in found]) if found else []
         in_order = sorted(zip(found, adjusted, strict=True), key=lambda each: each[0][0].value)
         for (difference, name), p in in_order:
             runs = runs_on(study, name, tasks)
-            row: Row = {"method": name, "against": against, "tasks": len(tasks), "runs": len(runs)}
-            row |= {**difference.columns("difference"), "p_holm": p}
-            yield f"{against} {name}", row | run_ids(runs, runs_on(study, against, tasks))
+            entries: Row = {"method": name, "against": against}
+            entries |= {"tasks": len(tasks), "runs": len(runs)}
+            entries |= {**difference.columns("difference"), "p_holm": p}
+            yield f"{against} {name}", entries | run_ids(runs, runs_on(study, against, tasks))
 
 
 def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[str]) -> Estimate:
@@ -218,8 +228,8 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
 
 def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
     """Draw the gap against the values of the only parameter that is varied (:attr:`.Study.varied`),
-    or else, also with fewer than two gaps of values, gaps of methods (:func:`.board`); None without
-    a gap. ``how``: see :data:`.DrawsFigure`."""
+    or else, also with fewer than two gaps of values, gaps of ranked methods; None without a gap.
+    ``how``: see :data:`.DrawsFigure`."""
     plot = _draw_varied(study, **how) or _draw_gaps(study, **how)
     return plot and replace(plot, id="ranking")
 
@@ -234,7 +244,7 @@ def _draw_varied(study: Study) -> Parts | None:
     """Draw gaps against the values of the only parameter that is varied; None with fewer than two
     values that have a gap."""
     name, values = study.varied
-    rows = board(study)
+    rows = standings(study).query("why == ''")
     rows = rows.loc[[label for label in values if label in rows.index]]
     if len(rows) < 2:
         return None
@@ -251,7 +261,7 @@ def _draw_varied(study: Study) -> Parts | None:
     axes.set_xticks([], minor=True)
     mean: Any = {"color": style.BLUE, "marker": "o", "markersize": 5, "linewidth": 1.6}
     shown = rows.assign(place=places)
-    tasks = common_tasks(study)
+    tasks = ranked_tasks(study)
     on = [runs_on(study, method, tasks).groupby("task").gap.mean() for method in rows.method]
     each_task = tasks if 1 < len(tasks) <= 8 else ()
     for task in each_task:
@@ -277,9 +287,9 @@ def _draw_varied(study: Study) -> Parts | None:
     f"{style.COVERAGE} bootstrap interval over runs. The axis is logarithmic from 0.1 % on.",
 )
 def _draw_gaps(study: Study) -> Parts | None:
-    """Draw the gap of each method of :func:`.board`, a mean over tasks, with interval and name,
-    without settings whose method is there; None if no method has a gap."""
-    rows, tasks = board(study), common_tasks(study)
+    """Draw the gap of each ranked method, a mean over tasks, with interval and name, without
+    settings whose method is there; None if no method is ranked."""
+    rows, tasks = standings(study).query("why == ''"), ranked_tasks(study)
     rows = without_settings(rows).reset_index(names="method")
     if not len(rows):
         return None
@@ -330,7 +340,7 @@ def _draw_gaps(study: Study) -> Parts | None:
         axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
         mark = looks[row["method"]]["marker"]
         (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
-        name = shown_name(study, row["method"])
+        name = row["title"]
         style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
         label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
         if not narrow:
