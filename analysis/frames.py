@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 
 import numpy as np
 import pandas as pd
@@ -19,18 +18,17 @@ from numpy.typing import ArrayLike
 from pandas.api.types import infer_dtype, is_hashable
 
 from coartic.analysis.optima import gap_share
-from coartic.analysis.statistics import running_times
-from coartic.analysis.statistics.instances import task_mean
+from coartic.analysis.statistics import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
-from coartic.internal.limits import brief_value, real_array
+from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, plain
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
-_TWICE = (
+DUPLICATE = (
     "a run is there twice (runs of two sources that count alike need a column seed, folder or "
     "run_id; number the draws of a bootstrap in a column run)"
 )
@@ -71,17 +69,17 @@ def checked(
     columns.index = columns.index.set_names([None] * columns.index.nlevels)
     not_na = "needed is a name; read_csv makes NA of some names, unless keep_default_na=False"
     for name in names:
-        _refuse_rows(columns, name, columns[name].isna(), not_na)
+        refuse_rows(columns, name, columns[name].isna(), not_na)
     for name in (*names, *others):
         is_list = ~columns[name].map(is_hashable).astype(bool)
-        _refuse_rows(columns, name, is_list, "needed is a name, a number or a tuple")
+        refuse_rows(columns, name, is_list, "needed is a name, a number or a tuple")
     for name in numbers:
         kind = infer_dtype(columns[name], skipna=True)
         if kind not in ("integer", "floating", "mixed-integer-float", "empty"):
             is_number = columns[name].map(
                 lambda value: isinstance(value, (int, float)) and not isinstance(value, bool)
             )
-            _refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
+            refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
         try:
             columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
         except OverflowError:
@@ -89,11 +87,11 @@ def checked(
         size = columns[name].abs()
         wrong = (size > 1e100) | ((size > 0) & (size < 1e-100))
         most = "needed are finite numbers, 0 or from 1e-100 to 1e100 in size"
-        _refuse_rows(columns, name, wrong, most)
+        refuse_rows(columns, name, wrong, most)
     if status:
         is_ok = columns.status.astype(object) == "ok"
         rule = "a run has a reward if its status is ok, and NaN otherwise"
-        _refuse_rows(columns, "status", is_ok != columns.reward.notna(), rule)
+        refuse_rows(columns, "status", is_ok != columns.reward.notna(), rule)
     return columns
 
 
@@ -113,7 +111,7 @@ def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
     return listed
 
 
-def _refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
+def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
     """Raise CoarticError if rows are True in ``wrong``, with the value of the first of them in
     ``column``, and the words ``needed``."""
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
@@ -135,17 +133,17 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     """
     for name in ("reward", "best_known"):
         sign = "a reward is minus the ticks; of a cost, such as best_cost, give the negative"
-        _refuse_rows(columns, name, columns[name] > 0, sign)
+        refuse_rows(columns, name, columns[name] > 0, sign)
     share = "a gap is a share of the best known reward, which has to be below 0"
-    _refuse_rows(columns, "best_known", columns.best_known == 0, share)
+    refuse_rows(columns, "best_known", columns.best_known == 0, share)
     excess = columns.reward - columns.best_known
     highest = "it is above best_known, which is to be the highest reward of the task"
-    _refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
+    refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
     columns = columns.assign(gap=gap_share(columns.reward, columns.best_known))
     if ZERO not in columns:
         return columns
     possible = columns.best_known - columns[ZERO]
-    _refuse_rows(columns, ZERO, possible < 0, highest)
+    refuse_rows(columns, ZERO, possible < 0, highest)
     return columns.assign(share=(columns.reward - columns[ZERO]) / possible.where(possible > 0))
 
 
@@ -167,7 +165,7 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     for name in {"best_known", ZERO} & {*columns}:
         several = columns[name].groupby(task).transform("nunique") > 1
-        _refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
+        refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
     names = columns.method.to_numpy(object)
     if "setting" in there:
         settings = columns.setting.astype(object).where(columns.setting.notna(), "").astype(str)
@@ -184,7 +182,7 @@ def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """Return a user's frame of runs, checked, with the gap of each (:func:`scored`). Raises
     CoarticError as :func:`scored` does, and for two rows of a run."""
     runs = scored(frame, *more)
-    _refuse_rows(runs, "method", runs.duplicated("key"), f"{_TWICE}; needed is a row for a run")
+    refuse_rows(runs, "method", runs.duplicated("key"), f"{DUPLICATE}; needed is a row for a run")
     return runs
 
 
@@ -435,73 +433,3 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         rows.append(row | counts | {"failed": int(of_method.reward.isna().sum()), "why": why})
     methods = pd.Index([*runs.method.unique()], name="method", tupleize_cols=False)
     return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")
-
-
-def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
-    """Return the share of targets that methods reach within a number of trials.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        With columns ``method``, ``task``, ``run``, ``trials`` (made so far, from 1), ``reward`` and
-        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end. With a
-        column ``setting``, a method with several settings is several methods.
-    targets : sequence of float
-        Gaps to the best known reward, such as ``[0.1, 0.05, 0.01]``.
-
-    Returns
-    -------
-    DataFrame
-        A row for each number of trials at which a method's share rises: ``method``, ``trials`` and
-        ``share``, the share of all pairs of run and target reached within these trials; tasks have
-        the same weight. A task without runs, and a run without a reward, reach no target. A method
-        that reaches no target has a single row, with share 0 and infinite trials.
-
-    Raises
-    ------
-    CoarticError
-        A column is missing or a reward is wrong (:func:`ranking`), trials are below 1, targets are
-        no gaps, or the frame has no best known reward.
-
-    Examples
-    --------
-    >>> frame = pd.DataFrame(
-    ...     {"method": "mine", "task": "ascending", "run": 0, "trials": [1, 40, 900],
-    ...      "reward": [-319, -305, -293], "best_known": -292}
-    ... )
-    >>> ecdf(frame, [0.05, 0.01])
-      method  trials  share
-    0   mine    40.0    0.5
-    1   mine   900.0    1.0
-    """
-    checked(frame, names=("run",))
-    frame = scored(frame, "trials")
-    in_order = frame.sort_values(["trials", "reward"], kind="stable")
-    again = in_order.duplicated(["key", "trials"]) & ~in_order.duplicated(
-        ["key", *SCORES, "trials"]
-    )
-    falls = in_order.groupby("key").reward.diff() < 0
-    improve = f"{_TWICE}, or its reward falls; needed are the best rewards so far"
-    _refuse_rows(in_order, "method", again | falls, improve)
-    _refuse_rows(frame, "trials", ~(frame.trials >= 1), "needed is the number of trials, from 1")
-    reach = np.empty(0)
-    with suppress(TypeError, ValueError):  # no numbers
-        reach = real_array("targets", targets)
-    if reach.ndim != 1 or not reach.size or not ((reach >= 0) & (reach <= 1)).all():
-        raise CoarticError(
-            f"targets are {brief_value(targets)}: needed are gaps, shares of the best known reward "
-            "from 0 to 1, such as [0.1, 0.05, 0.01] for 10, 5 and 1 % (no per cent, no ticks)"
-        )
-    if not frame.best_known.notna().any():
-        raise CoarticError("the frame has no best_known reward, so no targets")
-    every, rows = frame.task[frame.best_known.notna()].unique(), []
-    for method, of_method in frame.groupby("method", sort=False):
-        times = []
-        for task in every:
-            runs = of_method[of_method.task == task].groupby("key")
-            reached = [[run.trials[run.gap <= gap].min() for gap in reach] for _, run in runs]
-            trials = np.array(reached or [[np.nan] * len(reach)], dtype=np.float64)
-            times.append(np.where(np.isnan(trials), np.inf, trials))
-        steps = zip(*running_times.share_by_budget(times), strict=True)
-        rows += [(method, *step) for step in steps]
-    return pd.DataFrame(rows, columns=["method", "trials", "share"])

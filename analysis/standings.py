@@ -6,12 +6,13 @@ Searches for the optimum are references and are not ranked.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 
 import pandas as pd
 
 from coartic.analysis.frames import ranking
-from coartic.analysis.method_frame import BY_TRIAL
-from coartic.analysis.study import Study, cached
+from coartic.analysis.methods import BY_TRIAL
+from coartic.analysis.study import Study
 from coartic.analysis.words import listed, number
 
 
@@ -33,7 +34,7 @@ _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "paramet
 """Columns of runs on which no ranking rests: without them a large folder takes less memory."""
 
 
-@cached
+@lru_cache(maxsize=4)
 def compared_runs(study: Study) -> pd.DataFrame:
     """Return the runs that are ranked, failed ones too: of every method except searches for the
     optimum, on tasks with a best known reward, without :data:`_OF_RECORD`."""
@@ -42,7 +43,7 @@ def compared_runs(study: Study) -> pd.DataFrame:
     return runs[~runs.label.map(study.methods.is_search).astype(bool)]
 
 
-@cached
+@lru_cache(maxsize=4)
 def runs_by_method(study: Study) -> dict[str, pd.DataFrame]:
     """Return :func:`compared_runs` by the label of their row in the ranking (``ranked_as``), in the
     order of :attr:`.Study.methods`."""
@@ -63,7 +64,7 @@ def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
     return [*dict.fromkeys(zip(runs.task, runs.label, strict=True))]
 
 
-@cached
+@lru_cache(maxsize=4)
 def ranked_tasks(study: Study) -> tuple[str, ...]:
     """Return the names of the tasks over which methods are ranked: all that the command asked for
     and that have a best known reward, in the order of the study."""
@@ -71,7 +72,7 @@ def ranked_tasks(study: Study) -> tuple[str, ...]:
     return tuple(task for task in study.tasks if task in tasks)
 
 
-@cached
+@lru_cache(maxsize=4)
 def ranking_budget(study: Study) -> int | None:
     """Return the number of trials of a run with which methods are ranked (column ``budget``).
 
@@ -89,7 +90,7 @@ def ranking_budget(study: Study) -> int | None:
     return int(algorithms.idxmax()) if len(runs) else None  # type: ignore[call-overload]
 
 
-@cached
+@lru_cache(maxsize=4)
 def standings(study: Study) -> pd.DataFrame:
     """Return a row for each method of :func:`runs_by_method`, by label: the columns of
     :func:`.ranking`, ``note``, and the columns of :attr:`.Study.methods`.
@@ -119,7 +120,7 @@ def standings(study: Study) -> pd.DataFrame:
     return rows.sort_values(["why", "gap"], key=lambda of: of != "" if of.name == "why" else of)
 
 
-@cached
+@lru_cache(maxsize=1_024)
 def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
     """Return the names of the tasks on which a method (a label, also of a row of the ranking)
     solved every run."""

@@ -12,12 +12,11 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from coartic import CoarticError, load_task
-from coartic.analysis import load
+from coartic.analysis import FIGURES, load
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
 from coartic.analysis.figures.style import means, tip
 from coartic.analysis.methods import COLORS, KNOWN_METHODS, title_of
-from coartic.analysis.report.about import finding
-from coartic.analysis.sections import FIGURES, SECTIONS
+from coartic.analysis.report.sections import SECTIONS, finding
 from coartic.pictures import drawing
 from tests.support.figures import misplaced, texts_of
 from tests.support.made_up import row, study_of

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from coartic import Task, load_task
-from coartic.analysis import load, ranking
-from coartic.analysis.sections import FIGURES, TABLES
+from coartic.analysis import FIGURES, load, ranking
 
 
 def elements(page, name):
@@ -33,13 +32,7 @@ def test_a_task_is_a_picture_of_its_goals(name):
     np.testing.assert_allclose(np.diff(places[: len(task.goals)], axis=0), due, atol=2e-3)
 
 
-def test_studies_tables_and_figures_are_shown_well_formed(traced):
-    page = traced._repr_html_()
-    rows = [text for _, text in elements(page, "td")]
-    assert len(rows) == 5 * len(traced.runs.groupby(["method", "setting"]))
-    assert "dual-process/EC4" in rows
-    headings = [text for _, text in elements(TABLES["methods"]._repr_html_(), "td")]
-    assert {"gap", "run_ids"} < {*headings}
+def test_a_figure_is_shown_well_formed(traced):
     plot = FIGURES["learning-curves"](traced)
     ((_, caption),) = elements(plot._repr_html_(), "figcaption")
     assert caption.startswith("Learning curves. ")

@@ -12,10 +12,9 @@ import pandas as pd
 import pytest
 
 from coartic import CoarticError, corrective_trial, load_task
-from coartic.analysis import runtimes
-from coartic.analysis.method_frame import BY_FORMULA, BY_TRIAL, WITHOUT_REWARD
-from coartic.analysis.sections import FIGURES, TABLES
-from coartic.analysis.sections.learning import learning_curves
+from coartic.analysis import FIGURES, TABLES, runtimes
+from coartic.analysis.figures.drawings import learning_curves
+from coartic.analysis.methods import BY_FORMULA, BY_TRIAL, WITHOUT_REWARD
 from coartic.analysis.study import Study, solved
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of, study_of_trials
 

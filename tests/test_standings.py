@@ -9,19 +9,18 @@ import numpy as np
 import pytest
 
 from coartic import CoarticError
-from coartic.analysis import ranking, standings
-from coartic.analysis.method_frame import (
+from coartic.analysis import FIGURES, TABLES, ranking, running_times, standings, tables
+from coartic.analysis.methods import (
     BY_TRIAL,
     WITHOUT_REWARD,
     headline_methods,
     methods_of,
 )
-from coartic.analysis.report import about, render
-from coartic.analysis.report.render import shown_columns
-from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, costs
-from coartic.analysis.statistics import running_times
-from coartic.analysis.statistics.hypotheses import holm, stratified_test
+from coartic.analysis.report import sections
+from coartic.analysis.report.sections import SECTIONS
+from coartic.analysis.statistics import holm, stratified_test
 from coartic.analysis.study import Study
+from coartic.analysis.tables import shown_columns
 from coartic.analysis.words import number
 from coartic.cli.read import say_ranking
 from coartic.runs.shipped import open_shipped
@@ -81,7 +80,7 @@ def test_a_failed_run_reaches_nothing():
     assert (failed["method"], failed["failed"]) == (other, 2)
     assert failed["reasons"] == "2 × time limit"
     assert TABLES["runtimes"](seen).reached[other] == pytest.approx(2 / 4 * 10 / 20)
-    times = costs.times_of(seen, "ascending", other, "solve_s")
+    times = running_times.times_of(seen, "ascending", other, "solve_s")
     assert np.isfinite(times).sum(axis=1).tolist() == [10, 0, 0]
 
 
@@ -134,8 +133,8 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     gaps = {"mine": [3.5 / 293, 15 / 480], BOTH: [8.5 / 293, 1.5 / 480]}
     for method, of_method in gaps.items():
         assert ranked.gap[method] == pytest.approx(sum(of_method) / 2)
-    columns = shown_columns(TABLES["ranking"], ranked)
-    headings = {name: column.header for name, column in columns.items()}
+    columns = shown_columns(TABLES["ranking"], unknown, ranked)
+    headings = {name: column.heading for name, column in columns.items()}
     assert headings["gap"].startswith("gap to the best of this folder (%)")
     for words in (*said(unknown, "ranking"), FIGURES["ranking"](unknown).alt, *headings.values()):
         assert not re.search("optimum|known", words)
@@ -295,7 +294,7 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert rows.difference.tolist() == pytest.approx(differences)
     assert math.isnan(rows.difference_low.iloc[0])  # of two runs there is no interval
     assert (rows.tasks == 1).all()
-    texts = render.shown_columns(table, rows)["difference"].texts
+    texts = shown_columns(table, seen, rows)["difference"].texts
     assert texts[0] == number(100 * rows.difference.iloc[0], 1)  # per cent, as the gaps
     assert "positive: this method is better" in table.caption
     better = TABLES["differences"](study(TEN | strangers(("mine", 2), runs=10)))
@@ -391,8 +390,9 @@ def test_settings_are_ranked_as_methods_are():
     means = [1480 / 3, 494, 1492 / 3]
     assert ranked.gap.tolist()[:3] == pytest.approx([(mean - 292) / 292 for mean in means])
     assert (ranked.gap_low < ranked.gap_high)[settings[::2]].all()
-    own = [name == "own" for name in render.classes_of(TABLES["ranking"], ranked)]
-    assert ranked.index[own].tolist() == ["mine", "mine width=0.2"]
+    page = tables.html_of(TABLES["ranking"], seen, ranked)
+    bold = re.findall(r'row(\d+) col0 own text"', page)
+    assert ranked.index[[*map(int, bold)]].tolist() == ["mine", "mine width=0.2"]
 
 
 def test_a_title_that_another_method_has_is_not_taken():
@@ -457,7 +457,7 @@ GOLDEN = (ROOT / "tests" / "golden.md").read_text("utf-8")
 
 def said(seen, section):
     """The sentence of a section, its lines."""
-    return about.finding(seen, next(each for each in SECTIONS if each.id == section))
+    return sections.finding(seen, next(each for each in SECTIONS if each.id == section))
 
 
 @pytest.mark.parametrize("name", SENTENCES)

@@ -44,8 +44,8 @@ def report(
     if width is not None and not for_paper:
         raise CoarticError("--width has no effect without --for-paper")
     out = folder / "report" if out is None else out
+    from coartic.analysis import TABLES
     from coartic.analysis.report.build import write_report
-    from coartic.analysis.sections import TABLES
     from coartic.analysis.study import load
 
     started = time.monotonic()
@@ -83,8 +83,7 @@ def say_ranking(study: Study, *more: tuple[str, str]) -> None:
     """Print the ranking of a study as a table, then pairs of a word and a text: why methods are not
     ranked, what was found on coarticulation and cost, how runs differ from the paper's, how many
     failed, and ``more``."""
-    from coartic.analysis.report.about import RUNS, finding, limits
-    from coartic.analysis.sections import SECTIONS
+    from coartic.analysis.report.sections import RUNS, SECTIONS, finding, limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
     from coartic.learner.learning import TRIALS
