@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from coartic import CoarticError, Execution, Movement, Task
 from coartic.analysis.figures import style
-from coartic.analysis.solutions import Solutions
+from coartic.analysis.signatures import Solutions
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 from coartic.model import PAPER

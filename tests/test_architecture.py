@@ -4,6 +4,7 @@ import ast
 import graphlib
 import importlib
 import importlib.util
+import inspect
 import re
 import sys
 from functools import cache
@@ -182,7 +183,10 @@ def is_public(full):
         return False
     package, *homes = map(importlib.import_module, (module, *homes))
     exported = name in getattr(package, "__all__", ())
-    return exported and any(getattr(home, name) is getattr(package, name) for home in homes)
+    return exported and any(
+        inspect.unwrap(getattr(home, name)) is inspect.unwrap(getattr(package, name))
+        for home in homes
+    )
 
 
 def leads_to_a_page(module):

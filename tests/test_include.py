@@ -9,7 +9,7 @@ import pack_shipped
 import pytest
 
 from coartic import CoarticError, load_task
-from coartic.analysis.sections import TABLES
+from coartic.analysis import TABLES
 from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
 from coartic.benchmarks.include import include_folders

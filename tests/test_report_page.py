@@ -6,7 +6,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
-from coartic.analysis.sections.coarticulation import shared_goal
+from coartic.analysis.control import shared_goal
 from coartic.analysis.study import solved, typical_run
 
 pytestmark = pytest.mark.browser

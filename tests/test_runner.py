@@ -16,7 +16,7 @@ from coartic import (
     initial_hands,
     load_task,
 )
-from coartic.analysis.sections import TABLES
+from coartic.analysis import TABLES
 from coartic.analysis.study import load
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local

@@ -34,16 +34,9 @@ from coartic import (
     movements_of,
     trajectory,
 )
-from coartic.analysis import ecdf, interval, mean, means, other_tasks
-from coartic.analysis.sections import FIGURES, TABLES
-from coartic.analysis.signatures import measures
-from coartic.analysis.signatures.context_tests import posture_difference_below
-from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics.hypotheses import (
-    bootstrap_test,
-    holm,
-    share_test,
-)
+from coartic.analysis import FIGURES, TABLES, ecdf, interval, mean, means, other_tasks
+from coartic.analysis.signatures import Solutions
+from coartic.analysis.statistics import holm
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform, run_suite
@@ -362,14 +355,7 @@ def with_arguments(function, **own):
     return function, {name: USUAL[name] for name in USUAL if name in parameters} | own
 
 
-CELL = {"task": "two-armed-1", "method": "EC4"}
 OF_STUDY = {
-    **{name: {**CELL, "replay": False} for name in ("executed", "configurations")},
-    "signature": {"name": "first", "replay": False},
-    "signature_of": {"name": "first", **CELL, "replay": False},
-    "signature_by_hands": {"name": "first", **CELL},
-    "sequences": {"task": "two-armed-1"},
-    "movements": {"part": "solution"},
     **{name: {"signature": "first", "task": "two-armed-1", "label": "dual-process/EC4"}
        for name in ("mean_excess", "with_control")},
     "contexts_of_control": {"contexts": None},
@@ -393,17 +379,12 @@ CALLS = (
     *map(with_arguments, (
         Robot, ROBOT.forward_kinematics, ROBOT.jacobian, ROBOT.base_outline, ROBOT.arm,
         ROBOT.joints, ROBOT.reach, ROBOT.joint_positions, ROBOT.linearised, PATH.hand_path,
-        measures.arm, measures.as_in_isolation, measures.gain_at_next, measures.hand,
-        measures.other_arm, measures.ticks_slower, instance_names, SESSION.trial,
+        instance_names, SESSION.trial,
     )),
     with_arguments(Task, goals=[(3.0, 2.0)], locked_base=["y"], **RIGHT),
     with_arguments(plan_suite, suite="quick", tasks=["ascending"], methods=["EC1"], runs=1,
                    seed=0, trials=5, time_limit_s=1.0, trial_budget=5),
     with_arguments(PATH.animate, path=".gif"),
-    with_arguments(posture_difference_below, first=GROUPS[0], second=GROUPS[1], bound=1.0),
-    with_arguments(holm, family=2),
-    with_arguments(bootstrap_test, first=[1.0, 2.0], second=0.0),
-    with_arguments(share_test, alternative="greater"),
     with_arguments(reach_goals, q=[TASK.q0], hands=[1], goals=[(3.0, 2.0)], targets=None,
                    checks=True, locked_base=(), model=PAPER),
     with_arguments(SESSION.correct, goal=1),
@@ -497,7 +478,7 @@ def test_arrays_may_be_lists(call, usual):
 @pytest.mark.parametrize("name", OF_STUDY)
 def test_no_wrong_question_to_a_study_gets_an_error_of_python(name, traced):
     usual = OF_STUDY[name]
-    call = getattr(traced, name, None) or partial(getattr(analysis, name), traced)
+    call = partial(getattr(analysis, name), traced)
     for argument, value in itertools.product(usual, ODD):
         ours, words = refused_by_us(partial(call, **usual | {argument: value}))
         assert ours, (argument, value, words)

@@ -85,8 +85,8 @@ def draw(
     meant = given.tasks_meant(tasks or builtin_tasks())
     names = [name for text in meant for name in named_by(text)]
     chosen = [*tasks_by_name(map(load_task, names)).values()]
+    from coartic.analysis.figures.drawings import picture_of_tasks
     from coartic.analysis.figures.plot import FORMATS, picture  # slow imports, after the checks
-    from coartic.analysis.sections.tasks import picture_of_tasks
 
     if out.suffix:
         check_ending(out, FORMATS)

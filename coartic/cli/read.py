@@ -5,9 +5,8 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -45,8 +44,8 @@ def report(
     if width is not None and not for_paper:
         raise CoarticError("--width has no effect without --for-paper")
     out = folder / "report" if out is None else out
+    from coartic.analysis import TABLES
     from coartic.analysis.report.build import write_report
-    from coartic.analysis.sections import TABLES
     from coartic.analysis.study import load
 
     started = time.monotonic()
@@ -80,53 +79,38 @@ def report(
         sys.exit(1)
 
 
-def _with_id(name: str, row: Mapping[Any, Any]) -> str:
-    """Return the name of a method; for a method from a file, unless the name begins with its id,
-    the id, a colon and the name: ``my-search: Random steps``. ``row`` of :attr:`.Study.methods` has
-    ``base``, the id, and ``built_in``."""
-    has_id = row["built_in"] or name.startswith(row["base"])
-    return name if has_id else f"{row['base']}: {name}"
-
-
-def say_ranking(study: Study, asked: Iterable[str], *more: tuple[str, str]) -> None:
-    """Print the ranking of a study as a table, then pairs of a word and a text.
-
-    The table has ranked methods with the smallest gaps (all if a parameter is varied), the learner
-    and random search; and, ranked or not, if they have a gap, methods from files, and methods of
-    the labels ``asked``, except conditions that a ranked row joins. Settings and ablations of
-    built-in methods with a gap are left out. The pairs say why methods are not ranked, what was
-    found on coarticulation and cost, how runs differ from the paper's, how many failed, and
-    ``more``.
-    """
-    from coartic.analysis.method_frame import without_settings
-    from coartic.analysis.report.about import RUNS, finding, leading, limits
-    from coartic.analysis.sections import SECTIONS
-    from coartic.analysis.standings import board, common_tasks, not_ranked, reference, shown_name
+def say_ranking(study: Study, *more: tuple[str, str]) -> None:
+    """Print the ranking of a study as a table, then pairs of a word and a text: why methods are not
+    ranked, what was found on coarticulation and cost, how runs differ from the paper's, how many
+    failed, and ``more``."""
+    from coartic.analysis.report.sections import RUNS, SECTIONS, finding, limits
+    from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
     from coartic.learner.learning import TRIALS
 
-    in_order = board(study).query("ranked")
-    joined = {part for parts in in_order.parts if len(parts) > 1 for part in parts}
-    also = frozenset(asked) - joined  # which the row of both conditions has
-    every = board(study, also)
-    is_shown = every.index.isin(without_settings(every).index) | ~every.built_in.astype(bool)
-    rows = every[is_shown].reset_index(names="method")
-    named = [row["method"] for row in leading(rows[rows.ranked])]
-    first = rows.method[rows.ranked][: None if study.varied[0] else 12 - len(named)]
-    rows = rows[rows.method.isin({*first, *named, *also}) | ~rows.built_in]
-    to = reference(study, common_tasks(study))
+    every = standings(study)
+    names = [
+        row.title if row.built_in or row.title.startswith(row.base) else f"{row.base}: {row.title}"
+        for _, row in every.iterrows()
+    ]
+    every = every.assign(name=names)
+    rows, others = every[every.why == ""], every[every.why != ""]
+    to = reference(study, ranked_tasks(study))
     if study.question[0]:
         say(": ".join(study.question))
-    say_table(
-        ("method", f"gap to the {to} (%)", "share of the gain (%)", "runs"),
-        [
-            (_with_id(shown_name(study, row["method"]), row), interval(row, "gap", scale=100),
-             interval(row, "share", 0, 100), number(row["runs"]))
-            for row in rows.to_dict("records")
-        ],
-    )  # fmt: skip
+    heads = ["method", f"gap to the {to} (%)", "share of the gain (%)", "runs"]
+    heads += ["note"] * any(rows.note)
+    cells = [
+        [row["name"], interval(row, "gap", scale=100), interval(row, "share", 0, 100),
+         number(row["runs"]), row["note"]][: len(heads)]
+        for row in rows.to_dict("records")
+    ]  # fmt: skip
+    say_table(heads, cells)
     pairs = [("Answer", line) for line in finding(study, SECTIONS[0]) if study.varied[0]][:1]
-    pairs += [("Not ranked", sentence) for sentence in not_ranked(study, also)]
+    pairs += [
+        ("Not ranked", f"{why}: {'; '.join(of_reason['name'])}")
+        for why, of_reason in others.groupby("why", sort=False)
+    ]
     shown = [section for section in SECTIONS if section.id in ("coarticulation", "cost")]
     pairs += [(each.title, " ".join(lines)) for each in shown if (lines := finding(study, each))]
     what = limits(study)

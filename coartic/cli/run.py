@@ -118,7 +118,6 @@ def run(
             **{"time_limit_s": time_limit_s, "trial_budget": trial_budget},
         )
         asked = plan(chosen, request, registered)
-        labels = {job.cell.label for job in asked} if names else set[str]()
         if include:
             only = {job.cell.task.name for job in asked} if tasks else None
             display.show(f"Including the runs of {' and '.join(include)}")
@@ -131,7 +130,7 @@ def run(
         part = f"--include {quote(str(out))}, with all other parts, joins them"
         say_pairs([("Next", f"{out} has runs {runs[0]} to {runs[-1]}: {part}")])
     else:
-        say_ranking(load(out), labels, ("Next", f"coartic report {quote(str(out))}"))
+        say_ranking(load(out), ("Next", f"coartic report {quote(str(out))}"))
     if progress.crashed:
         sys.exit(1)
 
