@@ -159,14 +159,17 @@ class Study:
     stored: pd.DataFrame
     """Runs as stored, a row for each; :attr:`runs` has further columns."""
     marks: dict[str, list[str]] = field(default_factory=dict)
-    """Sentences on what was found against methods, by the method's id: code that was loaded too
-    late, and results that depend on earlier runs."""
+    """Sentences on what was found against methods, by the method's id: results that differ when a
+    run is made again, and other versions of packages."""
     against: str = ""
     """Label of the method with which table ``differences`` compares others; empty if none was
     named."""
     imports: dict[str, list[str]] = field(default_factory=dict)
     """Names and versions of the packages that files of methods import, by the method's id."""
     _computed: dict[Any, Any] = field(init=False, default_factory=dict)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_computed": {}}  # without results of functions, which do not pickle
 
     def __repr__(self) -> str:
         runs = counted(len(self.runs), "run")
