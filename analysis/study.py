@@ -129,8 +129,8 @@ class Study:
     stored: pd.DataFrame
     """Runs as stored, a row for each; :attr:`runs` has further columns."""
     marks: dict[str, list[str]] = field(default_factory=dict)
-    """Sentences on what was found against methods, by the method's id: code that was loaded too
-    late, and results that depend on earlier runs."""
+    """Sentences on what was found against methods, by the method's id: results that differ when a
+    run is made again, and other versions of packages."""
     against: str = ""
     """Label of the method with which table ``differences`` compares others; empty if none was
     named."""

@@ -40,6 +40,9 @@ _EXECUTORS = {
 """Options of ``coartic run`` that are executors in Python."""
 _LEAST_BATCH = 8
 """Most runs of a cell that are not divided among workers, if a method performs them together."""
+_MOST_TRIALS = 400_000
+"""Most trials of a job, if it has more runs than that: some seconds, which is what an interruption
+loses."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
 
@@ -328,9 +331,10 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     """Divide jobs for workers, and return the smaller jobs, each with some of the runs: first jobs
     of methods without a number of trials, then the others, by trials, the most first."""
-    # A run among many takes a fraction of its time alone: jobs are as large as methods allow, and
-    # each worker has a part. Long jobs come first, so that none is alone at the end; one run of a
-    # planner, which has no number of trials, can take as long as thousands of trials: it is first.
+    # A run among many takes a fraction of its time alone: jobs are as large as methods allow, in
+    # some seconds, and each worker has a part. Long jobs come first, so that none is alone at the
+    # end; one run of a planner, which has no number of trials, can take as long as thousands of
+    # trials: it is first.
 
     def divide(job: Job, size: int) -> Iterator[Job]:
         for first in range(0, len(job.numbers), size):
@@ -341,7 +345,8 @@ def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     for job in jobs:
         method, parameters = job.cell.method, job.cell.parameters
         most = method.configure(parameters).most_together() if method.is_ours else 1
-        parts += divide(job, min(most, share))
+        few = max(_MOST_TRIALS // (trials_in(parameters) or 1), _LEAST_BATCH)
+        parts += divide(job, min(most, share, few))
     even = len(parts) - len(parts) % workers
     ordered, last = parts[:even], parts[even:]
     for job in last:

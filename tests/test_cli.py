@@ -179,7 +179,7 @@ def test_verify_performs_runs_again(coartic, tmp_path):
 
 
 INTERRUPTED = """
-import contextlib, ctypes, os, signal, sys, tempfile, threading, time
+import contextlib, os, signal, sys, tempfile, threading, time
 import coartic.__main__
 
 moment, number, times = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
@@ -199,13 +199,9 @@ def clean():
         stack.callback(signals.start)
         interrupt()
 
-def call_back():
-    ctypes.CFUNCTYPE(None)(interrupt)()  # which passes no exception on
-    time.sleep(60)
-
-if moment in ("cleaning", "calling back"):  # which end after the signals
+if moment == "cleaning":  # which ends after the signals
     import coartic.cli
-    coartic.cli.main = clean if moment == "cleaning" else call_back
+    coartic.cli.main = clean
 else:  # milliseconds after it has begun
     threading.Timer(int(moment) / 1000, interrupt).start()
 coartic.__main__.main()
@@ -218,7 +214,7 @@ coartic.__main__.main()
     [
         ("300", "SIGINT", 2),
         ("2500", "SIGTERM", 2),
-        ("calling back", "SIGHUP", 1),
+        ("1500", "SIGHUP", 1),
         ("cleaning", "SIGINT", 3),
     ],
 )

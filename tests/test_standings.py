@@ -1,6 +1,7 @@
 """How far methods end from the optimum, who is ahead, and what it costs: by hand."""
 
 import math
+import pickle
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -464,3 +465,11 @@ def said(seen, section):
 def test_sentences_are_those_of_the_golden_page(name):
     lines = "\n".join(said(SENTENCES[name](), name.partition(":")[0]))
     assert f"## {name}\n\n{lines}\n\n## " in f"{GOLDEN}\n## "
+
+
+def test_a_study_pickles_with_what_was_asked_of_it(traced):
+    """As other libraries send it to their workers."""
+    before = TABLES["ranking"](traced)
+    copy = pickle.loads(pickle.dumps(traced))
+    assert copy.runs.equals(traced.runs)
+    assert TABLES["ranking"](copy).equals(before)

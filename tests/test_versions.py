@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import check_shipped
 import pytest
+from pydantic import create_model
 
 from coartic import CoarticError, execute, load_task
 from coartic.analysis.study import load
@@ -13,7 +14,10 @@ from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import compare_runs, perform_runs_again
 from coartic.benchmarks.runner import perform
 from coartic.method import run_method
+from coartic.runs.method_info import BUILT_IN, answer, method_info
+from coartic.runs.plan import Cell, cell_of
 from coartic.runs.record import PARTS
+from coartic.runs.shipped import open_shipped
 from coartic.runs.store import open_store
 from tests.support.processes import python
 from tests.support.suites import InProcess, cell_on, planned, run_and_write
@@ -60,6 +64,39 @@ def runs_of(folder):
     """The stored runs of a folder, by id."""
     with open_store(folder) as store:
         return [store.run(run_id) for run_id in sorted(store.ids())]
+
+
+def test_ids_are_those_of_the_shipped_runs():
+    with open_shipped("comparison") as store:
+        shipped = store.plan()
+    planned_now = {job.cell.digest for job in plan_suite("comparison")}
+    assert planned_now == {job.cell.digest for job in shipped}
+
+
+def digests(method, **parameters):
+    """What cells of a class of methods are known by."""
+    info = method_info(method, BUILT_IN, method.__module__, "1.1")
+    answers = answer(method, "complete", parameters)
+    return Cell(TASK, info, answers).digest
+
+
+def test_a_new_field_at_its_default_changes_no_id():
+    """Of a method, and of an exploration condition, which every learner has. Another value does."""
+    search = built_in()["hill-climbing"].load()
+    more = create_model("More", __base__=search.Parameters, patience=(int, 7))
+    longer = type("Longer", (search,), {"Parameters": more})
+    assert digests(longer) == digests(search) == digests(longer, patience=7)
+    assert digests(longer, patience=8) != digests(search)
+    custom = built_in()["dual-process/custom"].load()
+    more = create_model("More", __base__=custom.Parameters, tremor=(float | None, None))
+    shaking = type("Shaking", (custom,), {"Parameters": more})
+    assert digests(shaking) == digests(custom) == built_in_digest("dual-process/custom")
+    assert digests(shaking, tremor=0.1) != digests(custom)
+
+
+def built_in_digest(name):
+    info = built_in()[name]
+    return cell_of(TASK, info, {}).digest
 
 
 SLOW = {"receding-horizon"}

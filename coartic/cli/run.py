@@ -21,7 +21,7 @@ from coartic.internal.text import counted, one_line, unknown
 from coartic.internal.threads import MOST_JOBS
 
 if TYPE_CHECKING:
-    from coartic.benchmarks.conformance import Law
+    from coartic.benchmarks.conformance import CheckResult
     from coartic.benchmarks.suites import Suite
     from coartic.runs.method_info import MethodInfo
     from coartic.tasks.families import Family
@@ -292,8 +292,8 @@ def check(
             raise CoarticError("--verbose has no effect: it shows what a method prints")
         with Display() as display:
             display.show(f"Performing runs on {subject}")
-            laws = check_task_file(Path(subject), registered)
-        broken = _show_laws(subject, laws)
+            results = check_task_file(Path(subject), registered)
+        broken = _show_results(subject, results)
     else:
         names = given.methods_meant([subject], registered)
         given.check_used(method_file, registered, names)
@@ -301,24 +301,20 @@ def check(
         for name in names:
             with Display() as display:
                 display.show(f"Performing runs of {name}")
-                laws = check_method(registered[name], verbose=verbose)
-            broken += _show_laws(name, laws)
+                results = check_method(registered[name], verbose=verbose)
+            broken += _show_results(name, results)
     if broken:
         sys.exit(1)
 
 
-def _show_laws(name: str, laws: Sequence[Law]) -> int:
-    """Print the finding of each law (a rule that was checked) of ``name``, a method or a task file,
-    and how many hold; return the number of broken laws."""
-    for law in laws:
-        first, *more = law.finding.splitlines() or [""]
-        say(
-            f"{'pass' if law.passed else 'FAIL'}  {law.name}: {first}",
-            *(f"      {m}" for m in more),
-        )
-    passed = sum(law.passed for law in laws)
-    say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
-    return len(laws) - passed
+def _show_results(name: str, results: Sequence[CheckResult]) -> int:
+    """Print the results of the checks of ``name``, a method or a task file, and how many passed;
+    return the number of others."""
+    for result in results:
+        say(f"{'pass' if result.passed else 'FAIL'}  {result.name}: {result.finding}")
+    passed = sum(result.passed for result in results)
+    say(f"{name}: {passed} of {counted(len(results), 'check')} passed.")
+    return len(results) - passed
 
 
 def new(

@@ -25,6 +25,17 @@ from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
 """Origin of this project's methods."""
+ALWAYS_IN_IDS = frozenset(
+    {
+        *("base", "chains", "corrects", "counted", "credit", "direction", "discount", "drift"),
+        *("epsilon", "exploration", "graphs", "hand_exploration", "hands", "horizon", "learned"),
+        *("modify_chosen", "modify_other", "most_sequences", "nodes", "noise_sd", "noisy_starts"),
+        *("other_arm", "period", "pull", "rounds", "sigma", "starts", "stop", "stored", "trials"),
+    }
+)
+"""Names of parameters that count in the id of a run whatever their values. Add none: any other
+parameter counts only if its value is not the default. So a new field of a method, or of an
+exploration condition, changes no id of a run that does not use it."""
 VERSION = re.compile(r"\d+\.\d+")
 """Code of a built-in method, versions of model and method, in place of a hash."""
 
@@ -78,8 +89,9 @@ class MethodInfo:
         return method(method.Parameters(**parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all parameters by name, defaults included, as plain data, except parameters in
-        :attr:`Method.later` that have their defaults. Raises CoarticError for a wrong parameter."""
+        """Return the parameters that identify a run, by name, as plain data: those of
+        :data:`ALWAYS_IN_IDS`, and others that do not have their defaults. Raises CoarticError for a
+        wrong parameter."""
         return dict(self._ask("complete", parameters))
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
@@ -132,7 +144,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         return {
             name: value
             for name, value in values.items()
-            if name not in method.later or value != _defaults(method)[name]
+            if name in ALWAYS_IN_IDS or value != _defaults(method)[name]
         }
     task = Outline(*outline)._replace(hands=tuple(outline[3]))
     try:
