@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import SolutionError
-from coartic.internal.limits import MOST_RUN_SEED, MOST_RUNS, check_limits
+from coartic.internal.limits import MOST_RUN_SEED, MOST_RUNS, brief_value, check_limits
 from coartic.model import PAPER, MotionModel
 from coartic.motion.batch import SLOTS, Batch, arm_of, batch_for, load, start
 from coartic.motion.compile import entry, fill_row
@@ -78,7 +78,7 @@ def execute_noisy(
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or ``task`` or ``model`` has another type.
+        The task cannot be used, or an argument has another type.
     SolutionError
         A solution breaks the task's rules, as in :func:`coartic.execute`, or its movements have
         other ticks than they take on this task with this model: it may be of another task.
@@ -129,6 +129,10 @@ def execute_noisy(
     """
     check_limits("motor_noise", motor_noise, 0.0, _MOST_NOISE)
     check_limits("repeats", repeats, 1, MOST_RUNS)
+    if not isinstance(signal_dependent, bool | np.bool_):
+        raise TypeError(f"signal_dependent is {brief_value(signal_dependent)}; it must be a bool")
+    if not isinstance(solutions, Iterable):
+        raise TypeError(f"solutions is {brief_value(solutions)}; it must be a list of solutions")
     compiled = compiled_task(as_task(task), model)
     plans = [_plan_of(compiled.task, k, solution) for k, solution in enumerate(solutions)]
     generators = _generators(seed, len(plans))
