@@ -354,10 +354,12 @@ RIGHT = {"hands": ["right"]}
 OWN = {
     "movements_of": {"targets": TRIAL.configurations},
     "ecdf": {"targets": [0.1]},
+    "execute_noisy": {"solutions": [TRIAL.movements], "motor_noise": 0.01, "repeats": 2,
+                      "seed": [0], "signal_dependent": False},
     "hand_sequences": RIGHT,
     "initial_hands": RIGHT,
     "read_hits": {"path": "nowhere.csv"},
-}
+}  # fmt: skip
 PUBLIC = {name: each for package in (coartic, analysis)
           for name, each in getmembers(package, isfunction)
           if name in package.__all__ and name not in OF_STUDY}  # fmt: skip
