@@ -38,7 +38,7 @@ from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_SECONDS, check_limits
 from coartic.internal.text import error_line, plain
-from coartic.internal.threads import begin_worker, threads_for
+from coartic.internal.threads import begin_worker, end_with_parent, threads_for
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import warm_up
 from coartic.runs.plan import Job
@@ -60,7 +60,7 @@ def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     >>> with process_pool(2) as pool:  # doctest: +SKIP
     ...     rows = list(pool.map(solve_task, names))
     """
-    with ProcessPoolExecutor(processes, CONTEXT) as pool:
+    with ProcessPoolExecutor(processes, CONTEXT, initializer=end_with_parent) as pool:
         yield pool
 
 

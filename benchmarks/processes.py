@@ -8,6 +8,7 @@ import signal
 import sys
 import tempfile
 import threading
+from multiprocessing import resource_tracker
 from types import ModuleType
 from typing import Any
 
@@ -43,7 +44,23 @@ class WorkerProcess(_BASE.Process):  # type: ignore[misc]
 
 
 class _WorkerContext(type(_BASE)):  # type: ignore[misc]
+    """Context of workers. The first lock starts a process of Python that keeps track of locks; it
+    imports nothing from the working folder either."""
+
     Process = WorkerProcess
+
+    def Lock(self) -> Any:  # noqa: N802
+        _start_tracker()
+        return super().Lock()
+
+    def RLock(self) -> Any:  # noqa: N802
+        _start_tracker()
+        return super().RLock()
+
+
+def _start_tracker() -> None:
+    with _starting, environment({"PYTHONSAFEPATH": "1"}):
+        resource_tracker.ensure_running()
 
 
 CONTEXT: Any = _WorkerContext()

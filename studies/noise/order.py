@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from rules import RESAMPLES, Pair, common, judge
 
-from coartic.analysis.statistics.instances import other_tasks, task_mean
+from coartic.analysis.statistics import other_tasks, task_mean
 
 AFTER = 0.01
 """Motor noise of the verdicts, rad and length units."""

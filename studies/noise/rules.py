@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.statistics import bootstrap_test, holm
 from coartic.estimates import LEVEL
 
 RESAMPLES = 99_999
