@@ -380,11 +380,12 @@ class Store:
     def _insert(self, table: str, **row: Any) -> None:
         """Insert a row, values by column, into a table. A row with the same id is replaced in
         place, because other rows may refer to it."""
+        key = {"cells": "id", "environments": "id", "results": "run_id"}.get(table)
         names, marks = ", ".join(f'"{name}"' for name in row), ", ".join("?" * len(row))
-        news = ", ".join(f'"{name}" = excluded."{name}"' for name in row)
+        # A key that is set, though to itself, has SQLite look through all rows that refer to it.
+        news = ", ".join(f'"{name}" = excluded."{name}"' for name in row if name != key)
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
-        key = {"cells": "(id)", "environments": "(id)", "results": "(run_id)"}.get(table)
-        text += f" ON CONFLICT {key} DO UPDATE SET {news}" if key else ""
+        text += f" ON CONFLICT ({key}) DO UPDATE SET {news}" if key else ""
         self._db.execute(text, [*row.values()])
 
     def _rows(self, query: str, *values: object) -> list[Any]:
