@@ -76,20 +76,21 @@ def with_control(
     return pairs
 
 
+@lru_cache(maxsize=4_096)
 def signature_by_hands(study: Study, signature: str, task: str, label: str) -> dict[str, Array]:
     """Return a signature, a number for each run, of a method's runs on a task, by their hand
     sequence in alphabetical order.
 
     Arrays have shape ``(n,)``, of the first 500 solved runs on the task; runs without the signature
     are left out. Signature ``hand``, a measure of the choice of hands itself, has one entry ``""``
-    for all hand sequences together, or none if no run has it.
+    for all hand sequences together, or none if no run has it. It is cached: do not change it.
     """
-    values = study.signature(signature, task, label)
-    values = values[np.isfinite(values)]
-    hands = study.runs.hands[values.index].astype(str)
+    values = study.signature(signature, task, label).to_numpy(np.float64)
+    hands = np.array(study.cells[task, label].hands.tolist(), dtype=object)
     if signature == "hand":
-        hands = hands.mask(hands != "", "")
-    return {str(each): of.to_numpy(np.float64) for each, of in values.groupby(hands)}
+        hands[:] = ""
+    there = np.isfinite(values)
+    return {each: values[there & (hands == each)] for each in sorted({*hands[there]})}
 
 
 def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:

@@ -161,6 +161,7 @@ def target_ranges(study: Study) -> dict[str, tuple[float, int]]:
     return {name: pair for name, pair in rewards.items() if pair[0] < pair[1]}  # NaN: none
 
 
+@lru_cache(maxsize=4_096)
 def times_of(
     study: Study, task: str, label: str, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
@@ -181,9 +182,8 @@ def times_of(
     totals = runs[spend]
     if spend == "solve_s":
         totals = solve_times(solved(runs)).reindex(runs.index)
-    for run_id, status, made, total, reward in zip(
-        runs.run_id, runs.status, runs.trials, totals, runs.reward, strict=True
-    ):
+    columns = runs.run_id, runs.status, runs.trials, totals, runs.reward
+    for run_id, status, made, total, reward in zip(*(of.tolist() for of in columns), strict=True):
         if status != "ok":
             rows.append(np.full(len(targets), math.inf))
         elif not pd.isna(total):
@@ -204,6 +204,7 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
     return times[warm] if warm.any() else times
 
 
+@lru_cache(maxsize=4)
 def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
     """Return, by label, the runs of each method that ran on all tasks with targets
     (:func:`target_ranges`) among the ranked tasks."""

@@ -338,7 +338,7 @@ def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[st
 def run_ids(*parts: pd.DataFrame) -> Row:
     """Return a row with one entry, ``run_ids``: the ids of all runs in ``parts``, frames of runs,
     separated by spaces."""
-    return {"run_ids": " ".join(run_id for runs in parts for run_id in runs.run_id)}
+    return {"run_ids": " ".join(" ".join(runs.run_id.tolist()) for runs in parts)}
 
 
 def _named(study: Study, runs: pd.DataFrame) -> Row:
@@ -414,8 +414,10 @@ def _gaps_after(study: Study, trials: int) -> pd.Series:
         for run_id, reward in zip(runs.run_id, runs.reward.astype(float), strict=True)
     ]
     gaps = pd.Series(gap_share(best, runs.best_known.astype(float)), runs.index)
-    by_task = gaps.groupby([runs.ranked_as, runs.task]).agg(pd.Series.mean, skipna=False)
-    return by_task.groupby(level=0).agg(pd.Series.mean, skipna=False)
+    cells = gaps.groupby([runs.ranked_as, runs.task])
+    by_task = cells.mean().where(cells.count() == cells.size())
+    methods = by_task.groupby(level=0)
+    return methods.mean().where(methods.count() == methods.size())
 
 
 def _standing_rows(study: Study, *, ranked: bool) -> Rows:

@@ -18,7 +18,6 @@ from matplotlib import rc_context
 from matplotlib import style as styles
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
@@ -93,7 +92,10 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
                 if (parts := draw(study)) is None:
                     return None
                 drawing, data, alt, more = parts
-            has_dagger = any("†" in text.get_text() for text in drawing.findobj(Text))
+            texts = [text.get_text() for axes in drawing.axes for text in axes.texts]
+            for axes in drawing.axes:
+                texts += [axes.get_xlabel(), axes.get_title(), axes.get_title(loc="left")]
+            has_dagger = any("†" in text for text in texts)
             words = f"{caption}{more}{f' {RECONSTRUCTED}' * has_dagger}"
             ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
             to = reference(study, study.optima)

@@ -6,7 +6,7 @@ import html
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from coartic.analysis.tables import (
     is_setting,
     latex_of,
 )
-from coartic.analysis.words import listed, number
+from coartic.analysis.words import id_of, listed, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of
@@ -112,19 +112,12 @@ def _files_of_figures(study: Study, section: Section, width: float | None) -> di
     """Return the files of a section's figures of a width, inches, contents by path: SVG and PDF of
     each; None: each of its usual width."""
     files = {}
-    for plot in _plots_of(study, section, width):
+    drawn = (draw(study, width=width) for draw in section.figures)
+    for plot in filter(None, drawn):
         for ending in (".svg", ".pdf"):
             files[f"figures/{plot.id}{ending}"] = picture(plot.figure, ending)
             plot.figure.set_layout_engine("none")  # the next is laid out alike
     return files
-
-
-@lru_cache(maxsize=64)
-def _plots_of(study: Study, section: Section, width: float | None = None) -> list[Plot]:
-    """Return the figures of a section for which the folder has runs, of a width, inches; None:
-    each of its usual width."""
-    drawn = (draw(study, width=width) for draw in section.figures)
-    return [plot for plot in drawn if plot is not None]
 
 
 def _rows_shown(study: Study, table: Table) -> pd.DataFrame:
@@ -134,23 +127,25 @@ def _rows_shown(study: Study, table: Table) -> pd.DataFrame:
     return frame if table.with_settings else frame[~is_setting(study, frame)]
 
 
-def _parts_of(study: Study, section: Section) -> dict[str, Any]:
+def _parts_of(study: Study, section: Section, lead: Plot | None) -> dict[str, Any]:
     """Return the values of a section for the template by name. ``finding``: a list of lines;
-    ``figures``: a list of plots, each with its SVG and, for the ranking alone, an SVG at one
-    column, for phones; ``shown``: for each table with rows a dictionary of its ``id``, ``caption``,
-    number of ``rows`` and ``html``."""
+    ``figures``: a list of plots, without the one that leads the page (``lead``), each with its SVG
+    and, for the ranking, an SVG at one column, for phones; ``shown``: for each table with rows a
+    dictionary of its ``id``, ``caption``, number of ``rows`` and ``html``."""
     tables = []
     for table in section.tables:
         if len(frame := _rows_shown(study, table)):
             caption, page = caption_of(table, study), html_of(table, study, frame)
             tables.append({"id": table.id, "caption": caption, "rows": len(frame), "html": page})
-    on_phones = _plots_of(study, section, ONE) if section.id == "ranking" else []
-    narrow = {plot.id: for_page(replace(plot, id=f"{plot.id}-narrow")) for plot in on_phones}
+    draws = [draw for draw in section.figures if not lead or id_of(draw) != lead.id]
+    figures = [plot for draw in draws if (plot := draw(study)) is not None]
+    on_phones = [draw(study, width=ONE) for draw in draws if section.id == "ranking"]
+    narrow = {
+        plot.id: for_page(replace(plot, id=f"{plot.id}-narrow")) for plot in on_phones if plot
+    }
     return {
         "finding": sections.finding(study, section),
-        "figures": [
-            (plot, for_page(plot), narrow.get(plot.id, "")) for plot in _plots_of(study, section)
-        ],
+        "figures": [(plot, for_page(plot), narrow.get(plot.id, "")) for plot in figures],
         "shown": tables,
     }
 
@@ -167,10 +162,12 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
     parts that could not be made, by the name of the part; ``watch`` is called with each section's
     title.
     """
+    draw = draw_ranking if study.varied[0] else draw_postures
+    lead = sections.attempt(failures, "Picture", partial(draw, width=ONE), study)
     made = []
     for section in sections.visible_sections(study):
         watch(section.title)
-        parts = sections.attempt(failures, section.title, _parts_of, study, section)
+        parts = sections.attempt(failures, section.title, _parts_of, study, section, lead)
         parts = parts or {"finding": [], "figures": [], "shown": []}
         failure = failures.get(section.title, "")
         if failure or parts["figures"] or parts["shown"]:
@@ -187,8 +184,6 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
     )
     environment.filters |= {"number": number, "listed": listed}
     there = [section["id"] for section in made]
-    draw = draw_ranking if study.varied[0] else draw_postures
-    lead = sections.attempt(failures, "Picture", partial(draw, width=ONE), study)
     stage = next((name for name in ("coarticulation", "ranking", "tasks") if name in there), "")
     try:
         links = metadata("coartic").get_all("Project-URL") or []
