@@ -147,8 +147,11 @@ def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
     declared = [path.parent / name for name in method.files]
     parts = [f"{MODEL_VERSION}.{method.version}".encode()]
     for file in (path, *declared, *files):
-        check_file(file, most=_LARGEST_DATA)
-        parts.append(file.read_bytes())
+        try:
+            check_file(file, most=_LARGEST_DATA)
+            parts.append(file.read_bytes())
+        except (CoarticError, OSError) as error:
+            raise CoarticError(f"{path}: its file {error}") from None
     hashes = sorted(hashlib.sha256(part).digest() for part in parts)  # wherever the files are
     return hashlib.sha256(b"".join(hashes)).hexdigest()[:12]
 

@@ -60,7 +60,7 @@ def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     >>> with process_pool(2) as pool:  # doctest: +SKIP
     ...     rows = list(pool.map(solve_task, names))
     """
-    with ProcessPoolExecutor(processes, CONTEXT, initializer=end_with_parent) as pool:
+    with ProcessPoolExecutor(processes, CONTEXT, initializer=_begin_plainly) as pool:
         yield pool
 
 
@@ -238,6 +238,18 @@ class _Group:
             self._pool = None
 
 
+def _show_errors() -> None:
+    from coartic.benchmarks.preload import show_errors  # which belongs to processes of workers
+
+    show_errors()
+
+
+def _begin_plainly() -> None:
+    """Set up a process of :func:`process_pool`."""
+    _show_errors()
+    end_with_parent()
+
+
 def _begin(folder: Path, workers: int, verbose: bool) -> None:
     """Set up a process that performs jobs, one of ``workers`` that share 80 % of the machine's
     memory (at least 1 GiB each): it works in a new folder in ``folder``, and prints nothing unless
@@ -245,6 +257,7 @@ def _begin(folder: Path, workers: int, verbose: bool) -> None:
     os.environ.pop("PYTHONSAFEPATH", None)  # see WorkerProcess
     begin_worker(folder, streams=1 if verbose else 3)
     if verbose:
+        _show_errors()
         logging.basicConfig(level=logging.INFO)
         logging.getLogger("coartic").setLevel(logging.DEBUG)
         sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]

@@ -106,7 +106,7 @@ def test_command(tmp_path, coartic):
     change = "UPDATE suite SET content = json_set(content, '$.commit', json(?))"
     edit(tmp_path / "results", change, commit)
     change = "UPDATE environments SET content = json_set(content, '$.imports', json(?))"
-    edit(tmp_path / "results", change, '["solver 1.2", "other 3"]')
+    edit(tmp_path / "results", change, '{"solver": "1.2", "other": "3"}')
     text = coartic("cite", tmp_path / "results")[1]
     assert ", commit 0123456789abcdef with changes}," in text
     assert keys_in(text) == ["coartic", THE_PAPER, "whitney1969", "method-test-good"]

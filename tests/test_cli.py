@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from coartic import CoarticError, load_task
@@ -460,7 +461,7 @@ TAKEN = (
     "draw ascending [--out f.svg]",
     "draw ascending --out f.svg [--replace]",
     "draw metres.toml --out j.svg [--recording hits.csv]",
-    "draw metres.toml --recording hits.csv --out k.svg [--ticks-per-unit 100]",
+    "draw metres.toml --recording hits.csv --out k.svg [--ticks-per-unit 2]",
     "cite [--analysis]",
 )
 """Commands with and without what is in brackets, in this order: some write over what earlier ones
@@ -501,9 +502,10 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
     Path("mine.py").write_text(
         (ROOT / "tests" / "methods" / "nearest_hand.py").read_text("utf-8"), "utf-8"
     )
-    for name in ("metres.toml", "hits.csv"):
-        shipped = ROOT / "docs/examples/recordings" / name.replace("hits", "metres")
-        Path(name).write_text("".join(shipped.read_text("utf-8").splitlines(True)[:40]), "utf-8")
+    recordings = ROOT / "docs/examples/recordings"
+    Path("metres.toml").write_text((recordings / "metres.toml").read_text("utf-8"), "utf-8")
+    hits = pd.read_csv(recordings / "metres.csv").head(40)
+    hits.assign(duration=100 * hits.duration).to_csv("hits.csv", index=False)
     Path("task.toml").write_text(TASK_FILE.read_text("utf-8"), "utf-8")
 
     def call(words):
