@@ -371,7 +371,7 @@ def test_draw(coartic, tmp_path, monkeypatch):
 
 
 def test_a_place_that_is_taken_is_said_before_anything_is_drawn(coartic, tmp_path, monkeypatch):
-    monkeypatch.setattr("coartic.analysis.sections.tasks.picture_of_tasks", None)
+    monkeypatch.setattr("coartic.analysis.figures.drawings.picture_of_tasks", None)
     monkeypatch.setattr("coartic.play.page.play_page", None)
     for command, name in (("draw", "tasks.svg"), ("play", "page.html")):
         (tmp_path / name).touch()
