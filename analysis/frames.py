@@ -9,13 +9,12 @@ corrective process alone with its best hands. Rewards are negative ticks; the co
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from pandas.api.types import infer_dtype, is_hashable
+from pandas.api.types import is_hashable
 
 from coartic.analysis.optima import gap_share
 from coartic.analysis.statistics import task_mean
@@ -48,21 +47,15 @@ def checked(
     ``status`` is kept and has to agree: all runs with a reward, and no others, are ``ok``.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
-    that is no frame, such a column that is missing or there twice, no rows, a value of ``names``
-    that is missing, a value of ``names`` or ``others`` without a hash, such as a list, and for
-    ``numbers`` that are no numbers, or neither 0 nor from 1e-100 to 1e100 in size.
+    that is no frame, a missing column, no rows, a missing value in ``names``, and values of
+    ``numbers`` that are infinite or not numbers.
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
-    there = {*frame.columns}  # of a MultiIndex tuples
-    status = ["status"] if "reward" in numbers and "status" in there else []
+    status = ["status"] if "reward" in numbers and "status" in frame else []
     wanted = [*dict.fromkeys((*names, *others, *status, *numbers))]
-    if missing := [name for name in wanted if name not in there]:
+    if missing := [name for name in wanted if name not in {*frame.columns}]:
         raise CoarticError(f"the frame has no column {', '.join(map(inline, missing))}")
-    if several := [name for name in wanted if [*frame.columns].count(name) > 1]:
-        raise CoarticError(
-            f"the frame has column {inline(several[0])} twice: leave one of them out"
-        )
     if not len(frame):
         raise CoarticError("the frame has no rows")
     columns = frame[wanted].copy()
@@ -70,24 +63,14 @@ def checked(
     not_na = "needed is a name; read_csv makes NA of some names, unless keep_default_na=False"
     for name in names:
         refuse_rows(columns, name, columns[name].isna(), not_na)
-    for name in (*names, *others):
-        is_list = ~columns[name].map(is_hashable).astype(bool)
-        refuse_rows(columns, name, is_list, "needed is a name, a number or a tuple")
     for name in numbers:
-        kind = infer_dtype(columns[name], skipna=True)
-        if kind not in ("integer", "floating", "mixed-integer-float", "empty"):
-            is_number = columns[name].map(
-                lambda value: isinstance(value, (int, float)) and not isinstance(value, bool)
-            )
-            refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
         try:
-            columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
-        except OverflowError:
-            raise CoarticError(f"column {inline(name)} has a number beyond 1e308") from None
-        size = columns[name].abs()
-        wrong = (size > 1e100) | ((size > 0) & (size < 1e-100))
-        most = "needed are finite numbers, 0 or from 1e-100 to 1e100 in size"
-        refuse_rows(columns, name, wrong, most)
+            of_name = columns[name].astype("Float64")
+            values = of_name.to_numpy(np.float64, na_value=np.nan)
+        except (TypeError, ValueError) as error:
+            raise CoarticError(f"column {inline(name)}: needed are numbers ({error})") from None
+        refuse_rows(columns, name, np.isinf(values), "needed are finite numbers")
+        columns[name] = values
     if status:
         is_ok = columns.status.astype(object) == "ok"
         rule = "a run has a reward if its status is ok, and NaN otherwise"
@@ -101,9 +84,8 @@ def inline(name: object) -> str:
 
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
-    """Return a list of the names of columns in ``names``, an argument called ``what``; a text is
-    one name. Raises CoarticError for an argument that is not iterable, or has values without a
-    hash."""
+    """Return a list of the names of columns in ``names``, an argument called ``what``; a string is
+    one name."""
     if isinstance(names, str):
         return [names]
     if not isinstance(names, Iterable) or not all(map(is_hashable, listed := list(names))):
@@ -274,8 +256,8 @@ def means(
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text or infinite numbers in ``columns``;
-        ``by`` is empty; or the table would have a column twice.
+        The frame has no rows, lacks a column, or has text or infinite numbers in ``columns``; or
+        ``by`` is empty.
 
     Examples
     --------
@@ -288,19 +270,14 @@ def means(
     by, columns = _names_given("by", by), _names_given("columns", columns)
     if not by:
         raise CoarticError("by is empty: needed are names of columns")
-    ends = [end for name in columns for end in (name, f"{name}_low", f"{name}_high")]
-    made = [*by, "rows", *ends]
-    if twice := [name for name, count in Counter(made).items() if count > 1]:
-        wrong = f"the table would have two columns {inline(twice[0])}"
-        raise CoarticError(f"{wrong}: name it once, or give it another name in the frame")
     values, rows = checked(frame, numbers=columns, others=by), []
     for key, group in values.groupby(by, sort=False, dropna=False, observed=True):
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
         for name in columns:
             there = group[name].dropna().to_numpy(dtype=np.float64)
-            row |= mean(there).columns(name) if len(there) else {}
+            row |= (mean(there) if len(there) else Estimate(np.nan)).columns(name)
         rows.append(row)
-    return pd.DataFrame(rows, columns=made)
+    return pd.DataFrame(rows)
 
 
 def by_task(frame: pd.DataFrame) -> pd.DataFrame:

@@ -1,13 +1,14 @@
 """What a notebook shows of tasks, studies, tables and figures, and the results that are shipped."""
 
 import os
+import pickle
 from xml.dom import minidom
 
 import numpy as np
 import pytest
 
 from coartic import Task, load_task
-from coartic.analysis import FIGURES, load, ranking
+from coartic.analysis import FIGURES, TABLES, load, ranking
 
 
 def elements(page, name):
@@ -57,3 +58,10 @@ def test_shipped_results_are_read_as_a_study(tmp_path, monkeypatch):
     assert ranked.why["dual-process/EC3"] == "2 of 4 tasks"
     assert len(next(study.rewards())[1]) > 0
     assert os.listdir("shipped") == []
+
+
+def test_a_study_pickles_after_a_table_was_asked_for(traced):
+    table = TABLES["tasks"](traced)
+    again = pickle.loads(pickle.dumps(traced))
+    assert TABLES["tasks"](again).equals(table)
+    assert again.runs.equals(traced.runs)
