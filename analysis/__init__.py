@@ -3,19 +3,23 @@
 ``coartic.analysis.load(folder)`` reads a results folder as a :class:`Study`.
 """
 
+from typing import Any
+
 from coartic.internal.lazy import import_lazily
 
 _MODULES = {
-    "SIGNATURES": "coartic.analysis.signatures.measures",
+    "FIGURES": "coartic.analysis.figures.drawings",
+    "SIGNATURES": "coartic.analysis.signatures",
+    "TABLES": "coartic.analysis.tables",
     "Study": "coartic.analysis.study",
-    "TwoContexts": "coartic.analysis.signatures.two_contexts",
-    "beyond_p": "coartic.analysis.signatures.context_tests",
+    "TwoContexts": "coartic.analysis.signatures",
+    "beyond_p": "coartic.analysis.signatures",
     "by_task": "coartic.analysis.frames",
     "check_hits": "coartic.analysis.recordings",
     "consistency": "coartic.analysis.recordings",
     "contexts_of_control": "coartic.analysis.control",
     "draw_recording": "coartic.analysis.recordings",
-    "ecdf": "coartic.analysis.frames",
+    "ecdf": "coartic.analysis.running_times",
     "gaps": "coartic.analysis.frames",
     "hits_from_markers": "coartic.analysis.recordings",
     "interval": "coartic.analysis.words",
@@ -24,14 +28,29 @@ _MODULES = {
     "mean_excess": "coartic.analysis.control",
     "means": "coartic.analysis.frames",
     "number": "coartic.analysis.words",
-    "other_tasks": "coartic.analysis.statistics.instances",
+    "other_tasks": "coartic.analysis.statistics",
     "ranking": "coartic.analysis.frames",
     "read_hits": "coartic.analysis.recordings",
     "shares": "coartic.analysis.frames",
     "solutions_of": "coartic.analysis.recordings",
-    "runtimes": "coartic.analysis.sections.costs",
+    "runtimes": "coartic.analysis.running_times",
     "with_control": "coartic.analysis.control",
+}
+_CHECKED = {
+    *("beyond_p", "contexts_of_control", "interval", "mean", "mean_excess", "number"),
+    *("other_tasks", "with_control"),
 }
 __all__ = [*_MODULES]
 
-__getattr__, __dir__ = import_lazily(__name__, _MODULES)
+_import, __dir__ = import_lazily(__name__, _MODULES)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name when it is first used. Functions of :data:`_CHECKED` check the arguments that
+    users give them here; functions of the package call each other without these checks."""
+    value = _import(name)
+    if name in _CHECKED:
+        from coartic.internal.arguments import checked_arguments
+
+        value = globals()[name] = checked_arguments(value)
+    return value

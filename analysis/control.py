@@ -17,25 +17,25 @@ The test is the one-tailed test of the difference of means over runs by exchange
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
+from functools import lru_cache
 from statistics import mode
 
 import numpy as np
 import pandas as pd
 
-from coartic.analysis.method_frame import BY_TRIAL
-from coartic.analysis.methods import RANDOM_SEARCH
-from coartic.analysis.signatures.two_contexts import TwoContexts
-from coartic.analysis.study import MOST_EXECUTED, Study, cached, solved
-from coartic.internal.arguments import checked_arguments
+from coartic.analysis.methods import BY_TRIAL, LEARNERS, RANDOM_SEARCH, headline_methods
+from coartic.analysis.signatures import TwoContexts, context_pairs
+from coartic.analysis.study import MOST_EXECUTED, Study, solved
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
-from coartic.robot import Array
+from coartic.robot import HANDS, Array
 
 LEAST_SHARE = 0.1
 """Least share of a method's runs on a task that a compared hand sequence has."""
 
 
-@checked_arguments
 def with_control(
     study: Study, signature: str, task: str, label: str
 ) -> dict[str, tuple[Array, Array]]:
@@ -65,15 +65,32 @@ def with_control(
     >>> values, control = with_control(study, "first", "ascending", "dual-process/EC1")["RRR"]
     ... # doctest: +SKIP
     """
-    of_method = study.signature_by_hands(signature, task, label)
+    of_method = signature_by_hands(study, signature, task, label)
     total = min(len(solved(study.cells[task, label])), MOST_EXECUTED)
     pairs = {}
     for hands, values in sorted(of_method.items(), key=lambda item: -len(item[1])):
         if len(values) >= LEAST_SHARE * total:
             control = control_of(study, task, label, hands)
-            of_control = study.signature_by_hands(signature, task, control) if control else {}
+            of_control = signature_by_hands(study, signature, task, control) if control else {}
             pairs[hands] = values, of_control.get(hands, np.empty(0))
     return pairs
+
+
+@lru_cache(maxsize=4_096)
+def signature_by_hands(study: Study, signature: str, task: str, label: str) -> dict[str, Array]:
+    """Return a signature, a number for each run, of a method's runs on a task, by their hand
+    sequence in alphabetical order.
+
+    Arrays have shape ``(n,)``, of the first 500 solved runs on the task; runs without the signature
+    are left out. Signature ``hand``, a measure of the choice of hands itself, has one entry ``""``
+    for all hand sequences together, or none if no run has it. It is cached: do not change it.
+    """
+    values = study.signature(signature, task, label).to_numpy(np.float64)
+    hands = np.array(study.cells[task, label].hands.tolist(), dtype=object)
+    if signature == "hand":
+        hands[:] = ""
+    there = np.isfinite(values)
+    return {each: values[there & (hands == each)] for each in sorted({*hands[there]})}
 
 
 def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:
@@ -103,7 +120,7 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
     return EVERY_CONDITION[name].modify_other if pd.isna(changed) else bool(changed)
 
 
-@cached
+@lru_cache(maxsize=4_096)
 def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
     """Return the labels of forms of random search on a task, by hand sequence of all solved runs
     (empty if every hand sequence is tried), number of trials, and True if the idle arm is explored,
@@ -123,13 +140,12 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
     return labels
 
 
-@cached
+@lru_cache(maxsize=4_096)
 def _most_trials(study: Study, task: str, label: str) -> float:
     """Return the most trials that a run of a method on a task made, 0 if no run made trials."""
     return float(study.cells[task, label].trials.fillna(0).max())
 
 
-@checked_arguments
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
     """Return by how much a method's signature exceeds the mean signature of random search with the
     same hands (``hand``: with any), in the unit of the signature: a mean over the runs for which
@@ -146,7 +162,6 @@ def selects(study: Study, label: str) -> bool:
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 
 
-@checked_arguments
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
     """Return the runs of random search, the control of ``contexts``, on the same two tasks (the
     first 500 solved on each) for the same goal and hand; runs with the other hand do not count.
@@ -171,3 +186,32 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     )
     pair = TwoContexts(first, second, contexts.goal, contexts.hand)
     return pair if pair.in_both else None
+
+
+def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
+    """Yield the first 500 solved runs of a method (label) on two tasks at each first goal that the
+    tasks share (:func:`.context_pairs`), for each hand that hits this goal on both tasks."""
+    for first, second, shared in context_pairs(study.individual_tasks):
+        keys = (first, label), (second, label)
+        if study.cells.keys() >= {*keys}:
+            runs = study.executed(first, label), study.executed(second, label)
+            for goal in range(1, shared + 1):
+                for hand in HANDS:
+                    contexts = TwoContexts(*runs, goal, hand)
+                    if contexts.in_both:
+                        yield contexts
+
+
+@lru_cache(maxsize=4)
+def shared_goal(study: Study) -> TwoContexts | None:
+    """Return the runs at the first goal that two tasks share and that runs on both hit with the
+    same hand, of the first method with such runs, in this order: the paper's learner, methods from
+    files, methods that represent their algorithms, other methods.
+
+    None if no method has such runs.
+    """
+    rows = study.methods
+    subjects = rows.index[rows.is_learner], rows.index[~rows.built_in]
+    order = [*LEARNERS, *itertools.chain(*subjects), *headline_methods(rows), *rows.index]
+    every = (shared_goals(study, label) for label in dict.fromkeys(order))
+    return next(itertools.chain.from_iterable(every), None)

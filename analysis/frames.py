@@ -9,30 +9,25 @@ corrective process alone with its best hands. Rewards are negative ticks; the co
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Hashable, Iterable, Sequence, Set
-from contextlib import suppress
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from pandas.api.types import infer_dtype, is_hashable
+from pandas.api.types import is_hashable
 
-from coartic.analysis.method_frame import with_joined_learners
 from coartic.analysis.optima import gap_share
-from coartic.analysis.statistics import running_times
-from coartic.analysis.statistics.instances import task_mean
+from coartic.analysis.statistics import task_mean
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
-from coartic.internal.limits import brief_value, real_array
-from coartic.internal.text import plain
+from coartic.internal.limits import brief_value
+from coartic.internal.text import counted, plain
 from coartic.runs.plan import label_of
 
 SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
-_TWICE = (
+DUPLICATE = (
     "a run is there twice (runs of two sources that count alike need a column seed, folder or "
     "run_id; number the draws of a bootstrap in a column run)"
 )
@@ -52,50 +47,34 @@ def checked(
     ``status`` is kept and has to agree: all runs with a reward, and no others, are ``ok``.
 
     The index loses its names, which could be names of columns. Raises CoarticError for an object
-    that is no frame, such a column that is missing or there twice, no rows, a value of ``names``
-    that is missing, a value of ``names`` or ``others`` without a hash, such as a list, and for
-    ``numbers`` that are no numbers, or neither 0 nor from 1e-100 to 1e100 in size.
+    that is no frame, a missing column, no rows, a missing value in ``names``, and values of
+    ``numbers`` that are infinite or not numbers.
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
-    there = {*frame.columns}  # of a MultiIndex tuples
-    status = ["status"] if "reward" in numbers and "status" in there else []
+    status = ["status"] if "reward" in numbers and "status" in frame else []
     wanted = [*dict.fromkeys((*names, *others, *status, *numbers))]
-    if missing := [name for name in wanted if name not in there]:
+    if missing := [name for name in wanted if name not in {*frame.columns}]:
         raise CoarticError(f"the frame has no column {', '.join(map(inline, missing))}")
-    if several := [name for name in wanted if [*frame.columns].count(name) > 1]:
-        raise CoarticError(
-            f"the frame has column {inline(several[0])} twice: leave one of them out"
-        )
     if not len(frame):
         raise CoarticError("the frame has no rows")
     columns = frame[wanted].copy()
     columns.index = columns.index.set_names([None] * columns.index.nlevels)
     not_na = "needed is a name; read_csv makes NA of some names, unless keep_default_na=False"
     for name in names:
-        _refuse_rows(columns, name, columns[name].isna(), not_na)
-    for name in (*names, *others):
-        is_list = ~columns[name].map(is_hashable).astype(bool)
-        _refuse_rows(columns, name, is_list, "needed is a name, a number or a tuple")
+        refuse_rows(columns, name, columns[name].isna(), not_na)
     for name in numbers:
-        kind = infer_dtype(columns[name], skipna=True)
-        if kind not in ("integer", "floating", "mixed-integer-float", "empty"):
-            is_number = columns[name].map(
-                lambda value: isinstance(value, (int, float)) and not isinstance(value, bool)
-            )
-            _refuse_rows(columns, name, ~is_number.astype(bool), "needed are numbers")
         try:
-            columns[name] = columns[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
-        except OverflowError:
-            raise CoarticError(f"column {inline(name)} has a number beyond 1e308") from None
-        size = columns[name].abs()
-        wrong = (size > 1e100) | ((size > 0) & (size < 1e-100))
-        most = "needed are finite numbers, 0 or from 1e-100 to 1e100 in size"
-        _refuse_rows(columns, name, wrong, most)
+            of_name = columns[name].astype("Float64")
+            values = of_name.to_numpy(np.float64, na_value=np.nan)
+        except (TypeError, ValueError) as error:
+            raise CoarticError(f"column {inline(name)}: needed are numbers ({error})") from None
+        refuse_rows(columns, name, np.isinf(values), "needed are finite numbers")
+        columns[name] = values
     if status:
         is_ok = columns.status.astype(object) == "ok"
         rule = "a run has a reward if its status is ok, and NaN otherwise"
-        _refuse_rows(columns, "status", is_ok != columns.reward.notna(), rule)
+        refuse_rows(columns, "status", is_ok != columns.reward.notna(), rule)
     return columns
 
 
@@ -105,9 +84,8 @@ def inline(name: object) -> str:
 
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
-    """Return a list of the names of columns in ``names``, an argument called ``what``; a text is
-    one name. Raises CoarticError for an argument that is not iterable, or has values without a
-    hash."""
+    """Return a list of the names of columns in ``names``, an argument called ``what``; a string is
+    one name."""
     if isinstance(names, str):
         return [names]
     if not isinstance(names, Iterable) or not all(map(is_hashable, listed := list(names))):
@@ -115,7 +93,7 @@ def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
     return listed
 
 
-def _refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
+def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
     """Raise CoarticError if rows are True in ``wrong``, with the value of the first of them in
     ``column``, and the words ``needed``."""
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
@@ -137,17 +115,17 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     """
     for name in ("reward", "best_known"):
         sign = "a reward is minus the ticks; of a cost, such as best_cost, give the negative"
-        _refuse_rows(columns, name, columns[name] > 0, sign)
+        refuse_rows(columns, name, columns[name] > 0, sign)
     share = "a gap is a share of the best known reward, which has to be below 0"
-    _refuse_rows(columns, "best_known", columns.best_known == 0, share)
+    refuse_rows(columns, "best_known", columns.best_known == 0, share)
     excess = columns.reward - columns.best_known
     highest = "it is above best_known, which is to be the highest reward of the task"
-    _refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
+    refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
     columns = columns.assign(gap=gap_share(columns.reward, columns.best_known))
     if ZERO not in columns:
         return columns
     possible = columns.best_known - columns[ZERO]
-    _refuse_rows(columns, ZERO, possible < 0, highest)
+    refuse_rows(columns, ZERO, possible < 0, highest)
     return columns.assign(share=(columns.reward - columns[ZERO]) / possible.where(possible > 0))
 
 
@@ -169,7 +147,7 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     for name in {"best_known", ZERO} & {*columns}:
         several = columns[name].groupby(task).transform("nunique") > 1
-        _refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
+        refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
     names = columns.method.to_numpy(object)
     if "setting" in there:
         settings = columns.setting.astype(object).where(columns.setting.notna(), "").astype(str)
@@ -182,11 +160,11 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     return frame.assign(key=run if keys else np.arange(len(frame)))
 
 
-def _scored_runs(frame: pd.DataFrame) -> pd.DataFrame:
+def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """Return a user's frame of runs, checked, with the gap of each (:func:`scored`). Raises
     CoarticError as :func:`scored` does, and for two rows of a run."""
-    runs = scored(frame)
-    _refuse_rows(runs, "method", runs.duplicated("key"), f"{_TWICE}; needed is a row for a run")
+    runs = scored(frame, *more)
+    refuse_rows(runs, "method", runs.duplicated("key"), f"{DUPLICATE}; needed is a row for a run")
     return runs
 
 
@@ -278,8 +256,8 @@ def means(
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text or infinite numbers in ``columns``;
-        ``by`` is empty; or the table would have a column twice.
+        The frame has no rows, lacks a column, or has text or infinite numbers in ``columns``; or
+        ``by`` is empty.
 
     Examples
     --------
@@ -292,19 +270,14 @@ def means(
     by, columns = _names_given("by", by), _names_given("columns", columns)
     if not by:
         raise CoarticError("by is empty: needed are names of columns")
-    ends = [end for name in columns for end in (name, f"{name}_low", f"{name}_high")]
-    made = [*by, "rows", *ends]
-    if twice := [name for name, count in Counter(made).items() if count > 1]:
-        wrong = f"the table would have two columns {inline(twice[0])}"
-        raise CoarticError(f"{wrong}: name it once, or give it another name in the frame")
     values, rows = checked(frame, numbers=columns, others=by), []
     for key, group in values.groupby(by, sort=False, dropna=False, observed=True):
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
         for name in columns:
             there = group[name].dropna().to_numpy(dtype=np.float64)
-            row |= mean(there).columns(name) if len(there) else {}
+            row |= (mean(there) if len(there) else Estimate(np.nan)).columns(name)
         rows.append(row)
-    return pd.DataFrame(rows, columns=made)
+    return pd.DataFrame(rows)
 
 
 def by_task(frame: pd.DataFrame) -> pd.DataFrame:
@@ -345,157 +318,95 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     return table.reset_index()
 
 
-def compared_tasks(on: Iterable[tuple[Hashable, Set[Any]]]) -> Set[Any]:
-    """Return the tasks over which algorithms are ranked. ``on`` has, for each method, its algorithm
-    and the tasks on which it ran.
-
-    Candidates are the sets of tasks of single methods. The set is returned for which (number of
-    tasks) x (number of algorithms with a method that ran on all of them) is largest; of equals the
-    set with more tasks, then the first. Empty for no method.
-    """
-    pairs = [*on]
-
-    def size(tasks: Set[Any]) -> tuple[int, int]:
-        there = len({algorithm for algorithm, others in pairs if others >= tasks})
-        return len(tasks) * there, len(tasks)
-
-    return max((tasks for _, tasks in pairs), key=size, default=frozenset())
-
-
 def ranking(frame: pd.DataFrame) -> pd.DataFrame:
-    """Rank methods by their mean gap over tasks.
+    """Rank the methods that solved all tasks of a frame by their mean gap.
 
     Parameters
     ----------
     frame : DataFrame
-        With columns ``method``, ``task`` (names, numbers or tuples), ``reward`` and ``best_known``
-        (negative ticks); for shares also ``corrective_best``. With a column ``setting``, a method
-        with several settings has a row for each setting, ``"cma-es/bandit noise=0.1"``.
+        A row for each run, with columns ``method``, ``task`` (names, numbers or tuples), ``reward``
+        and ``best_known`` (negative ticks). Optional columns:
+
+        - ``setting``: a method with several settings has a row for each setting,
+          ``"cma-es/bandit noise=0.1"``;
+        - ``ranked_as``: names of rows, in place of ``method`` and ``setting``;
+        - ``corrective_best``: for shares;
+        - ``budget``: the number of trials that was asked for, missing for a method without trials.
+
+        ``load(folder).runs`` has all of them.
 
     Returns
     -------
     DataFrame
-        A row for each method, by its name, the smallest gap first: ``gap``, the mean over the
-        compared tasks (:func:`compared_tasks`: many tasks that many methods share) of the mean over
-        runs, with its 95 % interval ``gap_low`` to ``gap_high`` for other runs on the same tasks
-        (NaN with fewer than three runs on a task); the numbers of compared ``tasks`` that it solved
-        in every run, of ``missing`` tasks (other compared tasks), of ``runs`` and of ``failed``
-        runs on all tasks. A method with missing tasks has no gap and is last. The paper's learner
-        on tasks for one arm and for two has a further row, ``"dual-process (EC1, EC4)"``. With
-        ``corrective_best`` also the ``share`` of the possible gain (:func:`shares`) with
-        ``share_low`` and ``share_high``, a mean over the tasks on which something can be gained,
-        and ``without_gain``, the number of other tasks.
+        A row for each method, by its name: first the ranked methods, the smallest gap first, then
+        the others.
+
+        - ``gap``: mean over tasks of the mean over runs, with its 95 % interval ``gap_low`` to
+          ``gap_high`` for other runs on the same tasks (NaN with fewer than three runs on a task);
+          NaN for a method that is not ranked;
+        - ``share``, ``share_low``, ``share_high``: share of the possible gain (:func:`shares`), a
+          mean over the tasks on which something can be gained, and ``without_gain``, the number of
+          other tasks; only for a frame with ``corrective_best``;
+        - ``tasks``: number of tasks that it solved in every run; ``runs`` and ``failed``: numbers
+          of runs and of failed runs;
+        - ``why``: why it is not ranked, ``"1 of 2 tasks"`` or ``"6 of 9 runs failed"``; empty for a
+          ranked method.
+
+        Tasks without a best known reward do not count.
 
     Raises
     ------
     CoarticError
         A column or a name is missing, a reward is wrong (:func:`gaps`), a task has several best
-        known rewards, or a run has two rows.
+        known rewards, a run has two rows, or methods have different budgets.
 
     Examples
     --------
     >>> frame = pd.DataFrame(
-    ...     {"method": ["mine", "mine", "yours"], "task": "ascending",
-    ...      "reward": [-300, -296, -310], "best_known": -292}
+    ...     {"method": ["mine", "mine", "yours"], "task": ["ascending", "descending", "ascending"],
+    ...      "reward": [-300, -320, -310], "best_known": [-292, -304, -292]}
     ... )
-    >>> ranking(frame)[["gap", "missing", "failed"]].round(3)
-              gap  missing  failed
+    >>> ranking(frame)[["gap", "failed", "why"]].round(3)
+              gap  failed           why
     method
-    mine    0.021        0       0
-    yours   0.062        0       0
+    mine     0.04       0
+    yours     NaN       0  1 of 2 tasks
     """
-    frame = _scored_runs(frame)
-    by_method = with_joined_learners(dict([*frame.groupby("method", sort=False)]))
-    known = [of_method[of_method.best_known.notna()] for of_method in by_method.values()]
-    every = compared_tasks(zip(by_method, ({*runs.task} for runs in known), strict=True))
-    rows = []
-    for of_method, runs in zip(by_method.values(), known, strict=True):
-        of_tasks = runs[runs.task.isin(every)]
-        has_failed = of_tasks.gap.isna().groupby(of_tasks.task).transform("any")
-        solved = of_tasks[~has_failed]
-        by_task = dict([*solved.groupby("task").gap])
-        solved_all = by_task and by_task.keys() == every
-        row = (task_mean(by_task.values()) if solved_all else Estimate(np.nan)).columns("gap")
-        if "share" in frame.columns:
-            of_task = dict([*solved.dropna(subset="share").groupby("task").share])
-            estimated = task_mean(of_task.values()) if solved_all and of_task else Estimate(np.nan)
-            row |= {**estimated.columns("share"), "without_gain": len(by_task) - len(of_task)}
-        rows.append({
-            **row,
-            "tasks": len(by_task),
-            "missing": len(every) - len(by_task),
-            "runs": len(of_method),
-            "failed": int(of_method.reward.isna().sum()),
-        })  # fmt: skip
-    methods = pd.Index([*by_method], name="method", tupleize_cols=False)
-    return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")
-
-
-def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
-    """Return the share of targets that methods reach within a number of trials.
-
-    Parameters
-    ----------
-    frame : DataFrame
-        With columns ``method``, ``task``, ``run``, ``trials`` (made so far, from 1), ``reward`` and
-        ``best_known`` (negative ticks): a row for each improvement of a run, or for its end. With a
-        column ``setting``, a method with several settings is several methods.
-    targets : sequence of float
-        Gaps to the best known reward, such as ``[0.1, 0.05, 0.01]``.
-
-    Returns
-    -------
-    DataFrame
-        A row for each number of trials at which a method's share rises: ``method``, ``trials`` and
-        ``share``, the share of all pairs of run and target reached within these trials; tasks have
-        the same weight. A task without runs, and a run without a reward, reach no target. A method
-        that reaches no target has a single row, with share 0 and infinite trials.
-
-    Raises
-    ------
-    CoarticError
-        A column is missing or a reward is wrong (:func:`ranking`), trials are below 1, targets are
-        no gaps, or the frame has no best known reward.
-
-    Examples
-    --------
-    >>> frame = pd.DataFrame(
-    ...     {"method": "mine", "task": "ascending", "run": 0, "trials": [1, 40, 900],
-    ...      "reward": [-319, -305, -293], "best_known": -292}
-    ... )
-    >>> ecdf(frame, [0.05, 0.01])
-      method  trials  share
-    0   mine    40.0    0.5
-    1   mine   900.0    1.0
-    """
-    checked(frame, names=("run",))
-    frame = scored(frame, "trials")
-    in_order = frame.sort_values(["trials", "reward"], kind="stable")
-    again = in_order.duplicated(["key", "trials"]) & ~in_order.duplicated(
-        ["key", *SCORES, "trials"]
-    )
-    falls = in_order.groupby("key").reward.diff() < 0
-    improve = f"{_TWICE}, or its reward falls; needed are the best rewards so far"
-    _refuse_rows(in_order, "method", again | falls, improve)
-    _refuse_rows(frame, "trials", ~(frame.trials >= 1), "needed is the number of trials, from 1")
-    reach = np.empty(0)
-    with suppress(TypeError, ValueError):  # no numbers
-        reach = real_array("targets", targets)
-    if reach.ndim != 1 or not reach.size or not ((reach >= 0) & (reach <= 1)).all():
+    there = {*getattr(frame, "columns", ())}
+    if "ranked_as" in there:
+        frame = frame.drop(columns=["method", "setting"], errors="ignore")
+        frame = frame.rename(columns={"ranked_as": "method"})
+    runs = _scored_runs(frame, *["budget"] * ("budget" in there))
+    asked = sorted(runs.budget.dropna().unique()) if "budget" in there else []
+    if len(asked) > 1:
+        budgets = [f"{budget:.0f}" for budget in asked]
         raise CoarticError(
-            f"targets are {brief_value(targets)}: needed are gaps, shares of the best known reward "
-            "from 0 to 1, such as [0.1, 0.05, 0.01] for 10, 5 and 1 % (no per cent, no ticks)"
+            f"column budget has {' and '.join(budgets)} trials: methods are only ranked with equal "
+            "numbers of trials. Rank those with one number, and methods without trials: "
+            f"frame[frame.budget.isna() | (frame.budget == {budgets[0]})]"
         )
-    if not frame.best_known.notna().any():
-        raise CoarticError("the frame has no best_known reward, so no targets")
-    every, rows = frame.task[frame.best_known.notna()].unique(), []
-    for method, of_method in frame.groupby("method", sort=False):
-        times = []
-        for task in every:
-            runs = of_method[of_method.task == task].groupby("key")
-            reached = [[run.trials[run.gap <= gap].min() for gap in reach] for _, run in runs]
-            trials = np.array(reached or [[np.nan] * len(reach)], dtype=np.float64)
-            times.append(np.where(np.isnan(trials), np.inf, trials))
-        steps = zip(*running_times.share_by_budget(times), strict=True)
-        rows += [(method, *step) for step in steps]
-    return pd.DataFrame(rows, columns=["method", "trials", "share"])
+    known = runs[runs.best_known.notna()]
+    tasks = known.task.nunique()
+    by_method = dict([*known.groupby("method", sort=False)])
+    rows = []
+    for method, of_method in runs.groupby("method", sort=False):
+        of_tasks = by_method.get(method, known[:0])
+        failed = of_tasks.gap.isna()
+        solved = of_tasks[~of_tasks.task.isin(of_tasks.task[failed])]
+        reasons = [
+            f"{of_tasks.task.nunique()} of {counted(tasks, 'task')}"
+            * (of_tasks.task.nunique() < tasks),
+            f"{failed.sum()} of {counted(len(of_tasks), 'run')} failed" * bool(failed.any()),
+            "no best known reward" * (not tasks),
+        ]
+        why = "; ".join(filter(None, reasons))
+        by_task = [part for _, part in solved.groupby("task").gap]
+        row = (Estimate(np.nan) if why else task_mean(by_task)).columns("gap")
+        if "share" in runs:
+            parts = [part for _, part in solved.dropna(subset="share").groupby("task").share]
+            row |= (Estimate(np.nan) if why or not parts else task_mean(parts)).columns("share")
+            row["without_gain"] = len(by_task) - len(parts)
+        counts = {"tasks": len(by_task), "runs": len(of_method)}
+        rows.append(row | counts | {"failed": int(of_method.reward.isna().sum()), "why": why})
+    methods = pd.Index([*runs.method.unique()], name="method", tupleize_cols=False)
+    return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")

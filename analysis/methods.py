@@ -1,19 +1,24 @@
-"""Names of methods, and facts about the built-in ones, which ``methods.toml`` has.
-
-:mod:`~.method_frame` has a row for each method of a study.
-"""
+"""Methods: names and facts about the built-in ones, which ``methods.toml`` has, and a frame of the
+methods of a study (:func:`methods_of`)."""
 
 from __future__ import annotations
 
+import itertools
+import json
 import tomllib
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, METHOD_PREFIX
+from coartic.method import Information
+from coartic.runs.plan import in_words
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from coartic.runs.method_info import MethodInfo
 
 CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in EVERY_CONDITION}
@@ -100,3 +105,170 @@ def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
     words = (_WORDS.get(key, key + equals) + value for key, equals, value in pairs)
     return f"{name} ({', '.join(words).replace('_', ' ')})"
+
+
+BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
+    "using the reward of each trial",
+    "using the reward as a formula",
+    "not using the reward",
+)
+"""Groups of methods by their use of the reward."""
+OWN_COLOR, OWN_MARK = "walnut", "star"
+"""Colour of the first nine methods from files, and mark of the very first: no built-in method has
+this colour or this mark."""
+MARK = " ‡"
+"""Mark behind the title of a method against which something was found (:attr:`.Study.marks`)."""
+
+
+def methods_of(
+    runs: pd.DataFrame, declared: Mapping[str, MethodInfo], marked: Collection[str] = ()
+) -> pd.DataFrame:
+    """Return a row for each method with its setting, and for two conditions of the learner that
+    are ranked as one (:func:`ranked_as`): built-in methods in the order of ``methods.toml``, then
+    methods from files in the order of the suite. Most columns of two conditions are those of the
+    second.
+
+    Parameters
+    ----------
+    runs : DataFrame
+        A row for each run, with the columns of :attr:`.Study.runs`, in the order of the suite.
+    declared : mapping of str to MethodInfo
+        Declaration of each method, by its id without a setting.
+    marked : collection of str, optional
+        Ids of methods whose titles get :data:`MARK`.
+
+    Returns
+    -------
+    DataFrame
+        By the label of the method, with the columns of :attr:`.Study.methods`.
+    """
+    import pandas as pd  # names of methods are read without it
+
+    rows, by_label = dict[str, dict[str, Any]](), dict([*runs.groupby("label", sort=False)])
+    varied, values = parameter_varied(runs)
+    shown = Counter(map(title_of, declared.values()))
+    for label, of_method in by_label.items():
+        base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
+        named = setting
+        if label in values:
+            which = ", the paper's" if base in LEARNERS else ", default"
+            named = in_words({varied: values[label]}) + which * (not setting)
+        info = declared[base]
+        facts = KNOWN_METHODS.get(base) if info.is_ours else None
+        default = base if setting else facts.ablation_of if facts else ""
+        called = info if shown[title_of(info)] == 1 else base  # of two names alike: the ids
+        under = default if default in by_label and label not in values else ""
+        rows[label] = {
+            "base": base,
+            "condition": CONDITION_OF.get(base, ""),
+            "setting": setting,
+            "title": title_of(called, named) + MARK * (base in marked),
+            "short": title_of(base, named, short=True) + MARK * (base in marked),
+            "algorithm": facts.algorithm if facts else one_line(label),
+            "is_learner": base in LEARNERS,
+            "is_search": base in SEARCHES,
+            "information": _group_of(of_method),
+            "built_in": info.is_ours,
+            "stochastic": info.stochastic,
+            "headline": facts is None or facts.headline,
+            "under": under,
+            "look": tuple(facts.look) if facts and not setting else (),
+        }
+    for label, joined in runs[runs.ranked_as != runs.label].groupby("ranked_as"):
+        second = rows[max(joined.label, key=[*KNOWN_METHODS].index)]
+        conditions = str(label).partition(" ")[2].replace("-informed", "")
+        names = {"title": f"{second['algorithm']} {conditions}"}
+        names["short"] = f"{second['short'].rpartition(' ')[0]} {conditions}"
+        rows[str(label)] = second | names
+    for label, look in _looks_of(rows):
+        rows[label]["look"] = look
+    place = {name: number for number, name in enumerate(KNOWN_METHODS)}
+    ordered = sorted(rows, key=lambda label: place.get(rows[label]["base"], len(place)))
+    return pd.DataFrame([rows[label] for label in ordered], ordered).rename_axis("method")
+
+
+def parameter_varied(runs: pd.DataFrame) -> tuple[str, dict[str, Any]]:
+    """Return the name of a parameter and its values by label, from low to high if all are numbers,
+    if all runs except searches for the optimum are of one method, with two or more values of this
+    parameter, each on all their tasks, and equal others; or else an empty name and no value.
+    ``runs`` are as in :func:`methods_of`."""
+    runs = runs[~runs.method.isin(SEARCHES)]
+    tasks = runs.groupby("label", sort=False).task.nunique()
+    texts = runs.drop_duplicates("label").set_index("label").parameters
+    by_label = {str(label): json.loads(text) for label, text in texts.items()}
+    names = {name for each in by_label.values() for name in each}
+    differ = [n for n in names if len({repr(each.get(n)) for each in by_label.values()}) > 1]
+    if len({*runs.method}) != 1 or len(differ) != 1 or (tasks < runs.task.nunique()).any():
+        return "", {}
+    values = {label: each.get(differ[0]) for label, each in by_label.items()}
+    if all(type(value) in (int, float) for value in values.values()):
+        values = dict(sorted(values.items(), key=lambda each: each[1]))
+    return differ[0], values
+
+
+def _group_of(runs: pd.DataFrame) -> str:
+    """Return the group of a method, one of :data:`GROUPS`, from its runs.
+
+    ``using the reward of each trial`` if the method declares this reward and a run made more than
+    one trial; or else ``using the reward as a formula`` if it declares the formula; or else ``not
+    using the reward``.
+    """
+    information = {each for text in runs.information.unique() for each in text.split(", ")}
+    if (runs.trials > 1).any() and Information.REWARD_BY_TRIAL.value in information:
+        return BY_TRIAL
+    return BY_FORMULA if Information.REWARD_FORMULA.value in information else WITHOUT_REWARD
+
+
+def ranked_as(runs: pd.DataFrame) -> pd.Series:
+    """Return the name of the row of the ranking in which each run counts: its label, except that
+    two conditions of the learner are one row, :func:`joined_label`, if one ran on tasks for one arm
+    and the other on tasks for two. Column ``label`` of ``runs`` has labels."""
+    tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
+    names = runs.label
+    for one, others in ((EC1, (EC4, EC3)), (INFORMED_LEARNERS[0], INFORMED_LEARNERS[1:])):
+        for two in others:
+            if one in tasks and two in tasks and not tasks[one] & tasks[two]:
+                names = names.mask(names.isin([one, two]), joined_label(one, two))
+                break
+    return names
+
+
+def joined_label(one: str, two: str) -> str:
+    """Return the label of the row that joins the methods ``one`` and ``two`` (ids) of the learner,
+    such as ``dual-process (EC1, EC4)``."""
+    return f"{METHOD_PREFIX.rstrip('/')} ({CONDITION_OF[one]}, {CONDITION_OF[two]})"
+
+
+def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Yield the label of each row with its names of colour and mark: its ``look``, if it has one;
+    for the first methods from files :data:`OWN_COLOR` and a mark; for others the next, after the
+    last again the first, of the pairs that are in no ``look``, unused colours before others."""
+    fixed = {row["look"] for row in rows.values()}
+    taken = {look[0] for look in fixed if look}
+    colors = [color for color in COLORS if color not in (OWN_COLOR, "ink")]
+    colors.sort(key=taken.__contains__)
+    marks = [mark for mark in MARKS if mark != OWN_MARK]
+    pairs = ((c, marks[(k + shift) % len(marks)]) for shift in range(len(marks))
+             for k, c in enumerate(colors))  # fmt: skip
+    free = itertools.cycle(pair for pair in pairs if pair not in fixed)
+    theirs = itertools.chain(((OWN_COLOR, mark) for mark in MARKS), free)
+    for label in sorted(rows, key=lambda label: bool(rows[label]["built_in"])):
+        row = rows[label]
+        yield label, row["look"] or next(free if row["built_in"] else theirs)
+
+
+def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return ``rows``, some rows of :attr:`.Study.methods`, without settings and ablations of
+    methods that are in ``rows``, too (column ``under``): values of a varied parameter stay."""
+    return rows[~rows.under.isin(rows.index)]
+
+
+def headline_methods(rows: pd.DataFrame) -> list[str]:
+    """Return the labels of the rows that represent their algorithms (column ``headline``), among
+    ``rows``, some rows of :attr:`.Study.methods`; all labels if no row does.
+
+    Settings count as in :func:`without_settings`.
+    """
+    kept = without_settings(rows)
+    kept = kept[kept.headline]
+    return [*(kept if len(kept) else rows).index]

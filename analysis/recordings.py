@@ -9,6 +9,7 @@ all hits over the goals, where wrong units, axes, columns, clocks and sensors ca
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -24,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from coartic import CoarticError, Execution, Movement, Task
 from coartic.analysis.figures import style
-from coartic.analysis.solutions import Solutions
+from coartic.analysis.signatures import Solutions
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 from coartic.model import PAPER
@@ -39,6 +40,7 @@ _LONGEST_GAP = 0.05  # of a marker, s, that is bridged
 _LONGEST_STEP = 0.04  # between samples, s: with fewer samples hands pass goals unseen
 _OTHER_ARM = 0.1  # difference of a link's length from the task's, as a share
 _AT_REST = 0.05  # speed of a hand, as a share of the trial's fast movements
+_OF_CALLER = 6  # level in the stack of who called a function with checked arguments
 _COLUMNS = 4  # panels side by side in the figure
 
 
@@ -106,7 +108,8 @@ def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
     Warns
     -----
     UserWarning
-        Some hits of a subject are more than two radii from the centres of their goals.
+        Some hits of a subject are more than two radii from the centres of their goals, or the
+        median movement takes less than a tenth or more than ten times the model's time.
     """
     return _judged(_readable(frame, task, "the frame"), task, "the frame")
 
@@ -183,14 +186,17 @@ def hits_from_markers(
     -------
     DataFrame
         The hits of the trials in which all goals are hit, as :func:`check_hits` returns them;
-        ``ticks`` is at least 1. ``attrs["unfinished"]`` is the number of the other trials.
+        ``ticks`` is at least 1. ``attrs["unfinished"]`` has the number of other trials by subject.
 
     Raises
     ------
     CoarticError
-        The table cannot be read; a trial has fewer than 25 samples in a second, or a longer gap
-        before the last hit; the median length of a link differs from the task's by more than 10 %;
-        no trial hits all goals; or :func:`check_hits` refuses the hits.
+        The table cannot be read; no trial hits all goals; :func:`check_hits` refuses the hits; or a
+        trial has
+
+        - fewer than 25 samples in a second, or a jump in time of more than 50 ms;
+        - a gap of a marker of more than 50 ms before the last hit;
+        - a link whose median length differs from the task's by more than 10 %.
     ValueError
         ``ticks_per_unit`` is not above 0.
     """
@@ -207,7 +213,9 @@ def hits_from_markers(
             "the hands"
         )
     hits = _judged(_rows_of(finished, task, ticks_per_unit), task, source)
-    hits.attrs["unfinished"] = len(trials) - len(finished)
+    unfinished = Counter(trial.subject for trial in trials)
+    unfinished.subtract(trial.subject for trial in finished)
+    hits.attrs["unfinished"] = dict(unfinished)
     return hits
 
 
@@ -236,9 +244,11 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
         The hits are refused (:func:`check_hits`), or no trial hits all goals.
     """
     checked = _judged(_readable(hits, task, "the frame"), task, "the frame")
-    runs = {}
+    runs, unfinished = {}, 0
     for (subject, trial), rows in checked.groupby(["subject", "trial"], sort=False):
-        if len(rows) == len(task.goals):
+        if len(rows) < len(task.goals):
+            unfinished += 1
+        else:
             postures = rows[[*task.robot.joint_names]].to_numpy()
             ticks = rows.ticks.round().astype(int).tolist()
             movements = tuple(
@@ -250,7 +260,8 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
             runs[f"{subject} {trial:g}"] = Execution(movements, postures, sum(ticks), 0)
     if not runs:
         raise CoarticError("no trial hits all goals: signatures need at least one")
-    unfinished = hits.attrs.get("unfinished", 0)
+    without_hits = hits.attrs.get("unfinished", {})
+    unfinished += sum(without_hits.get(subject, 0) for subject in checked.subject.unique())
     return Solutions(task, "recorded", tuple(runs.values()), tuple(runs), unfinished)
 
 
@@ -305,8 +316,8 @@ def draw_recording(
 
 
 def is_of_markers(path: str | Path) -> bool:
-    """Return whether the columns of a CSV file are of markers: one of them is ``time``."""
-    return "time" in _table(path)
+    """Return whether columns of a CSV file are positions of markers."""
+    return any(str(name).endswith("_tip_x") for name in _table(path))
 
 
 # ----------------------------------------------------------------------------------------- reading
@@ -351,7 +362,8 @@ def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
     if missing := [name for name in columns if name not in frame]:
         found = ", ".join(map(str, frame.columns)) or "none"
         raise CoarticError(
-            f"{source} has no column {missing[0]}; it needs {', '.join(columns)}, and has {found}"
+            f"{source} has no column {missing[0]}; it needs {', '.join(columns)}, separated by "
+            f"commas (duration may stand in place of ticks in a file of hits), and has {found}"
         )
     if twice := [name for name in columns if [*frame.columns].count(name) > 1]:
         raise CoarticError(f"{source} has two columns {twice[0]!r}: leave one of them out")
@@ -382,11 +394,12 @@ def _refuse(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str, sou
     """Raise CoarticError if rows are ``wrong``, with the first of them and the number of others."""
     if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():
         (value,) = frame[column].iloc[rows[:1]].tolist()
-        shown = "empty" if pd.isna(value) or value == "" else brief_value(value)
+        shown = f"{value:g}" if isinstance(value, float) else brief_value(value)
+        if pd.isna(value) or value == "":
+            shown, needed = "empty", f"{needed}; leave out the rows of missing hits"
         more = f" ({len(rows)} such rows)" * (len(rows) > 1)
-        raise CoarticError(
-            f"{source}, row {frame.index[rows[0]]}: {column} is {shown}; it must be {needed}{more}"
-        )
+        row = f"{source}, data row {frame.index[rows[0]]}"
+        raise CoarticError(f"{row}: {column} is {shown}; it must be {needed}{more}")
 
 
 def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
@@ -411,7 +424,8 @@ def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
     goals = range(1, len(task.goals) + 1)
     _refuse(hits, "goal", ~hits.goal.isin(goals), f"an integer from 1 to {len(goals)}", source)
     _refuse(hits, "ticks", hits.ticks < 1e-6, "more than 0, since the previous hit", source)
-    once = "hit once in each trial: number the trials of a subject through all sessions"
+    once = "another goal than in the rows above of this subject and trial; number the trials of a "
+    once += "subject through all sessions"
     _refuse(hits, "goal", hits.duplicated(_KEY), once, source)
     order = np.lexsort((hits.goal.array, hits.trial.array, pd.factorize(hits.subject)[0]))
     unused = {name: value for name, value in at_start.items() if name not in used}
@@ -443,9 +457,10 @@ def _fit(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
 
 def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
     """Return hits of :func:`_readable` unchanged. Warns, and if they are most hits of a subject
-    raises CoarticError, for hits beyond two radii."""
-    is_far = _fit(hits, task).off > FAR
-    for subject, far in is_far.groupby(hits.subject, sort=False):
+    raises CoarticError, for hits beyond two radii; warns of times that are not of the model's
+    order of magnitude."""
+    for subject, fit in _fit(hits, task).groupby("subject", sort=False):
+        far, pace = fit.off > FAR, fit.pace.median()
         words = f"{source}: {far.sum()} of {len(far)} hits of {subject} are more than 2 radii off"
         if far.mean() > 0.5:
             raise CoarticError(
@@ -454,7 +469,14 @@ def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
                 "where the hand is"
             )
         if far.any():
-            warnings.warn(f"{words}; draw_recording shows them", stacklevel=3)
+            warnings.warn(f"{words}; draw_recording shows them", stacklevel=_OF_CALLER)
+        if not 0.1 <= pace <= 10:
+            warnings.warn(
+                f"{source}: the median movement of {subject} takes {pace:.2g} times as long as the "
+                "model's; draw_recording shows the paces, ticks_per_unit sets the unit of a column "
+                "duration",
+                stacklevel=_OF_CALLER,
+            )
     return hits
 
 
@@ -537,6 +559,12 @@ def _trial(
     robot, faults, first_gap = task.robot, [], len(time)
     if (step := float(np.median(np.diff(time)))) > _LONGEST_STEP + 1e-9:
         faults.append(f"samples are {step:g} s apart; hits need at least 25 samples a second")
+    if (jump := np.diff(time).max()) > step + _LONGEST_GAP + 1e-9:
+        before = time[np.diff(time).argmax()]
+        faults.append(
+            f"the time jumps by {jump:.3g} s at {before:g} s; fill the gap, leave the trial out, "
+            "or give each trial a number"
+        )
     for arm in places.values():
         for marker in arm.reshape(len(time), -1).T:
             first_gap = min(first_gap, _bridge(marker, time, step))

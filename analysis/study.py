@@ -1,40 +1,38 @@
 """A results folder as data: its runs, methods, cells, tasks, movements and optima.
 
 ``load("results/comparison")`` reads a folder. Other modules of the analysis have functions of a
-study; :func:`cached` keeps the results of a function for each study.
+study.
 """
 
 from __future__ import annotations
 
-import html
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, wraps
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from shlex import quote
-from typing import Any, Concatenate, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences, initial_hands
-from coartic.analysis.method_frame import methods_of, parameter_varied
+from coartic.analysis.methods import methods_of, parameter_varied, ranked_as
 from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
-from coartic.analysis.signatures.measures import SIGNATURES
-from coartic.analysis.solutions import Solutions
+from coartic.analysis.signatures import SIGNATURES, Solutions
 from coartic.analysis.words import titled_apart
 from coartic.errors import CoarticError
-from coartic.internal.arguments import Asked, Computed, checked_arguments
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
+from coartic.method import Information
 from coartic.motion.solution import initial_reward
 from coartic.motion.trial import ranked_sequences
 from coartic.robot import Array
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, label_of, size_of
+from coartic.runs.plan import Job, label_of, size_of, trials_in
 from coartic.runs.record import execute_all
 from coartic.runs.shipped import open_results
 from coartic.runs.store import explain_errors
@@ -80,34 +78,6 @@ def check_study(study: object) -> None:
     if not isinstance(study, Study):
         needed = "needed is a study, as coartic.analysis.load(folder) returns it"
         raise CoarticError(f"{needed}, not a {type(study).__name__}")
-
-
-def cached(
-    function: Callable[Concatenate[Study, Asked], Computed],
-) -> Callable[Concatenate[Study, Asked], Computed]:
-    """Make a function of a study keep its result for each study and its other arguments.
-
-    Calls with equal arguments return the same object, which callers must not change, if both give
-    an argument by position, or both by name; arguments must be hashable.
-    The function raises CoarticError for an object that is no study, and for an argument of another
-    kind than its hint says.
-    """
-
-    @checked_arguments
-    @wraps(function)
-    def once(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
-        key = function, args, tuple(named.items())
-        if key not in study._computed:
-            study._computed[key] = function(study, *args, **named)
-        result: Computed = study._computed[key]
-        return result
-
-    @wraps(function)
-    def of_study(study: Study, /, *args: Asked.args, **named: Asked.kwargs) -> Computed:
-        check_study(study)
-        return once(study, *args, **named)
-
-    return of_study
 
 
 def load(folder: str | Path, *, against: str = "") -> Study:
@@ -159,74 +129,17 @@ class Study:
     stored: pd.DataFrame
     """Runs as stored, a row for each; :attr:`runs` has further columns."""
     marks: dict[str, list[str]] = field(default_factory=dict)
-    """Sentences on what was found against methods, by the method's id: code that was loaded too
-    late, and results that depend on earlier runs."""
+    """Sentences on what was found against methods, by the method's id: results that differ when a
+    run is made again, and other versions of packages."""
     against: str = ""
     """Label of the method with which table ``differences`` compares others; empty if none was
     named."""
     imports: dict[str, list[str]] = field(default_factory=dict)
     """Names and versions of the packages that files of methods import, by the method's id."""
-    _computed: dict[Any, Any] = field(init=False, default_factory=dict)
 
-    def __repr__(self) -> str:
-        runs = counted(len(self.runs), "run")
-        return f"Study of {self.folder}: {runs} of suite {self.suite}"
-
-    def _repr_html_(self) -> str:
-        """Return HTML for a notebook: a row for each method with its setting, with numbers of
-        tasks, runs and solved runs."""
-        solved = self.runs.status == "ok"
-        runs = self.runs[["method", "setting", "task"]].assign(solved=solved)
-        counts = runs.groupby(["method", "setting"], sort=False).agg(
-            tasks=("task", "nunique"), runs=("solved", "size"), solved=("solved", "sum")
-        )
-        return f"<p>{html.escape(repr(self))}</p>{counts.reset_index().to_html(index=False)}"
-
-    @checked_arguments
-    def only(
-        self, methods: Sequence[str] | None = None, tasks: Sequence[str] | None = None
-    ) -> Study:
-        """Return a study of some methods on some tasks alone.
-
-        Parameters
-        ----------
-        methods : sequence of str, optional
-            Ids, labels with a setting, or labels of the ranking, such as ``"dual-process (EC1,
-            EC4)"``; by default all.
-        tasks : sequence of str, optional
-            Names of tasks; by default all.
-
-        Returns
-        -------
-        Study
-            A new study. Its gaps are the same as here: best known rewards are of all methods here.
-
-        Raises
-        ------
-        CoarticError
-            The folder has no such method or task, or no run of them.
-        """
-        jobs, labels = list(self.plan), {*self.methods.index, *self.methods.base}
-        for kind, names, there in (("method", methods, labels), ("task", tasks, {*self.tasks})):
-            for name in names or ():
-                if name not in there:
-                    raise CoarticError(unknown(kind, name, sorted(there)))
-        if methods is not None:
-            rows = self.methods[self.methods.index.isin(methods) | self.methods.base.isin(methods)]
-            labels = {label for parts in rows.parts for label in parts}
-            jobs = [job for job in jobs if job.cell.label in labels]
-        if tasks is not None:
-            jobs = [job for job in jobs if job.cell.task.name in tasks]
-        if not jobs:
-            raise CoarticError("the folder has no runs of these methods on these tasks")
-        kept = pd.MultiIndex.from_tuples([(job.cell.task.name, job.cell.label) for job in jobs])
-        of = pd.MultiIndex.from_frame(self.runs[["task", "label"]])
-        stored = self.stored[of.isin(kept)]
-        part = replace(self, plan=jobs, stored=stored)
-        vars(part)["optima"] = {
-            name: self.optima[name] for name in part.tasks if name in self.optima
-        }
-        return part
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields for pickle: what was computed from them is left out."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def suite(self) -> str:
@@ -299,7 +212,10 @@ class Study:
     def runs(self) -> pd.DataFrame:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
-        Further columns: ``label``, the method with its setting; ``family``, ``split``, number of
+        Further columns: ``label``, the method with its setting; ``ranked_as``, the name of its row
+        in the ranking, which differs from ``label`` where two conditions of the learner, for one
+        arm and for two, are one row; ``budget``, the number of trials that was asked for, missing
+        for methods that do not use the reward of each trial; ``family``, ``split``, number of
         ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task (missing without one, and
         for a search with another base) and :attr:`corrective_best`; ``gap``, a share of the best
         known reward; and a column for each parameter of methods, unless its name is taken:
@@ -307,6 +223,7 @@ class Study:
         """
         labels = [*map(label_of, self.stored.method, self.stored.setting)]
         runs, cells = self.stored.assign(label=labels), [job.cell for job in self.plan]
+        runs["ranked_as"] = ranked_as(runs)
         rows = [
             {
                 **cell.method.defaults,
@@ -315,12 +232,15 @@ class Study:
                 "split": cell.task.split,
                 "goals": len(cell.task.goals),
                 "arms": len(cell.task.hands),
+                "budget": trials_in(cell.parameters) or None,
             }
             for cell in cells
         ]
         keys = pd.MultiIndex.from_tuples([(cell.task.name, cell.label) for cell in cells])
         more = pd.DataFrame(rows, keys)
         runs = runs.join(more[[name for name in more if name not in runs]], on=["task", "label"])
+        by_trial = runs.information.str.contains(Information.REWARD_BY_TRIAL.value, regex=False)
+        runs["budget"] = runs.budget.where(by_trial).astype("Int64")
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task
         best = {name: each.reward for name, each in self.optima.items()}
         runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
@@ -334,16 +254,13 @@ class Study:
     def methods(self) -> pd.DataFrame:
         """A row for each method with its setting, by label, in the order of lists and figures.
 
-        Two conditions of the learner can make a further row, the second on its tasks, the first on
-        others (mostly for one arm): EC1 with EC4, EC1 with EC3, and the informed EC1 and EC4. Most
-        columns of this row are as in the row of the second. Columns:
+        Two conditions of the learner that are ranked as one, such as EC1 on tasks for one arm and
+        EC4 on tasks for two, have a further row, with most columns of the second. Columns:
 
         - ``base``: id of the method without a setting;
         - ``condition``: id of the learner's condition, such as ``EC4``, also of an informed one or
           an ablation; empty for an own condition and other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
-        - ``parts``: labels of its runs, a tuple of one text, or two of a joined row, in which runs
-          of the second label count on a task with runs of both;
         - ``title``: name on the page, in tables and figures;
         - ``short``: name in figures of one column;
         - ``algorithm``: algorithm that the method is a form of;
@@ -372,40 +289,38 @@ class Study:
             cells[key] = runs.iloc[slice(rows[0], rows[-1] + 1) if in_turn else rows]
         return cells
 
-    @cached
     def sequences(self, task: str) -> pd.DataFrame:
         """Return the results of the corrective process alone on a task, by hand sequence.
 
         A row for each sequence, the best first: ``hands``, ``reward`` (negative ticks, missing for
         a failure) and ``reason`` of the failure. No rows if the task has over 4,096 sequences.
-        Raises CoarticError for a task that the study does not have.
+        Raises CoarticError for a task that the study does not have. It is cached: do not change it.
         """
         if task not in self.tasks:
             raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
-        try:
-            names = hand_sequences(self.tasks[task])
-        except NotApplicableError:
-            names = []
-        ranked = ranked_sequences(self.tasks[task], names)
-        frame = pd.DataFrame([trial[:3] for trial in ranked], columns=["hands", "reward", "reason"])
-        return frame.astype({"reward": "Int64"})
+        if task not in self._sequences:
+            try:
+                names = hand_sequences(self.tasks[task])
+            except NotApplicableError:
+                names = []
+            ranked = [trial[:3] for trial in ranked_sequences(self.tasks[task], names)]
+            frame = pd.DataFrame(ranked, columns=["hands", "reward", "reason"])
+            self._sequences[task] = frame.astype({"reward": "Int64"})
+        return self._sequences[task]
 
     @cached_property
     def solutions(self) -> pd.DataFrame:
         """A row for each movement of the solutions: ``run_id``, ``order``, ``goal``, ``hand``,
-        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder's plan, also in a
-        study by :meth:`only`."""
+        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder's plan."""
         with open_results(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield the id of each run with rewards of trials, with these rewards, negative
-        ticks, shape ``(trials,)``, NaN for a trial that failed or whose reward is not kept; of all
-        runs of the folder's plan, also in a study by :meth:`only`."""
+        ticks, shape ``(trials,)``, NaN for a trial that failed or whose reward is not kept."""
         with open_results(self.folder) as store:
             yield from store.rewards()
 
-    @cached
     def executed(self, task: str, method: str, *, replay: bool = False) -> Solutions:
         """Return the solved runs of a method on a task, executed again.
 
@@ -436,6 +351,8 @@ class Study:
             on_task = [name for on, name in self.cells if on == task]
             asked = ("method", method, on_task) if on_task else ("task", task, self.tasks)
             raise CoarticError(f"{self.folder}: {unknown(*asked)}")
+        if (task, method, replay) in self._executed:
+            return self._executed[task, method, replay]
         stored = self.movements("replay" if replay else "solution")
         ids = map(str, solved(self.cells[task, method]).run_id)
         solutions = {run_id: stored[run_id] for run_id in ids if run_id in stored}
@@ -447,7 +364,9 @@ class Study:
                 if not (isinstance(run, Execution) and run.completed and run.ticks == ticks):
                     raise ValueError(f"run {run_id} does not do what is stored of it")
                 executed.append(run)
-        return Solutions(self.tasks[task], method, tuple(executed), tuple(solutions))
+        solved_runs = Solutions(self.tasks[task], method, tuple(executed), tuple(solutions))
+        self._executed[task, method, replay] = solved_runs
+        return solved_runs
 
     def configurations(self, task: str, method: str, *, replay: bool = False) -> Array:
         """Return the postures in which the solved runs of a method hit the goals of a task.
@@ -472,14 +391,22 @@ class Study:
         """
         return self.executed(task, method, replay=replay).configurations
 
-    @checked_arguments
-    def signature(self, name: str, *, replay: bool = False) -> pd.Series:
-        """Return a signature of coarticulation of every run.
+    def signature(
+        self,
+        name: str,
+        task: str | None = None,
+        method: str | None = None,
+        *,
+        replay: bool = False,
+    ) -> pd.Series:
+        """Return a signature of coarticulation of every run, or of the runs of a method on a task.
 
         Parameters
         ----------
         name : str
             One of ``coartic.analysis.SIGNATURES``: ``"first"``, ``"arm"``, ``"hand"``, ...
+        task, method : str, optional
+            Name of the only task, and label of the only method, its id with its setting.
         replay : bool
             Take the noiseless trial after learning in place of the solution.
 
@@ -488,60 +415,58 @@ class Study:
         Series
             By the index of :attr:`runs`; NaN for runs without the signature, failed runs, and runs
             after the first 500 solved ones of a method on a task.
-        """
-        values = pd.Series(np.nan, self.runs.index, name=name)
-        for key, runs in self.cells.items():
-            here = runs.index[runs.run_id.isin(self.executed(*key, replay=replay).run_ids)]
-            values[here] = self._signature_of_each(name, *key, replay=replay)
-        return values
 
-    @cached
-    def _signature_of_each(self, name: str, task: str, method: str, *, replay: bool) -> Array:
-        """Return signature ``name`` of each run of :meth:`executed`, ``(n,)``; NaN for runs without
-        this signature. Raises CoarticError for an unknown name."""
+        Raises
+        ------
+        CoarticError
+            The name is unknown, or the folder has no runs of the method on the task.
+        """
         if name not in SIGNATURES:
             raise CoarticError(unknown("signature", name, SIGNATURES))
-        return SIGNATURES[name].each(self.executed(task, method, replay=replay))
+        cells = [*self.cells] if task is None or method is None else [(task, method)]
+        parts = []
+        for key in cells:
+            if (name, *key, replay) not in self._signatures:
+                executed = self.executed(*key, replay=replay)
+                runs = self.cells[executed.task.name, executed.label]
+                values = pd.Series(np.nan, runs.index, name=name)
+                values[runs.run_id.isin(executed.run_ids)] = SIGNATURES[name].each(executed)
+                self._signatures[name, *key, replay] = values
+            parts.append(self._signatures[name, *key, replay])
+        if len(parts) == 1:
+            return parts[0]
+        every: pd.Series = pd.concat(parts)
+        return every.reindex(self.runs.index)
 
-    @cached
-    def signature_of(self, name: str, task: str, method: str, *, replay: bool = False) -> Array:
-        """Return a signature of the runs of a method on a task, shape ``(n,)``: of the first 500
-        solved runs, without the runs that lack the signature. ``name`` is in
-        ``coartic.analysis.SIGNATURES``; ``method`` is a label, the id with its setting; ``replay``
-        takes the noiseless trial after learning. Raises CoarticError for unknown names."""
-        values: Array = self._signature_of_each(name, task, method, replay=replay)
-        return values[np.isfinite(values)]
-
-    @cached
-    def signature_by_hands(self, name: str, task: str, method: str) -> dict[str, Array]:
-        """Return a signature, a number for each run, of a method's runs on a task, by their hand
-        sequence in alphabetical order.
-
-        Arrays have shape ``(n,)``, of the first 500 solved runs on the task; runs without the
-        signature are left out. Signature ``hand``, a measure of the choice of hands itself, has one
-        entry ``""`` for all hand sequences together, or none if no run has it. ``name`` is in
-        ``coartic.analysis.SIGNATURES``; ``method`` is a label, the id with its setting.
-        """
-        values = self._signature_of_each(name, task, method, replay=False)
-        runs = self.executed(task, method).runs
-        hands = np.array(["" if name == "hand" else run.hands for run in runs])
-        there = np.isfinite(values)
-        return {str(each): values[there & (hands == each)] for each in np.unique(hands[there])}
-
-    @cached
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of the ``solution`` or ``replay`` by run id, of the first 500 solved
-        runs of each method on each task of the folder, also in a study by :meth:`only`; for
-        ``replay`` runs without a replay are left out."""
-        with open_results(self.folder) as store:
-            return store.movements(part, MOST_EXECUTED)
+        runs of each method on each task; for ``replay`` runs without a replay are left out."""
+        if part not in self._movements:
+            with open_results(self.folder) as store:
+                self._movements[part] = store.movements(part, MOST_EXECUTED)
+        return self._movements[part]
 
+    @cached_property
+    def _sequences(self) -> dict[str, pd.DataFrame]:
+        return {}
 
-@cached
-def one_by_one(study: Study) -> dict[str, Task]:
-    """Return the tasks that a report shows one by one, by name: all tasks, except that instances of
-    families, also changed ones such as ``two-armed/v1/i017.radius-0.2``, are left out if there are
-    more than eight instances."""
-    drawn = {name for name in study.tasks if address_of(name.partition(".")[0]) is not None}
-    left_out = drawn if len(drawn) > 8 else ()
-    return {name: task for name, task in study.tasks.items() if name not in left_out}
+    @cached_property
+    def _executed(self) -> dict[tuple[str, str, bool], Solutions]:
+        return {}
+
+    @cached_property
+    def _signatures(self) -> dict[tuple[str, str, str, bool], pd.Series]:
+        return {}
+
+    @cached_property
+    def _movements(self) -> dict[str, dict[str, tuple[Movement, ...]]]:
+        return {}
+
+    @cached_property
+    def individual_tasks(self) -> dict[str, Task]:
+        """Tasks that a report shows one by one, by name: all tasks, except that instances of
+        families, also changed ones such as ``two-armed/v1/i017.radius-0.2``, are left out if there
+        are more than eight instances."""
+        drawn = {name for name in self.tasks if address_of(name.partition(".")[0]) is not None}
+        left_out = drawn if len(drawn) > 8 else ()
+        return {name: task for name, task in self.tasks.items() if name not in left_out}

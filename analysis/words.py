@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import unicodedata
 from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,42 +11,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from coartic.errors import CoarticError
-from coartic.internal.arguments import checked_arguments
 from coartic.internal.text import one_line
 
 if TYPE_CHECKING:
     from coartic import Task
 
-_LAST_LATIN = "\N{MODIFIER LETTER LOW LEFT ARROW}"
 _Digits = Annotated[int, Field(ge=0, le=30)]
 NONE = "–"
 """Text of a missing value."""
 MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 RECONSTRUCTED = "† The paper does not publish the goals of this task; ours are a reconstruction."
-_SIGNS = "αβγδεζηθικλμνξπρςστυφχψωΓΔΘΛΞΠΣΥΦΨΩ←↑→↓↔↕⇐⇑⇒⇓⇔↦≤≥≠≈≡∼∝∈∉∂∇√∑∏∫⋅∧∨∩∪⊂⊆∀∃⊥∥∠≪≫∘⊗⊕ℓ‡"
-_NAMES = """
-    alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho varsigma sigma
-    tau upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega
-    leftarrow uparrow rightarrow downarrow leftrightarrow updownarrow Leftarrow Uparrow Rightarrow
-    Downarrow Leftrightarrow mapsto leq geq neq approx equiv sim propto in notin partial nabla surd
-    sum prod int cdot wedge vee cap cup subset subseteq forall exists perp parallel angle ll gg circ
-    otimes oplus ell ddagger
-"""
 _LATEX = str.maketrans(
     {
         **{sign: f"\\{sign}" for sign in "&%$#_"},
         **{"~": "\\textasciitilde{}", "^": "\\textasciicircum{}", "\\": "\\textbackslash{}"},
         **{"{": "\\textbraceleft{}", "}": "\\textbraceright{}"},  # BibTeX counts braces
-        **{"†": "$\\dagger$", "−": "$-$", "–": "--", "∞": "$\\infty$", "±": "$\\pm$"},
-        **{"↳": "", NARROW_SPACE: "\\,", "…": "\\ldots{}", "—": "---", "‘": "`", "’": "'"},
-        **{"“": "``", "”": "''", "<": "$<$", ">": "$>$", "×": "$\\times$"},
-        **{sign: f"$\\{name}$" for sign, name in zip(_SIGNS, _NAMES.split(), strict=True)},
-        **{
-            sign: f"${letter}$"
-            for sign, letter in zip("οΑΒΕΖΗΙΚΜΝΟΡΤΧ", "oABEZHIKMNOPTX", strict=True)
-        },
+        **{"†": "$\\dagger$", "‡": "$\\ddagger$", "−": "$-$", "∞": "$\\infty$", "±": "$\\pm$"},
+        **{NARROW_SPACE: "\\,", "σ": "$\\sigma$", "ε": "$\\epsilon$"},
     }
 )
+"""Signs with a meaning in LaTeX or BibTeX, and signs that coartic itself writes."""
 
 
 def id_of(function: Callable[..., Any]) -> str:
@@ -56,7 +39,6 @@ def id_of(function: Callable[..., Any]) -> str:
     return function.__name__.partition("_")[2].replace("_", "-")
 
 
-@checked_arguments
 def number(value: float, digits: _Digits | None = None) -> str:
     """Write a number, with a true minus and spaces between thousands from 10 000 on; – for NaN.
 
@@ -95,7 +77,6 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
-@checked_arguments
 def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, unit: str = "") -> str:
     """Write a number of a table with its interval. Raises CoarticError if the row lacks a number.
 
@@ -197,20 +178,6 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
 
 
 def latex(text: object) -> str:
-    """Return text as one printable line (:func:`.one_line`) for LaTeX and BibTeX.
-
-    Special characters of LaTeX and BibTeX are escaped; Greek letters, arrows and common signs are
-    written as LaTeX does, except ``↳``, which is left out. Characters up to U+02FF stay (``é``,
-    ``ő``); Latin letters beyond lose accents (``ế`` becomes ``e``), and indices and ligatures
-    become plain (``₂``: ``2``). All others, such as Chinese, become ``\\symbol``, which XeLaTeX and
-    LuaLaTeX print.
-    """
-
-    def escaped(c: str) -> str:
-        parts = unicodedata.normalize("NFKD", c).translate(_LATEX)  # without accents
-        parts = "".join(part for part in parts if not unicodedata.combining(part))
-        is_plain = all(part <= _LAST_LATIN for part in parts)
-        return parts if is_plain else "".join(f'\\symbol{{"{ord(each):04X}}}' for each in c)
-
-    text = unicodedata.normalize("NFC", one_line(str(text))).translate(_LATEX)
-    return "".join(c if c <= _LAST_LATIN else escaped(c) for c in text)
+    """Return text as one printable line for LaTeX and BibTeX, in which special characters are
+    escaped. Letters that pdfLaTeX does not know stay; XeLaTeX and LuaLaTeX print them."""
+    return one_line(str(text)).translate(_LATEX)

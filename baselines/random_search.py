@@ -128,7 +128,6 @@ class RandomSearchHands(Method):
         "control of a many parameter system. Automation and Remote Control."
     )
     information = OPTIMISER_INFORMATION
-    later = frozenset({"stages", "keep", "idle_arm"})
     Parameters = RandomSearchHandsParameters
 
     def most_together(self) -> int:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
-import threading
 import time
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
+from importlib.metadata import version
 from typing import Any
 
-from coartic.benchmarks.pool import Local, Workers
+from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import current_environment
-from coartic.benchmarks.registry import current_code
+from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.worker import fail
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line
@@ -112,28 +112,18 @@ class Dask:
             raise CoarticError(f"{text}; start some. {_GOES_ON}") from None
 
 
-_kept = threading.local()
-"""Its ``workers`` hold the process of a thread of a Dask worker for the next job of a method."""
-
-
 def _remote(job: Job) -> list[Outcome]:
     """Perform a job on the machine of a Dask worker, in another process, and return the outcomes of
     its runs with the environment of this machine. Raises CoarticError if the method has another
-    version or code on this machine or its file cannot be used, and if no process can work."""
+    version or code on this machine, and if no process can work."""
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
-    method = job.cell.method
-    here = current_code(method)
-    if here != method.version:
-        text = f"method {method.name!r} is {here} on a Dask worker and {method.version} where "
-        raise CoarticError(f"{text}the suite was started; install the same version everywhere")
-    if not hasattr(_kept, "workers"):
-        _kept.workers = Workers(Local(1), stays=True)
-    try:
-        ((_, outcomes),) = _kept.workers.perform([job])
-    except CoarticError:  # such as a removed folder
-        del _kept.workers
-        raise
-    here_too = current_environment()
-    return [
-        replace(outcome, environment=here_too | (outcome.environment or {})) for outcome in outcomes
-    ]
+    method, used = job.cell.method, current_environment()
+    if method.is_ours:
+        here = built_in()[method.name].code
+        if here != method.code:
+            text = f"method {method.name!r} is {here} on a Dask worker and {method.code} where "
+            raise CoarticError(f"{text}the suite was started; install the same version everywhere")
+    else:
+        used = used | {"imports": {name: version(name) for name in method.packages}}
+    ((_, outcomes),) = Local(1).perform([job])
+    return [replace(outcome, environment=used) for outcome in outcomes]

@@ -6,9 +6,8 @@ in another process.
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain, pairwise
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from math import dist
 from pathlib import Path
 from typing import NamedTuple
@@ -29,178 +28,185 @@ from coartic.method import METERED
 from coartic.motion.solution import goals_without_target
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, in_words
-from coartic.runs.record import Outcome, Run
+from coartic.runs.record import Run
 from coartic.tasks.task import check_task
 
 CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
 _LIMIT_S = 120.0
-_BUDGET = 7  # trial budget of the runs that check law ``limits``
-_NO_SEED = (
-    "\nanother seed gives the same result as well: random numbers come from session.rng or "
-    "session.seed; without any, stochastic = False saves runs"
-)
+_BUDGET = 7  # trial budget of the runs that check ``limits``
 _UNDECLARED = ("does not declare", "own compiled", "outside its session")  # words of reasons
 
 
-class Law(NamedTuple):
-    """A law of methods or tasks, and whether it holds."""
+class CheckResult(NamedTuple):
+    """A check of a method or a task, and its result."""
 
     name: str
-    """Name of the law, such as ``determinism``."""
+    """Name of the check, such as ``determinism``."""
     passed: bool
-    """True if the law holds."""
+    """True if it found no problem."""
     finding: str
-    """Words on what was checked; for a broken law its first problem."""
-
-
-def _law(name: str, problems: Iterable[str], finding: str) -> Law:
-    """Return law ``name``: broken if there are ``problems``, and its finding is then the first of
-    them, else ``finding``."""
-    problem = next(iter(problems), None)
-    return Law(name, problem is None, problem or finding)
+    """What was checked, or the first problem."""
 
 
 def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
-) -> list[Law]:
-    """Check every law of a method, and return the laws in order, kept and broken. The method runs
-    on ``tasks``, by default the shipped tasks; tasks to which it does not apply are left out, and
-    without any task left ``solution`` is the last law, and broken. ``verbose`` shows prints, logs
-    and crashes of the method, not of its run in another process."""
+) -> list[CheckResult]:
+    """Check a method, and return the result of each of :data:`CHECKS`, in order.
+
+    Parameters
+    ----------
+    info : MethodInfo
+    tasks : sequence of Task, optional
+        Tasks on which the method runs, except tasks to which it does not apply; by default the
+        shipped tasks.
+    verbose : bool
+        Show what the method prints, logs and crashes with, except in another process.
+    """
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
 
     def applies(task: Task) -> bool:
         return info.why_not(task, parameters) is None
 
-    laws = _laws_of_declaration(info)
     given = [*map(load_task, builtin_tasks())] if tasks is None else tasks
-    tasks = list(filter(applies, given))
-    if not tasks:
-        problem = "it applies to none of the tasks, so nothing can be checked"
-        return [*laws, Law("solution", False, problem)]
-    jobs = {}
+    tasks, jobs, runs = list(filter(applies, given)), dict[tuple[str, str], Job](), _Runs()
     for kind, seed, budget, chosen in (
         ("first", 1, None, tasks),
         ("again", 1, None, tasks),
         ("other seed", 2, None, tasks),
         ("after others", 1, None, tasks),
         ("budget", 1, _BUDGET, tasks),
-        ("hopeless", 1, None, filter(applies, [_hopeless_task(tasks[0])])),
+        ("hopeless", 1, None, filter(applies, map(_hopeless_task, tasks[:1]))),
     ):
         for task in chosen:
             cell = cell_of(task, info, parameters, trial_budget=budget)
             jobs[kind, task.name] = Job(cell, seed, (0,), _LIMIT_S)
-    runs = dict(zip(jobs, perform_in_order([*jobs.values()], verbose=verbose), strict=True))
-    last = tasks[-1].name
-    runs["elsewhere", last] = next(perform_in_order([jobs["first", last]]))
-    values = in_words(parameters)
-    return [*laws, *_laws_of_runs(info, runs, f" (checked with {values})" if values else "")]
+    performed = perform_in_order([*jobs.values()], verbose=verbose)
+    for (kind, name), run in zip(jobs, performed, strict=True):
+        runs.setdefault(kind, {})[name] = run
+    if tasks:
+        last = tasks[-1].name
+        runs["elsewhere"] = {last: next(perform_in_order([jobs["first", last]]))}
+    results = []
+    for name, (problems, finding) in CHECKS.items():
+        problem = next(problems(info, runs), "")
+        results.append(CheckResult(name, not problem, problem or finding(info, runs)))
+    return results
 
 
-def _laws_of_runs(
-    info: MethodInfo, runs: Mapping[tuple[str, str], Run], checked_with: str
-) -> Iterator[Law]:
-    """Yield the laws on the runs of a method: ``solution``, ``determinism``, ``no hidden state``,
-    ``limits``, ``information`` and ``failure``. ``runs`` holds the runs by kind, such as ``first``,
-    and name of the task; ``checked_with`` has words on the parameters, or is empty."""
-
-    def of_kind(kind: str) -> dict[str, Outcome]:
-        return {task: run.outcome for (each, task), run in runs.items() if each == kind}
-
-    def changes(kind: str, how: str) -> Iterator[str]:
-        for task in of_kind(kind):
-            for change in compare_runs(runs["first", task], runs[kind, task]):
-                yield f"{how.format(task)}: {change}"
-
-    first = of_kind("first")
-    solutions = {task: runs["first", task].solution for task in first}
-    rewards = ", ".join(f"{task} {solution.reward}" for task, solution in solutions.items())
-    by_goals = defaultdict[str, list[str]](list)
-    for task, solution in solutions.items():
-        if goals := goals_without_target(solution.movements):
-            by_goals[", ".join(map(str, goals))].append(task)
-    few = f", or are {CHECK_TRIALS} trials too few" if "trials" in info.defaults else ""
-    asked = "".join(
-        f"\nonly the corrective process moves to goals {goals} on {', '.join(names)}"
-        for goals, names in by_goals.items()
-    )
-    asked += f", which have no target: is this meant{few}?" if asked else ""
-    yield _law(
-        "solution",
-        [f"on {task}: {each.status}: {each.reason}" for task, each in first.items() if each.reason],
-        f"executed and scored on {rewards}{checked_with}{asked}",
-    )  # fmt: skip
-    by_seed = [*changes("other seed", "declared not to be stochastic, but another seed on {}")]
-    yield _law(
-        "determinism",
-        chain(
-            changes("again", "same seed on {}, same process"),
-            changes("elsewhere", "same seed on {}, another process"),
-            () if info.stochastic else by_seed,
-        ),
-        f"the same result under {'the same' if info.stochastic else 'any'} seed, in one process "
-        "and in another" + ("" if by_seed or not info.stochastic else _NO_SEED),
-    )
-    yield _law(
-        "no hidden state",
-        changes("after others", "after other runs, {} with the same seed"),
-        "other runs in between change nothing",
-    )
-    yield _law(
-        "limits",
-        (
-            f"a budget of {_BUDGET} trials on {task}: {each.reason or each.meter}"
-            for task, each in of_kind("budget").items()
-            if each.status not in ("ok", "infeasible")
-            or (each.meter and each.meter.trials > _BUDGET)
-        ),
-        f"keeps to a budget of {_BUDGET} trials",
-    )
-    used = {name for each in first.values() for name in each.used}
-    unused = {item.value for item in METERED if item.value in info.information} - used
-    undeclared = (
-        f"on {task}: {each.reason}"
-        for task, each in first.items()
-        if any(words in each.reason for words in _UNDECLARED)
-    )
-    never = [f"declared but never used: {', '.join(sorted(unused))}"] if unused else []
-    declared = f"declared and used: {', '.join(sorted(used)) or 'nothing'}"
-    yield _law("information", [*undeclared, *never], declared)
-    hopeless = [*of_kind("hopeless").values()]
-    yield _law(
-        "failure",
-        (
-            f"on a task out of reach it gives {each.status} {each.reason}; it should "
-            "give infeasible, with a reason"
-            for each in hopeless
-            if each.status not in ("infeasible", "solver-failed")
-        ),
-        f"a task out of reach gives {hopeless[0].status}: {hopeless[0].reason}"
-        if hopeless
-        else "says beforehand that it does not apply to a task without a solution",
-    )
+_Runs = dict[str, dict[str, Run]]
+"""Runs by kind, such as ``first``, and by name of the task."""
 
 
-def _laws_of_declaration(info: MethodInfo) -> list[Law]:
-    """Return laws ``declaration`` (title and citation are there) and ``parameters`` (defaults
-    survive JSON, unknown names are refused, and values cannot be changed) of a method."""
+def _declaration(info: MethodInfo, _: _Runs) -> Iterator[str]:
+    yield from (f"{n} is empty" for n in ("title", "citation") if not getattr(info, n).strip())
+
+
+def _parameters(info: MethodInfo, _: _Runs) -> Iterator[str]:
     parameters, config = info.complete({}), info.rules()["config"]
-    again, problems = info.complete(parameters), []
-    if again != parameters:
-        problems.append(f"written as JSON and read back, {parameters} became {again}")
+    if (again := info.complete(parameters)) != parameters:
+        yield f"written as JSON and read back, {parameters} became {again}"
     if config["extra"] != "forbid":
-        problems.append("an unknown parameter is accepted; forbid extra keys")
+        yield "an unknown parameter is accepted; forbid extra keys"
     if config["frozen"] is not True:
-        problems.append("they can be changed after validation; freeze them")
-    return [
-        _law(
-            "declaration",
-            (f"{n} is empty" for n in ("title", "citation") if not getattr(info, n).strip()),
-            f"{info.title}; information: {', '.join(info.information) or 'none'}",
-        ),
-        _law("parameters", problems, in_words(parameters) or "none"),
-    ]
+        yield "they can be changed after validation; freeze them"
+
+
+def _solution(info: MethodInfo, runs: _Runs) -> Iterator[str]:
+    if not runs:
+        yield "it applies to none of the tasks, so nothing can be checked"
+    for task, run in runs.get("first", {}).items():
+        if run.outcome.reason:
+            yield f"on {task}: {run.outcome.status}: {run.outcome.reason}"
+
+
+def _changes(runs: _Runs, kind: str, how: str) -> Iterator[str]:
+    """Yield what differs between the first run on each task and the run of another kind."""
+    for task, run in runs.get(kind, {}).items():
+        yield from (f"{how.format(task)}: {c}" for c in compare_runs(runs["first"][task], run))
+
+
+def _determinism(info: MethodInfo, runs: _Runs) -> Iterator[str]:
+    yield from _changes(runs, "again", "same seed on {}, same process")
+    yield from _changes(runs, "elsewhere", "same seed on {}, another process")
+    if not info.stochastic:
+        how = "declared not to be stochastic, but another seed on {}"
+        yield from _changes(runs, "other seed", how)
+
+
+def _limits(info: MethodInfo, runs: _Runs) -> Iterator[str]:
+    for task, run in runs.get("budget", {}).items():
+        meter = run.outcome.meter
+        is_over = meter is not None and meter.trials > _BUDGET
+        if is_over or run.outcome.status not in ("ok", "infeasible"):
+            yield f"a budget of {_BUDGET} trials on {task}: {run.outcome.reason or meter}"
+
+
+def _used(runs: _Runs) -> set[str]:
+    return {name for run in runs.get("first", {}).values() for name in run.outcome.used}
+
+
+def _information(info: MethodInfo, runs: _Runs) -> Iterator[str]:
+    for task, run in runs.get("first", {}).items():
+        if any(words in run.outcome.reason for words in _UNDECLARED):
+            yield f"on {task}: {run.outcome.reason}"
+    metered = {item.value for item in METERED if item.value in info.information}
+    if runs and (unused := sorted(metered - _used(runs))):
+        yield f"declared but never used: {', '.join(unused)}"
+
+
+def _failure(info: MethodInfo, runs: _Runs) -> Iterator[str]:
+    for run in runs.get("hopeless", {}).values():
+        if run.outcome.status not in ("infeasible", "solver-failed"):
+            found = f"{run.outcome.status} {run.outcome.reason}"
+            yield f"a task out of reach gives {found}, not infeasible with a reason"
+
+
+def _rewards(info: MethodInfo, runs: _Runs) -> str:
+    """Return what the solutions are worth, and which goals no target leads to."""
+    first = runs["first"]
+    text = ", ".join(f"{task} {run.solution.reward}" for task, run in first.items())
+    for task, run in first.items():
+        if goals := goals_without_target(run.solution.movements):
+            numbers = ", ".join(map(str, goals))
+            text += f"; on {task} no target leads to goals {numbers}: is this meant?"
+    return f"executed and scored on {text}"
+
+
+def _seeds(info: MethodInfo, runs: _Runs) -> str:
+    """Return how results depend on the seed."""
+    if info.stochastic and not any(_changes(runs, "other seed", "{}")):
+        return "the same result, also under another seed: declare stochastic = False"
+    return f"the same result under {'the same' if info.stochastic else 'any'} seed"
+
+
+def _hopeless(info: MethodInfo, runs: _Runs) -> str:
+    """Return what a task out of reach gives."""
+    for run in runs.get("hopeless", {}).values():
+        return f"a task out of reach gives {run.outcome.status}: {run.outcome.reason}"
+    return "does not apply to a task out of reach"
+
+
+CHECKS: dict[
+    str,
+    tuple[Callable[[MethodInfo, _Runs], Iterator[str]], Callable[[MethodInfo, _Runs], str]],
+] = {
+    "declaration": (_declaration, lambda info, _: info.title),
+    "parameters": (_parameters, lambda info, _: in_words(info.complete({})) or "none"),
+    "solution": (_solution, _rewards),
+    "determinism": (_determinism, _seeds),
+    "no hidden state": (
+        lambda _, runs: _changes(runs, "after others", "after other runs, {} with the same seed"),
+        lambda *_: "other runs in between change nothing",
+    ),
+    "limits": (_limits, lambda *_: f"keeps to a budget of {_BUDGET} trials"),
+    "information": (
+        _information,
+        lambda _, runs: f"declared and used: {', '.join(sorted(_used(runs))) or 'nothing'}",
+    ),
+    "failure": (_failure, _hopeless),
+}
+"""Checks of a method by name: a function that yields problems, and one that says what was found."""
 
 
 def _hopeless_task(like: Task) -> Task:
@@ -217,43 +223,29 @@ def _hopeless_task(like: Task) -> Task:
     )
 
 
-def check_task_file(path: Path, registered: Registry) -> list[Law]:
-    """Check every law of a task file, and return the laws in order: ``valid``, ``name``, ``distinct
-    goals``, ``solvable``, ``methods``; for an invalid file ``valid`` alone. ``registered``: known
-    methods, of which one at least has to apply to the task."""
+def check_task_file(path: Path, registered: Registry) -> list[CheckResult]:
+    """Check a task file, and return the results in order: ``valid``, ``distinct goals``,
+    ``solvable``; for an invalid file ``valid`` only. ``registered`` has the known methods."""
     try:
-        task = load_task(path)
+        task = check_task(load_task(path))
     except TaskError as error:
-        return [Law("valid", False, str(error))]
-    shipped = task.name in builtin_tasks() and load_task(task.name) != task
-    near = (
-        f"goals {number} and {number + 1} lie within one radius of each other: hitting the first "
-        "nearly hits the second"
+        return [CheckResult("valid", False, str(error))]
+    near = [
+        f"goals {number} and {number + 1} lie within one radius of each other"
         for number, (goal, after) in enumerate(pairwise(task.goals), 1)
         if dist(goal, after) <= task.radius
-    )
-    solved, unsolved = "", []
+    ]
     try:
-        hands = initial_hands(check_task(task))
-        execution = corrective_trial(task, hands)
-        solved = f"initial hands {hands} complete it with {execution.reward}"
-        if not execution.completed:
-            unsolved = [f"initial hands {hands}: {execution.reason}"]
+        hands = initial_hands(task)
+        trial = corrective_trial(task, hands)
+        solved = trial.reason or f"initial hands {hands} complete it with {trial.reward}"
+        is_solved = trial.completed
     except (NotApplicableError, TaskError) as error:
-        unsolved = [str(error)]
+        solved, is_solved = str(error), False
     methods = [name for name, info in registered.items() if info.why_not(task) is None]
+    count = f"{counted(len(task.goals), 'goal')}; {counted(len(methods), 'method')} can run on it"
     return [
-        Law("valid", True, f"{task.name}, {counted(len(task.goals), 'goal')}"),
-        _law(
-            "name",
-            [f"name {task.name!r} belongs to a different, shipped task"] * shipped,
-            f"name {task.name!r} is its own",
-        ),
-        _law("distinct goals", near, "successive goals lie apart"),
-        _law("solvable", unsolved, solved),
-        _law(
-            "methods",
-            ["no method applies to it"] * (not methods),
-            f"{counted(len(methods), 'method')} can run on it, such as {', '.join(methods[:2])}",
-        ),
+        CheckResult("valid", True, f"{task.name}, {count}"),
+        CheckResult("distinct goals", not near, near[0] if near else "successive goals lie apart"),
+        CheckResult("solvable", is_solved, solved),
     ]

@@ -2,8 +2,7 @@
 
 Folders go together if they have the same suite, seed and trial budget, the same task for each name,
 the same version or code of each method and the same parameters of each of its settings. Versions of
-coartic and of libraries, and machines, may differ. A folder has to pass the checks of ``coartic
-verify``, though it may lack runs.
+coartic and of libraries, and machines, may differ. A folder may lack runs.
 """
 
 from __future__ import annotations
@@ -16,19 +15,14 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from coartic.analysis.verify import check_runs
 from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
-from coartic.runs.method_info import run_identity
 from coartic.runs.plan import Job, hash_of
-from coartic.runs.record import Run
 from coartic.runs.shipped import SHIPPED, open_shipped
-from coartic.runs.store import Store, explain_errors, open_store, writing
-
-_WRITTEN_AT_ONCE = 500  # runs that are in memory
+from coartic.runs.store import Store, open_store, writing
 
 
 def include_folders(
@@ -46,9 +40,8 @@ def include_folders(
     joined plan than ``plan`` asks for of its own.
 
     Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
-    at 0, if the folders do not go together, if a folder does not pass the checks of ``coartic
-    verify``, and if two folders, or a folder and ``out``, have different results of a run. Then
-    only shipped results may have been copied.
+    at 0, if the folders do not go together, and if two folders, or a folder and ``out``, have
+    different results of a run. Then nothing is copied.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
@@ -69,20 +62,12 @@ def include_folders(
                     f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
                 )
             sources[name] = stack.enter_context(open_store(folder))
-            with explain_errors(folder):
-                wrong = check_runs(folder).wrong
-            if wrong:
-                more = f" (`coartic verify` names {len(wrong) - 1} more)" * (len(wrong) > 1)
-                raise CoarticError(f"{name} is not included. {wrong[0]}{more}")
         joined = _join(plan, sources, tasks)
         target = stack.enter_context(writing(out))
-        if SHIPPED in sources and target.begin_as(sources[SHIPPED]):
-            del sources[SHIPPED]  # all its runs are there
-        with target.transaction():
-            target.replace_plan(joined, made_with())
-            origin = dict.fromkeys(map(run_identity, target.ids()), str(out))
-            for name, source in sources.items():
-                _copy_runs(name, source, target, origin)
+        _check_same_results({str(out): target, **sources})
+        target.replace_plan(joined, made_with())
+        for source in sources.values():
+            target.include(source)
     return joined
 
 
@@ -112,7 +97,7 @@ def _join(
     _check_together(plan[0], parts)
     methods = {job.cell.method.name: job.cell.method for part in parts.values() for job in part}
     for job in plan:  # failures are performed again where the code is here
-        if methods[job.cell.method.name].version == job.cell.method.version:
+        if methods[job.cell.method.name].code == job.cell.method.code:
             methods[job.cell.method.name] = job.cell.method
     jobs: dict[str, Job] = {}
     for job in itertools.chain(plan, *plans.values()):
@@ -179,37 +164,31 @@ def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
         job = part[0] if part else first
         agree(where, "the suite", repr(job.suite))
         agree(where, "the seed", job.seed)
-        agree(where, "the trial budget", job.cell.trial_budget)
+        agree(where, "the trial budget", job.cell.trial_budget or "unlimited")
     for where, cell in ((where, job.cell) for where, part in parts.items() for job in part):
         name, method = cell.task.name, cell.method
         agree(where, f"task {name!r}", f"definition {hash_of(cell.definition)[:8]}")
         kind = "version" if method.is_ours else "code"
         hint = ": leave it out of one of them" + ", or give it another name" * (not method.is_ours)
-        agree(where, f"method {method.name!r}", f"{kind} {method.version}", hint)
+        agree(where, f"method {method.name!r}", f"{kind} {method.code}", hint)
         cell_named = f"{cell.label} on {name}"
         agree(where, f"the list of parameters of {cell_named}", sorted(cell.parameters))
         for key, value in cell.parameters.items():
             agree(where, f"{key} of {cell_named}", value)
 
 
-def _copy_runs(name: str, source: Store, target: Store, origin: dict[tuple[str, str], str]) -> None:
-    """Copy the runs of a source's plan that the target lacks; enter ``name``, the source's folder,
-    for each of them in ``origin``, by :func:`.run_identity` of its id. Raises CoarticError if the
-    target has another result of a run."""
-    there = {run_identity(run_id): run_id for run_id in target.ids()}
-    results, held_results = source.results(), dict(target.results())
-    for first in range(0, len(results), _WRITTEN_AT_ONCE):
-        runs = list[Run]()
-        for run_id, result in results[first : first + _WRITTEN_AT_ONCE]:
-            held = there.get(run_identity(run_id), "")
-            if held_results.get(held) == result:
+def _check_same_results(stores: Mapping[str, Store]) -> None:
+    """Raise CoarticError if two stores, by the names of their folders, have different results of a
+    run. Rewards that one of them does not keep do not count."""
+    first_said = dict[str, tuple[str, str]]()
+    for name, store in stores.items():
+        for run_id, result in store.results().items():
+            first, there = first_said.setdefault(run_id, (name, result))
+            if there == result:
                 continue
-            run = source.run(run_id)
-            if not held:
-                runs.append(run)
-            elif changes := compare_runs(target.run(held), run):  # of what both runs keep
-                which = f"run {run.number} of {run.cell.method.name} on {run.cell.task.name}"
-                where = f"{origin[run_identity(run_id)]} and {name} ({run_id})"
-                raise CoarticError(f"{which} differs in {where}: {changes[0]}")
-        target.write(runs)
-        origin |= {run_identity(run.id): name for run in runs}
+            run = store.run(run_id)
+            if changes := compare_runs(stores[first].run(run_id), run):
+                raise CoarticError(
+                    f"run {run.number} of {run.cell.method.name} on {run.cell.task.name} differs "
+                    f"in {first} and {name} ({run_id}): {changes[0]}"
+                )

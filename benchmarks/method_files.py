@@ -1,143 +1,129 @@
-"""Import a method file in its own process, which answers questions about the methods in plain data.
+"""Read method files, each in a process of its own, and find what their results come from.
 
-Changes that a file makes to its process on import (another working folder, patches, limits, an
-exit) do not affect the process that runs suites.
+Changes that a file makes to its process on import (another working folder, patches, an exit) do not
+affect the process that runs suites, and modules of one name from two folders do not mix.
 """
 
 from __future__ import annotations
 
-import atexit
-import errno
-import itertools
-import json
-import multiprocessing
-import os
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import asdict
+import ast
+import hashlib
+import site
+import sys
+import sysconfig
+from collections.abc import Iterable
+from concurrent.futures import BrokenExecutor
+from dataclasses import replace
+from functools import partial
+from importlib import metadata
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from pydantic import TypeAdapter
+from pebble import ProcessExpired, ProcessPool
 
-from coartic.benchmarks.own_code import code_of
-from coartic.benchmarks.pool import CONTEXT, MORE_FILES, signal_name, start_process
+from coartic.benchmarks.processes import CONTEXT, signal_name
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, error_line, plain
-from coartic.internal.threads import begin_worker, end_group
+from coartic.internal.threads import begin_worker
+from coartic.internal.toml_files import check_file
 from coartic.method import Information, Method
-from coartic.runs.method_info import MethodInfo, answer, load_file, method_info, methods_in
+from coartic.model import MODEL_VERSION
+from coartic.runs.method_info import (
+    READERS,
+    MethodInfo,
+    answer,
+    load_file,
+    load_method,
+    method_info,
+    methods_in,
+)
 
 _ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to import
-_LONGEST_ANSWER = 2**24  # bytes of an answer
-_KINDS: dict[str, TypeAdapter[Any]] = {
-    "methods": TypeAdapter(list[MethodInfo]),
-    "complete": TypeAdapter(dict[str, Any]),
-    "why_not": TypeAdapter(str | None),
-    "rules": TypeAdapter(dict[str, dict[str, Any]]),
-}
-"""Kind of the answer, by question."""
+_LARGEST_DATA = 2**30  # bytes of a declared file
 
 
-def begin_reader(path: Path, shown: str) -> Callable[..., Any]:
-    """Start a process for a method file, and return a function that asks the process about a
-    method. ``shown`` is the name of the file in messages. The function takes the id of a method, a
-    question of :func:`.answer` and its arguments; the question ``methods``, with an empty id, comes
-    first: it imports the file, and gives the declarations of all methods. The function raises
-    CoarticError for an error there, for an answer of another kind, and for no answer in 5 minutes.
-    The process, with all processes of its group, ends with this process. Raises CoarticError if no
-    process begins."""
+def read_file(path: Path) -> list[MethodInfo]:
+    """Return the declarations of the methods of a file, which a new process imports; the process
+    then answers questions about them (:data:`READERS`). Raises CoarticError for an unusable
+    file."""
+    shown = plain(str(path), LONGEST_LINE)
+    check_file(path)
+    if path.suffix != ".py":
+        raise CoarticError(f"{shown}: the name of a method file ends in .py")
+    reader = ProcessPool(1, initializer=begin_worker, context=CONTEXT)
+    infos: list[MethodInfo] = _ask(reader, shown, _declarations, path, shown)
+    READERS[str(path)] = partial(_ask, reader, shown, _answer, path)
+    return infos
+
+
+def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
+    """Return the result of a function in the process that reads the file ``shown``. Raises
+    CoarticError if there is none."""
     try:
-        pipe, theirs = multiprocessing.Pipe()
-        answers = theirs, path, shown
-        process = CONTEXT.Process(target=_answer_questions, args=answers, daemon=True)
-        start_process(process)
-    except (OSError, EOFError) as error:  # EOFError: its server was killed
-        why = getattr(error, "strerror", None) or error_line(error)
-        how = f" {MORE_FILES}" * (getattr(error, "errno", 0) == errno.EMFILE)
-        words = f"{shown} is not read: no process for it begins ({why})"
-        raise CoarticError(f"{words}. Repeat the command{how}") from None
-    atexit.register(end_group, process.pid)
-    theirs.close()
-    numbers = itertools.count()
-
-    def ask(method: str, question: str, *arguments: Any) -> Any:
-        number = next(numbers)
-        try:
-            pipe.send_bytes(json.dumps([number, method, question, *arguments]).encode())
-            if not pipe.poll(_ANSWER_S):
-                end_group(process.pid)
-                raise CoarticError(f"{shown}: gives no answer within {_ANSWER_S:g} s")
-            text = pipe.recv_bytes(_LONGEST_ANSWER)
-        except (OSError, EOFError):
-            process.join(1.0)
-            code = process.exitcode
-            if code is None or code < 0 or code == 255:  # 255: its server was killed
-                name = signal_name(-code) if code and code < 0 else "a signal"
-                raise CoarticError(
-                    f"{shown} is not read: {name} ended the process that reads it, from outside or "
-                    "by the file itself. Repeat the command"
-                ) from None
-            how = f"its process ended with exit code {code}"
-            raise CoarticError(f"{shown}: cannot be imported: {how}") from None
-        try:
-            answered, kind, content = json.loads(text)
-            if answered != number:
-                raise ValueError(f"question {number} has the answer to question {answered}")
-            if kind == "answer":
-                return _KINDS[question].validate_python(content)
-        except (ValueError, TypeError, RecursionError) as error:
-            why = error_line(error)
-            raise CoarticError(f"{shown}: its answers cannot be read: {why}") from None
-        raise CoarticError(plain(str(content)))
-
-    return ask
+        return reader.schedule(function, args=arguments, timeout=_ANSWER_S).result()
+    except CoarticError as error:
+        raise CoarticError(str(error)) from None  # without the traceback of the other process
+    except ProcessExpired as error:
+        code = error.exitcode
+        how = f"{signal_name(-code)} ended it" if code < 0 else f"it ended with exit code {code}"
+        raise CoarticError(f"{shown}: cannot be read by its process: {how}") from None
+    except TimeoutError:
+        raise CoarticError(f"{shown}: gives no answer within {_ANSWER_S:g} s") from None
+    except (BrokenExecutor, OSError) as error:
+        why = error_line(error.__cause__ or error)
+        raise CoarticError(
+            f"{shown}: no process for it begins ({why}). Repeat the command"
+        ) from None
 
 
-def _answer_questions(pipe: Any, path: Path, shown: str) -> None:
-    """Answer questions on the file ``path``, ``shown`` in messages: through a pipe come JSON
-    ``[NUMBER, METHOD, QUESTION, ARGUMENTS...]``, and go ``[NUMBER, "answer", ANSWER]`` or
-    ``[NUMBER, "error", SENTENCE]``, until it is closed. A child that the file has forked ends
-    instead of answering."""
-    begin_worker()
-    reader = os.getpid()
-    methods: dict[str, type[Method]] = {}
-    while True:
-        try:
-            number, name, question, *arguments = json.loads(pipe.recv_bytes())
-        except EOFError:
-            return
-        try:
-            content: Any
-            if question == "methods":
-                try:
-                    module = load_file(path)
-                except BaseException as error:
-                    why = f"{shown}: cannot be imported: {error_line(error)}"
-                    raise CoarticError(why) from None
-                found = dict.fromkeys(methods_in(module))
-                content = [asdict(info) for info in _methods_of_module(module, found, shown, path)]
-                methods = {method.name: method for method in found}
-            else:
-                content = answer(methods[name], question, *arguments)
-            text = json.dumps([number, "answer", content])
-        except CoarticError as error:
-            text = json.dumps([number, "error", str(error)])
-        except BaseException as error:
-            text = json.dumps([number, "error", f"{shown}: cannot be used: {error_line(error)}"])
-        if os.getpid() != reader:
-            os._exit(0)
-        pipe.send_bytes(text.encode())
+# What follows runs in the process of a file.
 
 
-def _methods_of_module(
-    module: ModuleType, methods: Collection[type[Method]], origin: str, file: Path
-) -> Iterator[MethodInfo]:
-    """Yield the declarations of ``methods``, the classes that ``module`` defines, with their code;
-    ``origin`` is the name of the ``file`` in messages. Raises CoarticError for no method, for
-    declared texts or information of a wrong form, and for a file that cannot be read."""
+def _answer(path: Path, method: str, question: str, *arguments: Any) -> Any:
+    """Return the answer of a method of a file to a question of :func:`.answer`."""
+    try:
+        return answer(load_method(str(path), method), question, *arguments)
+    except CoarticError:
+        raise
+    except BaseException as error:
+        raise CoarticError(f"{path}: cannot be used: {error_line(error)}") from None
+
+
+def check_code(info: MethodInfo) -> None:
+    """Import the file of a method. Raises CoarticError if results of the method would come from
+    other code than ``info`` says, because a file was changed."""
+    path = Path(info.where)
+    module, loaded = load_file(path, info.code)
+    codes = {each.name: _code_of(each, path, _own_files(loaded)) for each in methods_in(module)}
+    if codes.get(info.name) != info.code:
+        raise CoarticError(
+            f"{info.where}, or a file that it loads, is not as it was when the suite was started: "
+            "repeat the command, on a cluster with the same files everywhere"
+        )
+
+
+def _declarations(path: Path, shown: str) -> list[MethodInfo]:
+    """Import a file, ``shown`` in messages, and return the declarations of its methods, with their
+    code and the packages that the file imports. Raises CoarticError for no method, and for
+    declarations of a wrong form."""
+    try:
+        module, loaded = load_file(path)
+    except BaseException as error:
+        raise CoarticError(f"{shown}: cannot be imported: {error_line(error)}") from None
+    methods = methods_in(module)
+    if not methods:
+        unfinished = [
+            f"{method.__name__} has no {', '.join(sorted(method.__abstractmethods__))}"
+            for method in methods_in(module, abstract=True)
+        ]
+        why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
+        raise CoarticError(
+            f"{shown}: defines no subclass of coartic.Method or coartic.Optimiser{why}"
+        )
+    files = _own_files(loaded)
+    packages, infos = _packages_of({path, *files}), list[MethodInfo]()
     for method in methods:
-        where = f"{origin}: {method.__name__}"
+        where = f"{shown}: {method.__name__}"
         for attribute in ("name", "title", "citation", "tuned_on"):
             text = getattr(method, attribute, None)
             if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
@@ -146,22 +132,63 @@ def _methods_of_module(
         if not isinstance(information, frozenset | set) or not all(
             isinstance(each, Information) for each in information
         ):
-            wrong = f"{where}: information must be a set of Information, not {information!r}"
-            raise CoarticError(wrong)
+            raise CoarticError(
+                f"{where}: information must be a set of Information, not {information!r}"
+            )
+        info = method_info(method, shown, str(path), _code_of(method, path, files))
+        infos.append(replace(info, packages=packages))
+    return infos
+
+
+def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
+    """Return a hash, 12 hexadecimal digits, of what the results of a method from a file come from:
+    versions of model and method, the file, the data files that the method declares, and the user's
+    ``files`` that its import loads. Raises CoarticError for a file that cannot be read."""
+    declared = [path.parent / name for name in method.files]
+    parts = [f"{MODEL_VERSION}.{method.version}".encode()]
+    for file in (path, *declared, *files):
         try:
-            code = code_of(method, file)
-        except CoarticError as error:
-            raise CoarticError(f"{origin}: {error}") from None
-        except OSError as error:
-            wrong = f"{error.filename}: cannot be read: {error.strerror}"
-            raise CoarticError(f"{origin}: {wrong}") from None
-        yield method_info(method, origin, str(file), code)
-    if not methods:
-        unfinished = [
-            f"{method.__name__} has no {', '.join(sorted(method.__abstractmethods__))}"
-            for method in methods_in(module, abstract=True)
-        ]
-        why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
-        raise CoarticError(
-            f"{origin}: defines no subclass of coartic.Method or coartic.Optimiser{why}"
-        )
+            check_file(file, most=_LARGEST_DATA)
+            parts.append(file.read_bytes())
+        except (CoarticError, OSError) as error:
+            raise CoarticError(f"{path}: its file {error}") from None
+    hashes = sorted(hashlib.sha256(part).digest() for part in parts)  # wherever the files are
+    return hashlib.sha256(b"".join(hashes)).hexdigest()[:12]
+
+
+def _own_files(names: Iterable[str]) -> set[Path]:
+    """Return the user's files among the loaded modules of these names: existing files outside of
+    this project, the standard library and installed packages."""
+    folders = [sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")]
+    folders += [*site.getsitepackages(), site.getusersitepackages()]
+    found = {
+        Path(path).resolve()
+        for name in names
+        if name.partition(".")[0] != "coartic"
+        and isinstance(path := getattr(sys.modules.get(name), "__file__", None), str)
+    }
+    return {
+        path
+        for path in found
+        if path.is_file()
+        and not {"site-packages", "dist-packages"} & {*path.parts}
+        and not any(path.is_relative_to(Path(folder).resolve()) for folder in folders)
+    }
+
+
+def _packages_of(files: Iterable[Path]) -> dict[str, str]:
+    """Return the versions of the installed packages that Python files import, by name."""
+    names = set[str]()
+    for file in files:
+        if file.suffix == ".py":
+            for node in ast.walk(ast.parse(file.read_bytes())):
+                if isinstance(node, ast.Import):
+                    names |= {alias.name for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                    names.add(node.module)
+    tops = {name.partition(".")[0] for name in names} - {"coartic"} - sys.stdlib_module_names
+    if not tops:
+        return {}
+    known = metadata.packages_distributions()
+    found = sorted({package for top in tops for package in known.get(top, ())})
+    return {package: metadata.version(package) for package in found}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import math
-import multiprocessing
 import os
 import platform
 import re
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import coartic
-from coartic.benchmarks.pool import CONTEXT, start_process
+from coartic.benchmarks.pool import process_pool
 from coartic.internal.text import LONGEST_LINE, plain
 from coartic.internal.threads import threads_for, worker_variables
 from coartic.motion.compile import FINGERPRINT, PACKAGE
@@ -90,21 +89,15 @@ def _commit_of_checkout() -> dict[str, Any] | None:
 
 def arithmetic() -> str:
     """Return a fingerprint of how workers round, ``NumPy HASH, libm HASH``: hashes of the bits of
-    some results, computed in a process that is started like a worker; empty if it does not answer.
-    Where a hash is the same, that library rounds these results alike."""
-    ours, theirs = multiprocessing.Pipe(duplex=False)
-    process = CONTEXT.Process(target=_say_arithmetic, args=(theirs,), daemon=True)
-    try:
-        start_process(process)
-        theirs.close()
-        return str(ours.recv())
-    except (OSError, EOFError):
-        return ""
+    some results, computed in a process with the variables of a worker. Where a hash is the same,
+    that library rounds these results alike."""
+    with process_pool(1) as pool:
+        return pool.submit(_arithmetic).result()
 
 
-def _say_arithmetic(pipe: Any) -> None:
-    """Send the text of :func:`arithmetic` through a pipe: a hash of numbers computed by NumPy, and
-    a hash of numbers computed by the C library."""
+def _arithmetic() -> str:
+    """Return the text of :func:`arithmetic` for this process: a hash of numbers computed by NumPy,
+    and a hash of numbers computed by the C library."""
     matrix = np.random.default_rng(0).standard_normal((16, 16))
     by_numpy = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix)), np.abs(matrix) ** 0.3
     numbers = np.abs(matrix).ravel().tolist()
@@ -113,5 +106,4 @@ def _say_arithmetic(pipe: Any) -> None:
         hashlib.sha256(b"".join(np.asarray(each).tobytes() for each in computed)).hexdigest()[:8]
         for computed in (by_numpy, by_libm)
     ]
-    with contextlib.suppress(OSError):  # the command was interrupted
-        pipe.send("NumPy {}, libm {}".format(*hashes))
+    return "NumPy {}, libm {}".format(*hashes)

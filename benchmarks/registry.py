@@ -7,20 +7,17 @@ from __future__ import annotations
 
 import importlib
 import re
-import threading
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 
 from coartic.errors import CoarticError
-from coartic.internal.text import LONGEST_LINE, plain, unknown
-from coartic.internal.toml_files import check_file
+from coartic.internal.text import unknown
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.method import MODULES
 from coartic.model import MODEL_VERSION
-from coartic.runs.method_info import BUILT_IN, READERS, MethodInfo, method_info
+from coartic.runs.method_info import BUILT_IN, MethodInfo, method_info
 
 _RESERVED = (METHOD_PREFIX, "optimum/")
 """Beginnings of ids that have a meaning in every table; they are reserved for built-in methods."""
@@ -41,7 +38,9 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
     """
     infos = dict(built_in())
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
-        for info in _methods_of_file(path):
+        from coartic.benchmarks.method_files import read_file  # which few commands need
+
+        for info in read_file(path):
             check_id(info.name, info.origin, infos)
             infos[info.name] = info
     return infos
@@ -56,23 +55,6 @@ def built_in() -> Mapping[str, MethodInfo]:
         for name in MODULES
         for method in importlib.import_module(name).METHODS
     }
-
-
-_asking = threading.Lock()
-"""Held while a process that reads a file is asked: threads would take each other's answers."""
-
-
-def current_code(method: MethodInfo) -> str:
-    """Return the code that a method has here, versions such as ``1.2`` or the hash of a method
-    file's code; ``none`` if its file no longer defines the method. Raises CoarticError for a file
-    that cannot be used, and KeyError for a built-in method that is not here."""
-    if method.is_ours:
-        return built_in()[method.name].code
-    with _asking:
-        if method.where not in READERS:  # a reader imports the file again for every question
-            list(_methods_of_file(Path(method.where)))
-        infos = READERS[method.where]("", "methods")
-    return next((info.code for info in infos if info.name == method.name), "none")
 
 
 def check_id(name: str, origin: str, registered: Registry) -> None:
@@ -109,19 +91,3 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     if not named:
         raise CoarticError(unknown("method", name, [*registered, *EVERY_CONDITION]))
     return named
-
-
-def _methods_of_file(path: Path) -> Iterator[MethodInfo]:
-    """Yield the declaration of each method of a file, which a separate process imports; the
-    function that asks this process is added to ``READERS``, by path. Raises CoarticError for an
-    unusable file."""
-    from coartic.benchmarks.method_files import begin_reader  # which few commands need
-
-    shown = plain(str(path), LONGEST_LINE)
-    check_file(path)
-    if path.suffix != ".py":
-        raise CoarticError(f"{shown}: the name of a method file ends in .py")
-    ask = begin_reader(path, shown)
-    for info in ask("", "methods"):
-        READERS[str(path)] = ask
-        yield replace(info, origin=shown, where=str(path))

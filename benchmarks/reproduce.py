@@ -17,13 +17,8 @@ from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.pictures.trajectories import Trajectory, trajectory
 from coartic.runs.plan import Job
-from coartic.runs.record import EARLIER, LATE, PARTS, Run, too_long
+from coartic.runs.record import PARTS, UNREPEATED, Run, too_long
 from coartic.runs.store import open_store
-
-LONG_S = 60.0
-"""Wall time of a run, s, beyond which it is made again alone."""
-AFTER_ANOTHER = "with the same seed after another run"
-"""Words of a doubt about a method whose results depend on its earlier runs (:func:`doubts_of`)."""
 
 
 def find_run(prefix: str, folder: Path) -> Run:
@@ -109,7 +104,7 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
             plan[position].run_id(number)
             for position, number, *_ in store.present()
             if (method := plan[position].cell.method).name in registered
-            and registered[method.name].code == method.version
+            and registered[method.name].code == method.code
         ]
         if not ids:
             raise CoarticError(
@@ -119,50 +114,15 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
         return [store.run(run_id) for run_id in ids[::step][:count]]
 
 
-def repeats_of(run: Run) -> list[Job]:
-    """Return the jobs whose runs :func:`doubts_of` compares with a run: a run with another seed,
-    and then this run again; of a run of more than a minute this run again alone."""
-    is_long = (run.outcome.times.wall_s or 0.0) > LONG_S
-    numbers = (run.number,) if is_long else (run.number + 1, run.number)
-    return [replace(run.job, numbers=(number,)) for number in numbers]
-
-
-def doubts_of(run: Run, repeats: Sequence[Run]) -> Iterator[str]:
-    """Yield sentences on doubts about a method, from one of its runs and the runs of
-    :func:`repeats_of` in any order: hidden state, use of the seed."""
-    name, task = run.cell.method.name, run.cell.task.name
-    advice = f"see: coartic check {name}"
-    again, *others = sorted(repeats, key=lambda each: each.number)
-    when = AFTER_ANOTHER if others else "with the same seed"
-    for change in compare_runs(run, again)[:1]:
-        yield (
-            f"{name} gives another result on {task} {when} "
-            f"({change}): it keeps something, or draws from a generator without a seed; {advice}"
-        )
-    if not others:
-        return
-    changes = compare_runs(run, others[0])
-    if changes and not run.cell.method.stochastic:
-        yield (
-            f"{name} is declared not to be stochastic, but another seed gives another result on "
-            f"{task} ({changes[0]}); {advice}"
-        )
-    if run.cell.method.stochastic and not changes:
-        yield (
-            f"{name} gives the same result on {task} with another seed, so its runs are one: take "
-            "random numbers from session.rng, or declare stochastic = False"
-        )
-
-
 def compare_runs(a: Run, b: Run) -> list[str]:
     """Return the differences between the results of two runs, in words, an empty list for equal
     results: status, reason, details, counts, movements and rewards. Rewards that a run does not
-    keep do not count, nor marks (:func:`.mark_of`), which depend on earlier runs."""
+    keep do not count."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
-    marks = LATE, EARLIER
     first, second = (
-        run.to_row() | {"details": {k: v for k, v in run.outcome.details.items() if k not in marks}}
+        run.to_row()
+        | {"details": {k: v for k, v in run.outcome.details.items() if k != UNREPEATED}}
         for run in (a, b)
     )
     changes = [

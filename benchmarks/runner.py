@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -21,13 +21,7 @@ from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import made_with
-from coartic.benchmarks.reproduce import (
-    AFTER_ANOTHER,
-    LONG_S,
-    doubts_of,
-    perform_in_order,
-    repeats_of,
-)
+from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.time_left import TimeLeft
@@ -37,7 +31,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, error_line
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
-from coartic.runs.record import EARLIER, Run
+from coartic.runs.record import UNREPEATED, Run
 from coartic.runs.store import Store, writing
 
 _EXECUTORS = {
@@ -47,6 +41,9 @@ _EXECUTORS = {
 """Options of ``coartic run`` that are executors in Python."""
 _LEAST_BATCH = 8
 """Most runs of a cell that are not divided among workers, if a method performs them together."""
+_MOST_TRIALS = 400_000
+"""Most trials of a job, if it has more runs than that: some seconds, which is what an interruption
+loses."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
 
@@ -70,9 +67,9 @@ class Progress:
     """Runs of the plan that crashed."""
     marks: dict[str, list[str]] = field(default_factory=dict)
     """Sentences on methods against which runs of the folder speak (:meth:`Store.marks`)."""
-    others: Counter[int] = field(default_factory=Counter)
+    others: int = 0
     """Runs of earlier commands in the folder that the plan does not ask for, without :attr:`stale`
-    runs, by the seed of their suite."""
+    runs."""
     wall_s: float = 0.0
     """Wall time of the call, s; 0 until it ends."""
     time_left: TimeLeft = field(default_factory=TimeLeft)
@@ -116,7 +113,7 @@ class Progress:
             f"{counted(count, 'run')} {what}"
             for count, what in (
                 (self.stale.total(), "by another version of their method"),
-                (self.others.total(), "of earlier commands, which are kept"),
+                (self.others, "of earlier commands, which are kept"),
             )
             if count > 0
         ]
@@ -185,9 +182,9 @@ def perform(
 
     The plan replaces the plan of the folder; other runs stay there, and no report shows them. Runs
     that fail are stored and counted, and raise nothing; runs that crashed, or timed out under a
-    lower limit, are performed again by the next call. An interruption keeps finished runs. For each
-    method of a file, an ok run of this call is made again after a run with another seed (alone if
-    all take more than a minute); warnings say what is doubtful, such as other results.
+    lower limit, are performed again by the next call. An interruption keeps finished runs. Of each
+    method of a file, the quickest ok run of this call is made again in another process; a warning,
+    and a mark in reports, say if the result differs.
 
     Parameters
     ----------
@@ -225,7 +222,7 @@ def perform(
             warnings.warn(f"watch is not called again: {error_line(error)}", stacklevel=3)
 
     def seconds(run: Run) -> float:
-        return max(run.outcome.times.wall_s or math.inf, LONG_S)
+        return run.outcome.times.wall_s or math.inf
 
     executor = Local() if executor is None else executor
     if not isinstance(executor, Local | Dask):
@@ -235,8 +232,8 @@ def perform(
         raise CoarticError(f"plan is {brief_value(plan)}; it must be a list of jobs of plan_suite")
     with writing(folder) as store:
         store.replace_plan(plan, made_with())
-        progress = Progress(folder, size_of(plan), stale=store.stale(), others=store.others())
-        progress.others[plan[0].seed] -= progress.stale.total()
+        progress = Progress(folder, size_of(plan), stale=store.stale())
+        progress.others = store.others() - progress.stale.total()
         progress.marks = store.marks()
         missing = _missing_jobs(plan, store, progress)
         own = {job.cell.method.name: job for job in missing if not job.cell.method.is_ours}
@@ -261,27 +258,24 @@ def perform(
                         progress.finish(run)
                         tell(run.cell)
             jobs = alone
-        again, doubts = defaultdict[str, list[Run]](list), list[str]()
-        repeats = [job for run in chosen.values() for job in repeats_of(run)]
-        progress.time_left.expect(repeats)
-        progress.repeats = len(repeats)
-        for job in repeats[:1]:
-            tell(job.cell)
-        for run in perform_in_order(repeats, min(executor.workers, Local().workers)):
-            again[run.cell.method.name].append(run)
-            progress.time_left.finish(run)
-            progress.repeats -= 1
+        progress.time_left.expect([run.job for run in chosen.values()])
+        progress.repeats = len(chosen)
+        for run in list(chosen.values())[:1]:
             tell(run.cell)
-        for name, run in chosen.items():
-            of_run = [*doubts_of(run, again[name])]
-            doubts += of_run
-            if any(AFTER_ANOTHER in doubt for doubt in of_run):
-                details = run.outcome.details | {EARLIER: [run.cell.task.name]}
+        workers = min(executor.workers, Local().workers)
+        for again in perform_in_order([run.job for run in chosen.values()], workers):
+            name = again.cell.method.name
+            run = chosen[name]
+            if changes := compare_runs(run, again)[:1]:
+                details = run.outcome.details | {UNREPEATED: changes[0]}
                 store.write([replace(run, outcome=replace(run.outcome, details=details))])
+            progress.time_left.finish(again)
+            progress.repeats -= 1
+            tell(again.cell)
         known, progress.marks = {*chain(*progress.marks.values())}, store.marks()
-        new = [mark for mark in chain(*progress.marks.values()) if mark not in known]
-        for doubt in (*new, *doubts):
-            warnings.warn(doubt, stacklevel=2)
+        for mark in chain(*progress.marks.values()):
+            if mark not in known:
+                warnings.warn(mark, stacklevel=2)
         progress.wall_s = time.perf_counter() - clock
         return progress
 
@@ -317,9 +311,10 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     """Divide jobs for workers, and return the smaller jobs, each with some of the runs: first jobs
     of methods without a number of trials, then the others, by trials, the most first."""
-    # A run among many takes a fraction of its time alone: jobs are as large as methods allow, and
-    # each worker has a part. Long jobs come first, so that none is alone at the end; one run of a
-    # planner, which has no number of trials, can take as long as thousands of trials: it is first.
+    # A run among many takes a fraction of its time alone: jobs are as large as methods allow, in
+    # some seconds, and each worker has a part. Long jobs come first, so that none is alone at the
+    # end; one run of a planner, which has no number of trials, can take as long as thousands of
+    # trials: it is first.
 
     def divide(job: Job, size: int) -> Iterator[Job]:
         for first in range(0, len(job.numbers), size):
@@ -330,7 +325,8 @@ def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     for job in jobs:
         method, parameters = job.cell.method, job.cell.parameters
         most = method.configure(parameters).most_together() if method.is_ours else 1
-        parts += divide(job, min(most, share))
+        few = max(_MOST_TRIALS // (trials_in(parameters) or 1), _LEAST_BATCH)
+        parts += divide(job, min(most, share, few))
     even = len(parts) - len(parts) % workers
     ordered, last = parts[:even], parts[even:]
     for job in last:

@@ -17,7 +17,8 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     """Return the scored runs of a job from their outcomes, in order. All ``parts`` of outcomes
     (solution, initial, replay) are executed, except parts that are too long or break the task's
     rules; only runs that are ok have scores."""
-    task = job.cell.task
+    task, method = job.cell.task, job.cell.method
+    imports = {} if method.is_ours else {"imports": method.packages}
     executions = iter(execute_all(task, [m for each in outcomes for m in each.parts.values()]))
     runs = []
     for number, outcome in zip(job.numbers, outcomes, strict=True):
@@ -29,7 +30,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
             status=status,  # type: ignore[arg-type]
             reason="" if is_ok else plain(reason, LONGEST_REASON) or "it gave no reason",
             parts={},
-            environment=current_environment() | (outcome.environment or {}),
+            environment=current_environment() | imports | (outcome.environment or {}),
         )
         scores = {part: _score_of(task, part, each) for part, each in parts.items() if is_ok}
         runs.append(Run(replace(job, numbers=(number,)), final, scores, now()))

@@ -13,20 +13,15 @@ import sys
 import time
 import traceback
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
-from coartic.benchmarks.own_code import imported_packages, libraries, own_files
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.limits import brief_value
-from coartic.internal.text import Line, counted, error_line
+from coartic.internal.text import counted, error_line
 from coartic.method import (
-    MOST_COUNT,
     Information,
-    Meter,
     MethodError,
     Result,
     Session,
@@ -36,13 +31,12 @@ from coartic.method import (
 from coartic.motion.trial import trials_outside
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job
-from coartic.runs.record import LATE, PARTS, Outcome, Times, movement_data, movement_from
+from coartic.runs.record import PARTS, Outcome, Times, movement_data, movement_from
 
 _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 
 
 _OUTCOMES = TypeAdapter(list[Outcome])
-_ENVIRONMENT = TypeAdapter(dict[Literal["libraries", "imports"], dict[Line, Line] | list[Line]])
 _LONGEST_DETAILS = 10_000_000
 _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError, RecursionError
 """Errors of malformed data."""
@@ -83,36 +77,19 @@ def answer_of(outcomes: Sequence[Outcome]) -> bytes:
 
 def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
     """Return the outcomes of a job from its answer, the JSON of :func:`answer_of`; an outcome
-    ``crashed`` for each run if the answer is malformed or :func:`_check_stated` refuses it."""
+    ``crashed`` for each run if the answer is malformed."""
     try:
         content = json.loads(answer)
         for each in content:
             parts = each["parts"].items()
             each["parts"] = {part: [*map(movement_from, made)] for part, made in parts}
         outcomes = _OUTCOMES.validate_python(content)
-        for outcome in outcomes:
-            _check_stated(job, outcome)
         if len(outcomes) == len(job.numbers):
             return outcomes
         why = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
     except _MALFORMED as error:
         why = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {why}")
-
-
-def _check_stated(job: Job, outcome: Outcome) -> None:
-    """Raise ValueError for an outcome with a time or count that is negative or too large, more
-    rewards than trials, information that its method does not declare, or a malformed
-    environment."""
-    meter = outcome.meter or Meter()
-    for name, number in {**vars(outcome.times), **vars(meter)}.items():
-        if number is not None and not 0 <= number <= MOST_COUNT:
-            raise ValueError(f"{name} is {brief_value(number)}")
-    if len(outcome.rewards) > meter.trials:
-        raise ValueError(f"{len(outcome.rewards)} rewards of {counted(meter.trials, 'trial')}")
-    if others := {*outcome.used} - {*job.cell.method.information}:
-        raise ValueError(f"it used {brief_value(sorted(others))}, which it does not declare")
-    _ENVIRONMENT.validate_python(outcome.environment or {})
 
 
 def perform_job(job: Job) -> list[Outcome]:
@@ -136,10 +113,8 @@ def perform_job(job: Job) -> list[Outcome]:
     warm = name in _seen
     _seen.add(name)
     wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
-    modules = {*sys.modules}
     try:
         method = cell.method.configure(cell.parameters)
-        modules = {*sys.modules}
         results: Sequence[Any]
         if (reason_not := method.why_not(outline_of(cell.task))) is not None:
             raise MethodError("infeasible", str(reason_not))
@@ -157,14 +132,7 @@ def perform_job(job: Job) -> list[Outcome]:
     runs = len(sessions)
     times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
     pairs = zip(results, sessions, strict=True)
-    outcomes = [_outcome_of(cell.method, result, session, times) for result, session in pairs]
-    if not cell.method.is_ours:
-        imports = imported_packages(cell.method.where)
-        used = {"libraries": libraries(), "imports": imports}
-        outcomes = [replace(each, environment=used) for each in outcomes]
-        if late := sorted(Path(path).name for path in own_files(modules)):
-            outcomes = [replace(each, details=each.details | {LATE: late}) for each in outcomes]
-    return outcomes
+    return [_outcome_of(cell.method, result, session, times) for result, session in pairs]
 
 
 _seen: set[str] = set()

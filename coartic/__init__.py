@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from coartic.method.optimisers import Objective, Optimiser, objective
     from coartic.model import PAPER, MotionModel
     from coartic.motion.movement import Correction, MoveResult, correct, move
+    from coartic.motion.noise import execute_noisy
     from coartic.motion.solution import (
         Execution,
         Movement,
@@ -73,6 +74,7 @@ __all__ = [
     "correct",
     "corrective_trial",
     "execute",
+    "execute_noisy",
     "hand_sequences",
     "initial_hands",
     "learn",
@@ -96,6 +98,7 @@ _HOMES = {
     "method": ("BudgetError", "MethodError", "UndeclaredError"),
     "model": ("PAPER", "MotionModel"),
     "motion.movement": ("Correction", "MoveResult", "correct", "move"),
+    "motion.noise": ("execute_noisy",),
     "motion.solution": (
         *("Execution", "Movement", "corrective_trial", "execute"),
         *("hand_sequences", "initial_hands", "movements_of"),

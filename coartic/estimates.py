@@ -19,7 +19,6 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.limits import real_array
 from coartic.robot import Array
 
@@ -107,8 +106,7 @@ def centred(values: Array) -> Array:
     return np.where(varies(values), values - np.mean(values, axis=0), 0.0)
 
 
-@checked_arguments
-def mean(values: Numbers) -> Estimate:
+def mean(values: ArrayLike) -> Estimate:
     """Return the mean of a sample ``(n,)`` with its 95 % interval (:func:`mean_of_means`), whose
     ends are NaN for fewer than three values. Raises ValueError for a sample that is no vector,
     empty or not finite, or has values, other than 0, that are not from 1e-100 to 1e100 in size."""
@@ -120,8 +118,7 @@ def _mean_of(values: tuple[float, ...]) -> Estimate:
     return mean_of_means([np.array(values)], [1.0])
 
 
-@checked_arguments
-def difference_of_means(first: Numbers, second: Numbers) -> Estimate:
+def difference_of_means(first: ArrayLike, second: ArrayLike) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
     and ``(m,)``, with its 95 % interval (:func:`mean_of_means`), whose ends are NaN for fewer than
     three values in a sample. Raises ValueError for samples that :func:`mean` refuses."""
@@ -162,7 +159,7 @@ def mean_of_means(
     kept = sum(n) <= LARGE
     batches: Iterable[list[Any]] = (_drawn_once if kept else drawn)(n, resamples)
     resampled = np.concatenate([
-        sum(weight * sample[places].mean(axis=1)
+        sum(weight * sample.take(places).mean(axis=1)
             for (sample, weight), places in zip(parts, batch, strict=True))
         for batch in batches
     ])  # fmt: skip

@@ -42,10 +42,10 @@ def _kernels():
 @pytest.fixture(scope="session", autouse=True)
 def _parts_of_reports_fail_aloud():
     """A part of a report that cannot be made fails the test, where a user gets the others."""
-    from coartic.analysis.report import about
+    from coartic.analysis.report import sections
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(about, "attempt", lambda failures, name, make, *args: make(*args))
+        patch.setattr(sections, "attempt", lambda failures, name, make, *args: make(*args))
         yield
 
 
@@ -77,8 +77,7 @@ def not_repeated():
     from coartic.benchmarks import runner
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(runner, "repeats_of", lambda run: [])
-        patch.setattr(runner, "doubts_of", lambda *_: ())
+        patch.setattr(runner, "perform_in_order", lambda *_: ())
         yield
 
 
@@ -134,13 +133,13 @@ def traced(tmp_path_factory):
 @pytest.fixture(scope="session")
 def report(traced, tmp_path_factory):
     """The folder of a report on those results, as a user gets it."""
-    from coartic.analysis.report import about, build
+    from coartic.analysis.report import build, sections
     from tests.support.suites import made_once
 
     def make(folder):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(build, "picture", lambda *_: b"")  # drawn for the page already
-            patch.setattr(about, "visible_sections", lambda study: build.SECTIONS)  # all
+            patch.setattr(sections, "visible_sections", lambda study: build.SECTIONS)  # all
             build.write_report(traced, folder / "report", for_paper=False)
 
     return made_once(tmp_path_factory, "traced-report", make) / "report"

@@ -10,7 +10,7 @@ from coartic.analysis.citations import STATISTICS, THE_PAPER, bibliography, refe
 from coartic.analysis.methods import KNOWN_METHODS
 from coartic.benchmarks.registry import METHOD_NAME, NAMES, built_in, registry
 from coartic.runs.method_info import MethodInfo
-from tests.support.suites import BROKEN, ROOT, cell_on, edit_plan, run_and_write
+from tests.support.suites import BROKEN, ROOT, cell_on, edit, run_and_write
 
 
 def fields_of(entry):
@@ -103,10 +103,10 @@ def test_command(tmp_path, coartic):
     cells = [cell_on(load_task("ascending"), methods[name]) for name in names]
     run_and_write(tmp_path / "results", cells, runs=1)
     commit = '{"id": "0123456789abcdef", "dirty": true}'
-    change = "UPDATE environments SET content = json_set(content, '$.commit', json(?))"
-    edit_plan(tmp_path / "results", change, commit)
+    change = "UPDATE suite SET content = json_set(content, '$.commit', json(?))"
+    edit(tmp_path / "results", change, commit)
     change = "UPDATE environments SET content = json_set(content, '$.imports', json(?))"
-    edit_plan(tmp_path / "results", change, '["solver 1.2", "other 3"]')
+    edit(tmp_path / "results", change, '{"solver": "1.2", "other": "3"}')
     text = coartic("cite", tmp_path / "results")[1]
     assert ", commit 0123456789abcdef with changes}," in text
     assert keys_in(text) == ["coartic", THE_PAPER, "whitney1969", "method-test-good"]

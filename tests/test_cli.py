@@ -8,10 +8,12 @@ import signal
 import subprocess
 import sys
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
+import pandas as pd
 import pytest
 
 from coartic import CoarticError, load_task
@@ -34,8 +36,7 @@ from tests.support.suites import (
     Failing,
     cell_on,
     edit,
-    edit_plan,
-    moved,
+    edit_movement,
     paper_cells,
     run_and_write,
 )
@@ -172,8 +173,7 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     edit(out, "UPDATE results SET movement_ticks = movement_ticks + 1 WHERE run_id = ?", second)
     code, text, _ = coartic("verify", out, "--again", 2)
     assert (code, "2 runs performed again: 1 with another result." in text) == (1, True)
-    first_movement = """WHERE "order" = 0 AND part = 'replay'"""
-    edit(out, f"UPDATE movements SET path = {moved('$[6]', 1e-12)} {first_movement}")
+    edit_movement(out, 2, lambda movement: movement[4].reverse(), "replay")
     code, text, _ = coartic("verify", out, "--run", second)
     assert code == 1
     assert f"Run {second}, performed again: movement_ticks: " in text
@@ -181,14 +181,16 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     code, _, error = coartic("verify", out, "--run", "")
     assert code == 2
     assert "is not a run id" in error
-    edit_plan(out, "UPDATE cells SET code = 'other'")
+    cells = [cell_on(load_task("ascending"), replace(KNOWN["dual-process/EC1"], code="other"))]
+    run_and_write(tmp_path / "other", cells, runs=1, trials=3)
+    out = tmp_path / "other"
     code, _, error = coartic("verify", out, "--again", 1)
     assert code == 2
     assert "has no run of a method that has the same version or code here" in error
 
 
 INTERRUPTED = """
-import contextlib, ctypes, os, signal, sys, tempfile, threading, time
+import contextlib, os, signal, sys, tempfile, threading, time
 import coartic.__main__
 
 moment, number, times = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
@@ -208,13 +210,9 @@ def clean():
         stack.callback(signals.start)
         interrupt()
 
-def call_back():
-    ctypes.CFUNCTYPE(None)(interrupt)()  # which passes no exception on
-    time.sleep(60)
-
-if moment in ("cleaning", "calling back"):  # which end after the signals
+if moment == "cleaning":  # which ends after the signals
     import coartic.cli
-    coartic.cli.main = clean if moment == "cleaning" else call_back
+    coartic.cli.main = clean
 else:  # milliseconds after it has begun
     threading.Timer(int(moment) / 1000, interrupt).start()
 coartic.__main__.main()
@@ -227,7 +225,7 @@ coartic.__main__.main()
     [
         ("300", "SIGINT", 2),
         ("2500", "SIGTERM", 2),
-        ("calling back", "SIGHUP", 1),
+        ("1500", "SIGHUP", 1),
         ("cleaning", "SIGINT", 3),
     ],
 )
@@ -269,7 +267,7 @@ def test_what_a_folder_holds_besides_is_said_before_the_first_run(coartic, tmp_p
 
     monkeypatch.setattr("coartic.cli.run.interruptible", interruptible)
     error = coartic(*SMALL, "--out", out, "--seed", 7)[2]
-    assert f"{out} holds 2 runs" in error.partition("Runs: ")[0]
+    assert f"{out} holds 2 other runs" in error.partition("Runs: ")[0]
     assert f"Saved in {out}: 2 runs; " in sentences[0]()
     edit(out, "DELETE FROM results")
     assert f"Saved in {out}: 0 runs; " in sentences[0]()
@@ -379,7 +377,7 @@ def test_draw(coartic, tmp_path, monkeypatch):
 
 
 def test_a_place_that_is_taken_is_said_before_anything_is_drawn(coartic, tmp_path, monkeypatch):
-    monkeypatch.setattr("coartic.analysis.sections.tasks.picture_of_tasks", None)
+    monkeypatch.setattr("coartic.analysis.figures.drawings.picture_of_tasks", None)
     monkeypatch.setattr("coartic.play.page.play_page", None)
     for command, name in (("draw", "tasks.svg"), ("play", "page.html")):
         (tmp_path / name).touch()
@@ -470,7 +468,7 @@ TAKEN = (
     "draw ascending [--out f.svg]",
     "draw ascending --out f.svg [--replace]",
     "draw metres.toml --out j.svg [--recording hits.csv]",
-    "draw metres.toml --recording hits.csv --out k.svg [--ticks-per-unit 100]",
+    "draw metres.toml --recording hits.csv --out k.svg [--ticks-per-unit 2]",
     "cite [--analysis]",
 )
 """Commands with and without what is in brackets, in this order: some write over what earlier ones
@@ -511,9 +509,10 @@ def test_each_option_changes_what_a_command_does_or_is_refused(
     Path("mine.py").write_text(
         (ROOT / "tests" / "methods" / "nearest_hand.py").read_text("utf-8"), "utf-8"
     )
-    for name in ("metres.toml", "hits.csv"):
-        shipped = ROOT / "docs/examples/recordings" / name.replace("hits", "metres")
-        Path(name).write_text("".join(shipped.read_text("utf-8").splitlines(True)[:40]), "utf-8")
+    recordings = ROOT / "docs/examples/recordings"
+    Path("metres.toml").write_text((recordings / "metres.toml").read_text("utf-8"), "utf-8")
+    hits = pd.read_csv(recordings / "metres.csv").head(40)
+    hits.assign(duration=100 * hits.duration).to_csv("hits.csv", index=False)
     Path("task.toml").write_text(TASK_FILE.read_text("utf-8"), "utf-8")
 
     def call(words):

@@ -1,5 +1,7 @@
 """Runs on a Dask cluster: the same results, and a sentence for whatever is wrong with it."""
 
+from dataclasses import replace
+
 import pytest
 
 from coartic import CoarticError, load_task
@@ -7,7 +9,6 @@ from coartic.benchmarks import cluster as cluster_module
 from coartic.benchmarks.cluster import Dask
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
-from coartic.runs.store import open_store
 from tests.support.suites import (
     InProcess,
     cell_on,
@@ -41,11 +42,7 @@ def test_runs_come_out_as_they_do_here(address, tmp_path):
     assert set(there.runs.together) == {3}
 
 
-def test_runs_of_a_method_share_a_process(distributed, tmp_path):
-    """One a worker, however many runs it performs: it has imported the method's file. Workers are
-    processes, as on a cluster."""
-    (tmp_path / "mine.py").write_text("""
-import os
+OWN = """
 from coartic.method import Information, Method, Result
 from coartic.motion.solution import Movement
 
@@ -54,23 +51,28 @@ class Mine(Method):
     title = citation = "x"
     information = frozenset({Information.CORRECTIVE_PROCESS})
     def solve(self, session):
-        movements = [Movement(n, "right", "corrective") for n in range(1, session.goals_count + 1)]
-        return Result(tuple(movements), {"process": os.getpid()})
-""")
-    mine = registry([tmp_path / "mine.py"])["mine"]
-    cells = [cell_on(load_task(task), mine) for task in ("ascending", "descending")]
-    out = tmp_path / "out"
+        goals = range(1, session.goals_count + 1)
+        return Result(tuple(Movement(n, "right", "corrective") for n in goals))
+"""
+
+
+def test_a_method_of_a_file_runs_on_workers_that_are_processes(distributed, tmp_path):
+    """As on a cluster. One whose file was changed there is refused."""
+    (tmp_path / "mine.py").write_text(OWN)
+    cell = cell_on(load_task("ascending"), registry([tmp_path / "mine.py"])["mine"])
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, **QUIET) as cluster:
-        run_and_write(out, cells, executor=Dask(cluster.scheduler_address), runs=8)
-    with open_store(out) as store:
-        runs = [store.run(run_id) for run_id in store.ids()]
-    assert (len(runs), {run.outcome.status for run in runs}) == (16, {"ok"})
-    assert len({run.outcome.details["process"] for run in runs}) == 1
+        dask = Dask(cluster.scheduler_address)
+        runs = run_and_write(tmp_path / "out", [cell], executor=dask).runs
+        assert runs.status.tolist() == ["ok", "ok"]
+        (tmp_path / "mine.py").write_text(f"{OWN}# changed")
+        with pytest.raises(CoarticError, match="mine.py, or a file that it loads, is not as it w"):
+            run_and_write(tmp_path / "other", [cell], executor=dask)
 
 
-def test_a_worker_with_other_code_is_refused(address, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster_module, "current_code", lambda *_: "c0ffee")
-    with pytest.raises(CoarticError, match=r"is c0ffee on a Dask worker.*install the same"):
+def test_a_worker_with_another_version_is_refused(address, tmp_path, monkeypatch):
+    others = {name: replace(info, code="9.9") for name, info in registry().items()}
+    monkeypatch.setattr(cluster_module, "built_in", lambda: others)
+    with pytest.raises(CoarticError, match=r"is 9.9 on a Dask worker.*install the same"):
         perform(planned(CELLS), tmp_path, executor=Dask(address))
 
 
@@ -112,7 +114,7 @@ def test_what_is_no_executor(tmp_path):
 
 
 def test_a_scheduler_that_is_lost(distributed, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster_module, "Workers", lambda *_, **__: InProcess())
+    monkeypatch.setattr(cluster_module, "Local", InProcess)
     cluster = distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", **QUIET)
     with cluster:
         executor = Dask(cluster.scheduler_address)

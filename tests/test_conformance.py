@@ -9,7 +9,7 @@ import pytest
 from coartic import corrective_trial, load_task
 from coartic.benchmarks import conformance, reproduce
 from coartic.benchmarks.conformance import check_method, check_task_file
-from coartic.benchmarks.pool import CONTEXT
+from coartic.benchmarks.processes import CONTEXT
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.worker import perform_job
 from coartic.method import Information, Session
@@ -162,10 +162,8 @@ def test_a_solution_without_targets_is_asked_about(methods):
     changes."""
     method = replace(methods["test/no-target"], stochastic=True)
     laws = {law.name: law for law in check_method(method, tasks=FEW_TASKS)}
-    asked = "only the corrective process moves to goals 1, 2, 3 on ascending"
-    assert asked in laws["solution"].finding
-    assert laws["solution"].finding.count("which have no target: is this meant") == 1
-    assert "another seed gives the same result as well" in laws["determinism"].finding
+    assert "on ascending no target leads to goals 1, 2, 3" in laws["solution"].finding
+    assert "also under another seed" in laws["determinism"].finding
 
 
 @pytest.mark.parametrize("path", sorted(TASK_FOLDER.glob("*.toml")), ids=lambda path: path.stem)
@@ -177,7 +175,6 @@ def test_shipped_tasks_keep_every_law(methods, path):
     ("text", "law", "finding"),
     [
         ("name = 1", "valid", "name is 1"),
-        (GOOD.replace('"mine"', '"ascending"'), "name", "belongs to a different, shipped task"),
         (GOOD.replace("[5.0, 2.0]", "[5.0, 1.05]"), "distinct goals", "goals 1 and 2 lie within"),
         (
             'goals = [[20, 20]]\nlocked_base = ["x", "y"]\nhands = ["right"]\n'
@@ -190,10 +187,9 @@ def test_shipped_tasks_keep_every_law(methods, path):
             # Beyond what the corrective process can do with the only hand there is.
             'name = "behind"\nlocked_base = ["x", "y"]\nhands = ["right"]\n'
             "goals = [[-2.0, 0.1], [2.0, 2.0]]",
-            "methods",
-            "methods can run on it, such as dual-process/EC1",
+            "solvable",
+            "did not converge",
         ),
-        ('hands = ["left"]' + GOOD.replace('"RR"', '"LL"'), "methods", "corrective-alone/given"),
     ],
 )
 def test_laws_of_a_task_file(methods, text, law, finding, tmp_path):
@@ -201,4 +197,4 @@ def test_laws_of_a_task_file(methods, text, law, finding, tmp_path):
     path.write_text(text, encoding="utf-8")
     laws = {each.name: each for each in check_task_file(path, methods)}
     assert finding in laws[law].finding
-    assert laws[law].passed == (law == "methods")
+    assert not laws[law].passed

@@ -12,12 +12,11 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from coartic import CoarticError, load_task
-from coartic.analysis import load
+from coartic.analysis import FIGURES, load
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
 from coartic.analysis.figures.style import means, tip
 from coartic.analysis.methods import COLORS, KNOWN_METHODS, title_of
-from coartic.analysis.report.about import finding
-from coartic.analysis.sections import FIGURES, SECTIONS
+from coartic.analysis.report.sections import SECTIONS, finding
 from coartic.pictures import drawing
 from tests.support.figures import misplaced, texts_of
 from tests.support.made_up import row, study_of
@@ -100,20 +99,13 @@ def test_a_caption_names_what_its_figure_shows(method, task, named):
     assert [words for words in absent if words in caption] == named
 
 
-def test_a_figure_has_chosen_methods_tasks_and_style(shipped, tmp_path):
-    chosen = {"methods": ["cma-es/bandit", "dual-process (EC1, EC4)"], "tasks": ["ascending"]}
-    plot = FIGURES["ranking"](shipped, style={"axes.labelsize": 20.0}, **chosen)
-    every = FIGURES["ranking"](shipped, tasks=["ascending"])
-    assert plot.data.method.tolist() == ["cma-es/bandit", "dual-process/EC1"]
-    gaps = every.data.set_index("method").gap
-    assert plot.data.gap.tolist() == gaps[plot.data.method].tolist()
+def test_a_figure_has_chosen_style(shipped, tmp_path):
+    plot = FIGURES["ranking"](shipped, style={"axes.labelsize": 20.0})
     assert plot.figure.axes[0].xaxis.label.get_fontsize() == 20.0
     plot.save(tmp_path / "mine.pdf")
     assert (tmp_path / "mine.pdf").read_bytes().startswith(b"%PDF")
     with pytest.raises(CoarticError, match=r"ends in \.svg, \.pdf, \.png; not in '\.doc'"):
         plot.save(tmp_path / "mine.doc")
-    with pytest.raises(CoarticError, match="unknown method 'cma-es/bandits'.*cma-es/bandit"):
-        FIGURES["ranking"](shipped, methods=["cma-es/bandits"])
 
 
 def test_the_gallery_shows_every_figure():

@@ -25,6 +25,8 @@ def test_a_folder_holds_what_was_published_last(tmp_path):
     (folder / "tables" / "mine.csv").write_text("mine")
     with open(folder / LISTING, "a") as listing:
         listing.write(".\ntables\n")  # no file of ours
+    for left in (folder / ".coartic-123-a.txt", folder / "tables" / ".coartic-9-b.csv"):
+        left.write_text("of a command that was killed")
     publish(folder, {"a.txt": b"4", "of..dots.txt": b"3"})
     publish(folder, {"a.txt": b"4", "d.txt": b"5"})
     mine = {"mine.txt": b"mine", "tables/mine.csv": b"mine"}

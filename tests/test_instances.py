@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coartic.analysis.optima import gap_share
-from coartic.analysis.statistics.instances import other_tasks, task_mean
+from coartic.analysis.statistics import other_tasks, task_mean
 
 
 def width(estimate):

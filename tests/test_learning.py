@@ -275,6 +275,7 @@ LEFT_FIRST = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"
         (SolutionError, "ovement", {"start": "x"}),
         *((ValueError, "seed is", {"seeds": [seed]}) for seed in (-1, 2**128)),
         (ValueError, "seeds has more than 1,000,000 entries", {"seeds": range(10**9)}),
+        (ValueError, "seeds has 3 more than once", {"seeds": [3, 1, 3]}),
         (ValueError, "seeds has more than 20,000 entries",
          {"seeds": itertools.count(), "trials": 10_000}),
         (TypeError, "must be a MotionModel", {"model": None}),
@@ -405,7 +406,7 @@ def assert_same(a, b):
 )
 def test_a_run_is_the_same_whoever_is_beside_it(task, condition, model):
     task = load_task(task)
-    seeds = [*range(SLOTS), 17, *range(SLOTS, SLOTS + 3)]  # more than there are slots, one twice
+    seeds = [*range(SLOTS), 217, *range(SLOTS, SLOTS + 3)]  # more than there are slots
     for trials in (1, np.int64(25)):
         options = {"trials": trials, "model": model}
         together = learn_many(task, condition, seeds=np.uint8(seeds), jobs=1, **options)

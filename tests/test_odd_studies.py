@@ -1,14 +1,16 @@
 """Results that users can have: methods that fail, settings without their method, odd names."""
 
-import numpy as np
+import math
+
+import pandas as pd
 
 from coartic import load_task
+from coartic.analysis import FIGURES, TABLES
 from coartic.analysis.control import with_control
 from coartic.analysis.optima import BestKnown
-from coartic.analysis.report import about
-from coartic.analysis.report.render import shown_columns
-from coartic.analysis.sections import FIGURES, SECTIONS, TABLES
-from coartic.analysis.table import is_setting
+from coartic.analysis.report import sections
+from coartic.analysis.report.sections import SECTIONS
+from coartic.analysis.tables import is_setting, shown_columns
 from tests.support.made_up import runs_of, study_of, study_of_trials
 
 ONE, TWO, THREE = "ascending", "two-armed-1", "two-armed-2"
@@ -41,8 +43,8 @@ def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
         behind([TWO, THREE], "dual-process/EC4", 30, 31, 32),
     )
     table = TABLES["differences"](study)
-    assert (is_setting(table) == (table.against == "mine sigma=0.1")).all()
-    assert 0 < is_setting(table).sum() == len(table) / 2
+    assert (is_setting(study, table) == (table.against == "mine sigma=0.1")).all()
+    assert 0 < is_setting(study, table).sum() == len(table) / 2
 
 
 def test_a_setting_without_its_method_is_drawn():
@@ -55,26 +57,28 @@ def test_a_setting_without_its_method_is_drawn():
     assert [*drawn] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
 
 
-def test_the_sentence_of_the_ranking_is_of_methods_on_the_common_tasks():
-    """An own method that solved more tasks, but others, is not among them."""
+def test_the_sentence_of_the_ranking_is_of_methods_on_all_tasks():
+    """An own method that solved more tasks, but not all, is not among them."""
     methods = "random-search", "hill-climbing", "cma-es/bandit"
     study = planted(
-        *(behind([ONE, TWO], method, 15, 14, 13) for method in methods),
-        behind([ONE, THREE, "descending"], "mine", 15, 14, 13),
+        *(behind([ONE, TWO, THREE], method, 15, 14, 13) for method in methods),
+        behind([ONE, TWO], "mine", 5, 4, 3),
     )
-    (said,) = [line for line in about.finding(study, SECTION["ranking"]) if "trial" in line]
+    (said,) = [line for line in sections.finding(study, SECTION["ranking"]) if "trial" in line]
     assert "hill climbing" in said
     assert "mine" not in said
 
 
-def test_missing_tasks_are_those_without_a_solution_of_every_run():
+def test_a_task_without_a_solution_of_every_run_is_not_solved():
     study = planted(
         *(behind([ONE], method, 10, 11, 12) for method in ("mine", "hill-climbing")),
         *(behind([TWO, THREE], method, 10, 11, None) for method in ("mine", "hill-climbing")),
         behind([ONE, TWO, THREE], "random-search", 15, 14, 13),
     )
-    missing = TABLES["ranking"](study).missing
-    assert missing.to_dict() == {"mine": 2, "hill-climbing": 2, "random-search": 0}
+    assert [*TABLES["ranking"](study).index] == ["random-search"]
+    others = TABLES["not-ranked"](study)
+    assert others.tasks.to_dict() == {"hill-climbing": 1, "mine": 1}
+    assert (others.why == "2 of 9 runs failed").all()
 
 
 def test_names_of_tasks_may_end_as_columns_of_intervals_do():
@@ -87,29 +91,16 @@ def test_names_of_tasks_may_end_as_columns_of_intervals_do():
     study = study_of(rows, tasks, optima={name: BestKnown(-465, -465) for name in names})
     table = TABLES["ranking"]
     frame = table(study)
-    columns = shown_columns(table, frame)
+    columns = shown_columns(table, study, frame)
     assert {f"on {name}" for name in names} <= columns.keys()
     assert columns["on reach"].texts == ["3.2", "1.1"]
-
-
-def test_a_learner_over_all_tasks_has_the_gap_of_its_own_conditions():
-    """EC1 ran on a task with two arms as well, on which EC4 stands for the learner."""
-    study = planted(
-        behind([ONE], "dual-process/EC1", 8, 8),
-        behind([TWO], "dual-process/EC1", 35, 35),
-        behind([TWO], "dual-process/EC4", 5, 5),
-        behind([ONE], "hill-climbing", 8, 8),
-        behind([TWO], "hill-climbing", 5, 5),
-    )
-    gap = TABLES["ranking"](study).gap
-    assert gap["dual-process (EC1, EC4)"] == gap["hill-climbing"]
 
 
 def test_hands_of_many_runs_are_shares_of_those_that_are_executed():
     hands = ["RRRR", "LRLR", "LRLR", "LRLR"] * 500
     study = study_of(runs_of(TWO, "hill-climbing", [-470] * 2000, hands=hands))
-    some = {"LRLR": np.ones(375), "RRRR": np.ones(125)}
-    object.__setattr__(study, "signature_by_hands", lambda *_: some)
+    values = pd.Series([1.0] * 500 + [math.nan] * 1500, study.runs.index)
+    object.__setattr__(study, "signature", lambda *_: values)
     assert [*with_control(study, "first", TWO, "hill-climbing")] == ["LRLR", "RRRR"]
 
 

@@ -1,14 +1,9 @@
 """What a method file's results come from, and what is done when it changes."""
 
-import subprocess
-import sys
-
 import pytest
 
 from coartic.analysis.study import load
-from coartic.benchmarks import own_code
 from coartic.benchmarks.registry import built_in, registry
-from tests.support.processes import python, pythons
 
 METHOD = """
 import numpy as np
@@ -17,18 +12,18 @@ from coartic import Optimiser
 
 class Mine(Optimiser):
     name, title, citation = "mine", "Mine", "none"
+    {more}
 
     def optimise(self, objective, rng):
-        {first}
         x = objective.x0
         while True:
             objective.many(x + {step} * rng.standard_normal((10, objective.dim)))
 """
 
 
-def written(folder, name="mine.py", imports="", first="pass", step="0.1"):
+def written(folder, name="mine.py", imports="", more="", step="0.1"):
     folder.mkdir(parents=True, exist_ok=True)
-    text = METHOD.format(imports=imports, first=first, step=step)
+    text = METHOD.format(imports=imports, more=more, step=step)
     (folder / name).write_text(text, encoding="utf-8")
     return folder / name
 
@@ -47,41 +42,42 @@ def library(tmp_path, monkeypatch):
     return folder / "mylib.py"
 
 
-COUNTS = {
-    "from coartic.baselines.cma_es import CMAES": ["cma-es/bandit"],
-    "import coartic.baselines.cma_es": ["cma-es/bandit"],
-    "import coartic as c\nlearn = c.learn": ["dual-process/EC1"],
-    "from coartic import learn": ["dual-process/EC1"],
-    "from coartic.baselines.trajectory_problem import Instance": ["cma-es/bandit"],
-    "from coartic import load_task": [],
-    "import learn": [],
-}
+@pytest.mark.process
+def test_what_counts_as_the_code_of_a_method(tmp_path):
+    """The file, helpers beside it, declared data and the version, wherever the folder is."""
+    files = {
+        "helper.py": "STEP = 1",
+        "parts/__init__.py": "",
+        "parts/more.py": "RATE = 1",
+        "data": "x = 1",
+    }
+
+    def code(folder, version=1, **changed):
+        for name, text in (files | changed).items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(text, encoding="utf-8")
+        imports = "from helper import STEP\nimport parts.more"
+        return code_of(
+            written(folder, imports=imports, more=f"files, version = ('data',), {version}")
+        )
+
+    first = code(tmp_path / "here")
+    assert code(tmp_path / "elsewhere") == first
+    changes = ("helper.py", "parts/more.py", "data")
+    others = [code(tmp_path / name[:4], **{name: "STEP = RATE = 2"}) for name in changes]
+    others += [code(tmp_path / "new", version=2), code_of(written(tmp_path / "plain"))]
+    assert len({first, *others}) == 6
 
 
 @pytest.mark.process
-def test_versions_of_what_is_built_in_count(tmp_path):
-    """Where a file imports a method, in whatever way; of a helper of methods, all versions do."""
-    files = [written(tmp_path, f"{n}.py", imports) for n, imports in enumerate(COUNTS)]
-    lines = python("-c", RAISE, *map(str, files)).stdout.splitlines()
-    assert dict(zip(COUNTS, map(str.split, lines), strict=True)) == COUNTS
-
-
-RAISE = """
-import sys
-from pathlib import Path
-from coartic.benchmarks.own_code import code_of
-from coartic.benchmarks.registry import built_in
-
-infos = built_in()
-method = infos["hill-climbing"].load()
-for file in map(Path, sys.argv[1:]):
-    before = code_of(method, file)
-    for name in ("cma-es/bandit", "dual-process/EC1"):
-        infos[name].load().version, kept = 9, infos[name].load().version
-        print(name if code_of(method, file) != before else "", end=" ")
-        infos[name].load().version = kept
-    print()
-"""
+def test_helpers_of_one_name_in_two_folders_do_not_mix(tmp_path):
+    for folder, step in (("a", "0.1"), ("b", "0.2")):
+        path = written(tmp_path / folder, imports="import helper", step="helper.STEP")
+        path.write_text(path.read_text("utf-8").replace('"mine"', f'"{folder}"'), "utf-8")
+        (tmp_path / folder / "helper.py").write_text(f"STEP = {step}", encoding="utf-8")
+    both = registry([tmp_path / "a" / "mine.py", tmp_path / "b" / "mine.py"])
+    assert both["a"].code != both["b"].code
+    assert both["a"].code == registry([tmp_path / "a" / "mine.py"])["a"].code
 
 
 @pytest.mark.process
@@ -93,7 +89,6 @@ def test_a_changed_library_makes_runs_again(coartic, tmp_path, library):
                "--method-file", path, "--jobs", 1, "--out", tmp_path / "out")  # fmt: skip
     assert coartic(*command, "--runs", 2)[0] == 0
     before = load(tmp_path / "out").runs
-    assert load(tmp_path / "out").imports == {}  # an editable install counts as files of the user
     library.write_text("STEP = 0.5\n", encoding="utf-8")
     code, text, error = coartic(*command, "--runs", 3)
     assert (code, "reused" in text) == (0, False), text
@@ -103,123 +98,50 @@ def test_a_changed_library_makes_runs_again(coartic, tmp_path, library):
     assert before.reward.tolist() != after.reward.tolist()[:2]
 
 
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Installs a version of package ``tiny-solver``, which is imported as ``tinysolver``."""
+    folder = tmp_path / "site-packages"
+    monkeypatch.syspath_prepend(folder)
+
+    def install(version):
+        for old in folder.glob("*.dist-info"):
+            (old / "METADATA").unlink()
+            old.rename(folder / f"tiny_solver-{version}.dist-info")
+        place = folder / f"tiny_solver-{version}.dist-info"
+        place.mkdir(parents=True, exist_ok=True)
+        (folder / "tinysolver.py").write_text(f"VERSION = {version!r}\n")
+        (place / "METADATA").write_text(f"Name: tiny-solver\nVersion: {version}\n")
+        (place / "RECORD").write_text("tinysolver.py,,\n")
+
+    return install
+
+
 @pytest.mark.process
 @pytest.mark.filterwarnings("default")
-@pytest.mark.usefixtures("library", "unranked", "not_repeated")
-def test_a_file_that_is_loaded_late_is_named(coartic, tmp_path):
-    path = written(tmp_path, first="import mylib as late", step="late.STEP")
+@pytest.mark.usefixtures("unranked", "not_repeated")
+def test_runs_with_another_version_of_an_imported_package_are_marked(coartic, tmp_path, package):
+    """They are used, and the ranking says so."""
+    path = written(tmp_path, imports="import json, tinysolver")
     command = ("run", "paper", "--tasks", "ascending", "--trials", 50, "--methods", "mine",
-               "--method-file", path, "--jobs", 1, "--out", tmp_path / "out",
-               "--runs", 2)  # fmt: skip
-    code, text, error = coartic(*command)
-    assert (code, "reused" in text) == (0, False), error
-    assert error.count("mine: mylib.py was first loaded during a run") == 1
-    assert "import it at the top of the method file" in " ".join(error.split())
-    code, text, error = coartic(*command)
+               "--method-file", path, "--jobs", 1, "--out", tmp_path / "out")  # fmt: skip
+    package("1.0")
+    assert coartic(*command, "--runs", 2)[0] == 0
+    study = load(tmp_path / "out")
+    assert {"tiny-solver 1.0"} < {*study.imports["mine"]}
+    assert study.marks == {}
+    package("1.1")
+    code, text, _ = coartic(*command, "--runs", 3)
     assert (code, "2 reused" in text) == (0, True)
-    assert error.count("mylib.py was first loaded during a run") == 1
-    assert load(tmp_path / "out").methods.title["mine"] == "Mine ‡"
-
-
-def test_packages_that_a_file_imports_are_named_without_those_of_this_project(tmp_path):
-    cma = pytest.importorskip("cma")
-    path = tmp_path / "mine.py"
-    path.write_text("import json, numpy\nfrom cma import fmin2\n", encoding="utf-8")
-    lines = own_code.imported_packages(str(path))
-    assert f"cma {cma.__version__.split()[0]}" in lines
-    assert not [line for line in lines if line.startswith("numpy")]
-
-
-def test_a_file_that_was_removed_or_broken_since_imports_nothing(tmp_path):
-    (tmp_path / "broken.py").write_text("import numba\ndef (", encoding="utf-8")
-    none = own_code.imported_packages(str(tmp_path / "no-module.txt"))
-    for name in ("removed.py", "broken.py"):
-        assert own_code.imported_packages(str(tmp_path / name)) == none
-
-
-SOURCE = '''
-"""A docstring."""
-def words(x, width, who=None):  # a comment
-    a = "one " f"two {x}" " three" u" four" f"{x!r:>{width}}" ""
-    b = f"{{{x}}}" + f"{x=}" + f"{ x = !s:^{width}.{3}}" + f"" + f"{x:}" + rf"\\{x}\\d"
-
-    c = f"""{x
-        } and {'nested ' + f"{width}"} — é
-""" f'\\N{BULLET}{x:%H:%M {{}}}'
-    if x:
-            return a, b"\\x00" b"bytes", c % (who,), f"{x:{'>'}{width}}"
-'''
-SAME = [
-    SOURCE.replace("# a comment", "# another"),
-    SOURCE.replace("\n\n", "\n"),
-    SOURCE.replace("\n\n", "\n    # more\n\n\n"),
-    SOURCE.replace("            return", "      return"),
-]
-OTHER = [
-    SOURCE.replace("{x:}", "{ x:}"),
-    SOURCE.replace("three", "four"),
-    SOURCE.replace("    if x:", "    if not x:"),
-    SOURCE.replace("            return", "            pass\n    return"),
-]
-
-
-def test_what_counts_of_a_python_file(tmp_path):
-    def content(text):
-        (tmp_path / "a.py").write_text(text, encoding="utf-8")
-        return own_code.content_of(str(tmp_path / "a.py"))
-
-    assert {content(text) for text in SAME} == {content(SOURCE)}
-    assert len({content(text) for text in [SOURCE, *OTHER]}) == 1 + len(OTHER)
-    compiled = tmp_path / "a.so"  # counts byte by byte
-    compiled.write_bytes(b"x = 1  # one")
-    assert own_code.content_of(str(compiled)) == b"x = 1  # one"
-
-
-ONLY_CONTENT = """
-import hashlib, importlib.util, re, sys
-source = open(sys.argv[1], encoding="utf-8").read()
-names = tuple(f"def {name}(" for name in ("content_of", "_between"))
-parts = [part.split("\\n\\n\\n")[0] for part in re.split(r"\\n(?=def )", source)]
-code = "\\n".join(part for part in parts if part.startswith(names))
-scope = {}
-exec("import io, tokenize\\nfrom pathlib import Path\\n" + code, scope)
-print(hashlib.sha256(scope["content_of"](sys.argv[2])).hexdigest())
-"""
-
-
-@pytest.mark.process
-@pytest.mark.parametrize("minor", range(11, 16))
-def test_every_version_of_python_reads_the_same_code(minor, tmp_path):
-    """By the two functions that read it, as the others need packages."""
-    (tmp_path / "a.py").write_text(SOURCE, encoding="utf-8")
-    command = ["-I", "-c", ONLY_CONTENT, own_code.__file__, str(tmp_path / "a.py")]
-    here = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=True)
-    for other in (there := pythons().get(minor, [])):
-        done = subprocess.run([other, *command], capture_output=True, text=True, check=False)
-        assert done.stdout == here.stdout, done.stderr
-    if not there:
-        pytest.skip(f"Python 3.{minor} is not installed")
+    study = load(tmp_path / "out")
+    assert study.marks["mine"] == [
+        "mine: runs were made with tiny-solver 1.0; now it has tiny-solver 1.1"
+    ]
+    assert study.methods.title["mine"] == "Mine ‡"
+    assert not any(each.startswith("json") for each in study.imports["mine"])
 
 
 def test_words_in_built_in_code_count_nowhere():
     """A built-in method is known by its versions alone, and they are stated."""
     assert {info.code for info in built_in().values()} == {"1.1", "1.2"}
     assert all(isinstance(info.load().version, int) for info in built_in().values())
-
-
-def test_a_later_parameter_is_left_out_while_it_has_its_default(monkeypatch):
-    """Of what a cell is known by; and it is taken into account where it has another value."""
-    from coartic import load_task
-    from coartic.runs.plan import cell_of
-
-    info, task = built_in()["hill-climbing"], load_task("ascending")
-    before = cell_of(task, info, {})
-    name = next(iter(before.parameters))
-    monkeypatch.setattr(info.load(), "later", frozenset({name}))
-    cell = cell_of(task, info, {})
-    assert name not in cell.parameters
-    assert cell.setting == ""
-    assert info.configure(cell.parameters).parameters == info.configure({}).parameters
-    other = cell_of(task, info, {name: before.parameters[name] * 2})
-    assert other.parameters == before.parameters | {name: before.parameters[name] * 2}
-    assert other.setting.startswith(f"{name}=")

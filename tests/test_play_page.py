@@ -12,7 +12,7 @@ from playwright.sync_api import expect
 
 from coartic import CONDITIONS, Movement, Task, corrective_trial, execute, learn, load_task
 from coartic.analysis import solutions_of
-from coartic.analysis.signatures.context_tests import standardised_posture_difference
+from coartic.analysis.signatures import standardised_posture_difference
 from coartic.motion.solution import hand_sequences, initial_hands
 from coartic.play import page as pages
 from tests.support.strategies import changed, metres_task

@@ -6,7 +6,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
-from coartic.analysis.sections.coarticulation import shared_goal
+from coartic.analysis.control import shared_goal
 from coartic.analysis.study import solved, typical_run
 
 pytestmark = pytest.mark.browser
@@ -34,22 +34,21 @@ IN_SIGHT = """rows => rows.filter(row => row.checkVisibility())
 
 def rows_in_sight(page):
     """All text of each row of the table of methods, and its second cell."""
-    return page.eval_on_selector_all("#table-methods tbody tr", IN_SIGHT)
+    return page.eval_on_selector_all("#T_methods tbody tr", IN_SIGHT)
 
 
 def test_tables_are_searched_sorted_and_unfolded(opened, address):
     page = opened()
-    # A table that is folded opens for a link to a row, and is sorted by its headers.
-    assert not page.locator("#table-methods").is_visible()
-    row = page.locator("#table-methods tbody tr").nth(2).get_attribute("id")
-    page.goto(f"{address}#{row}")
-    assert page.locator(f"#{row}").is_visible()
-    head = page.locator("#table-methods thead button", has_text="reward").first
-    column = page.locator("#table-methods thead th").all_inner_texts()
+    # A table that is folded opens for a link to a cell, and is sorted by its headers.
+    assert not page.locator("#T_methods").is_visible()
+    page.goto(f"{address}#T_methods_row2_col0")
+    assert page.locator("#T_methods_row2_col0").is_visible()
+    head = page.locator("#T_methods thead button", has_text="reward").first
+    column = page.locator("#T_methods thead th").all_inner_texts()
     place = next(k for k, text in enumerate(column) if text.startswith("reward"))
 
     def values():
-        cells = page.locator(f"#table-methods tbody tr td:nth-child({place + 1})")
+        cells = page.locator(f"#T_methods tbody tr td:nth-child({place + 1})")
         return [float(text.split()[0].replace("−", "-")) for text in cells.all_inner_texts()]
 
     for ordered in (sorted(values()), sorted(values(), reverse=True)):
@@ -66,16 +65,17 @@ def test_tables_are_searched_sorted_and_unfolded(opened, address):
 
 def test_a_table_is_copied_for_a_spreadsheet(opened):
     page = opened()
+    page.eval_on_selector_all("details", "all => all.forEach((each) => { each.open = true; })")
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     for row, text in enumerate(("=1", "-x", "@x", "−1.5")):
-        cell = page.locator("#table-ranking tbody tr").nth(row).locator("td").first
+        cell = page.locator("#T_methods tbody tr").nth(row).locator("td").first
         cell.evaluate("(cell, text) => { cell.textContent = text; }", text)
-    page.locator("#table-ranking").locator("xpath=../preceding-sibling::p[1]/button").click()
+    page.locator("#T_methods").locator("xpath=../preceding-sibling::p[1]/button").click()
     page.get_by_text("rows are in the clipboard").wait_for()
     lines = page.evaluate("navigator.clipboard.readText()").split("\n")
     rows = [line.split("\t") for line in lines]
     assert [row[0] for row in rows[1:5]] == ["'=1", "'-x", "'@x", "-1.5"]
-    assert rows[0][1].startswith("gap")
+    assert rows[0][1].startswith("method")
 
 
 def part(page, name):
@@ -118,9 +118,9 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
 
 def test_a_cell_of_the_ranking_opens_its_film_and_says_its_command(opened, traced):
     page = opened()
-    cells = page.locator("#table-ranking .film-of")
+    cells = page.locator("#T_ranking .film-of, #T_not-ranked .film-of")
     assert cells.count() > 5
-    row = page.locator("#table-ranking tr", has=page.get_by_title("row hill-climbing"))
+    row = page.locator("#T_not-ranked tr", has_text="hill climbing")
     row.locator(".film-of").click()
     expect(part(page, "stored")).to_have_value("hill-climbing")
     expect(part(page, "preset").locator("option:checked")).to_have_text("Two-armed 1 †")
@@ -175,5 +175,5 @@ def test_without_scripts_all_is_there(page_without_scripts, address):
     page = page_without_scripts
     page.goto(address)
     assert page.locator(".still svg").is_visible()
-    assert page.locator("#table-methods tbody tr").count() > 8
+    assert page.locator("#T_methods tbody tr").count() > 8
     assert not page.locator("#methods-search").is_visible()

@@ -16,7 +16,7 @@ from coartic import (
     initial_hands,
     load_task,
 )
-from coartic.analysis.sections import TABLES
+from coartic.analysis import TABLES
 from coartic.analysis.study import load
 from coartic.benchmarks import reproduce
 from coartic.benchmarks.pool import Local
@@ -268,20 +268,12 @@ def test_a_folder_of_another_suite_is_refused(results):
         perform(plan, results.folder, executor=InProcess())
 
 
-DOUBTS = {
-    "test/good": "",
-    "test/undrawn": "another seed, so its runs are one: take random numbers from session.rng",
-    "test/random": "another result on ascending with the same seed after another run",
-    "test/remembers": "another result on ascending with the same seed after another run",
-    "test/lucky": "declared not to be stochastic, but another seed gives another result",
-    "test/draws": "",
-}
-
-
 @pytest.mark.usefixtures("in_this_process")
-@pytest.mark.parametrize("name", DOUBTS)
-def test_runs_of_a_method_file_warn_of_what_a_check_would_find(methods, name, tmp_path):
-    """Once for a method, whatever the number of its runs and tasks; the results stay."""
+@pytest.mark.parametrize(
+    ("name", "repeats"), [("test/good", True), ("test/draws", True), ("test/random", False)]
+)
+def test_a_run_of_each_method_of_a_file_is_made_again(methods, name, repeats, tmp_path):
+    """One, whatever the number of its runs and tasks; where it differs, reports have a mark."""
     tasks = [load_task("ascending"), load_task("two-armed-1")]
     plan = planned([cell_on(task, methods[name]) for task in tasks])
     with warnings.catch_warnings(record=True) as said:
@@ -289,29 +281,12 @@ def test_runs_of_a_method_file_warn_of_what_a_check_would_find(methods, name, tm
         progress = perform(plan, tmp_path, executor=InProcess())
         perform(plan, tmp_path, executor=InProcess())  # has nothing to perform
     assert (progress.done, progress.failed) == (progress.total, 0)
-    depends = DOUBTS[name].startswith("another result on")
     study = load(tmp_path)
-    sentence = f"{name}: results depend on earlier runs (seen on ascending)"
-    assert study.marks == ({name: [sentence]} if depends else {})
-    assert study.methods.title[name].endswith(" ‡") == depends
+    marks = [mark for of_method in study.marks.values() for mark in of_method]
+    assert [str(each.message) for each in said] == marks
+    assert len(marks) == (not repeats)
+    assert all(f"{name}: another result when a run was made again" in mark for mark in marks)
+    assert study.methods.title[name].endswith(" ‡") == bool(marks)
     changed = replace(methods[name], code="another")
     perform(planned([cell_on(tasks[0], changed)]), tmp_path, executor=Silent())
     assert load(tmp_path).marks == {}
-    texts = [str(each.message) for each in said]
-    assert len({*texts}) == len(texts)
-    assert any(DOUBTS[name] in text for text in texts) == bool(DOUBTS[name])
-
-
-@pytest.mark.usefixtures("in_this_process")
-@pytest.mark.parametrize(("wall_s", "seeds"), [(60.0, (1, 0)), (60.1, (0,))])
-def test_a_long_run_is_made_again_alone(methods, wall_s, seeds):
-    job = Job(cell_on(load_task("ascending"), methods["test/random"]), 0, (0,))
-    (run,) = score(job, perform_job(job))
-    run = replace(run, outcome=replace(run.outcome, times=Times(wall_s=wall_s)))
-    jobs = reproduce.repeats_of(run)
-    assert tuple(each.numbers for each in jobs) == tuple((seed,) for seed in seeds)
-    repeats = [*reproduce.perform_in_order(jobs)]
-    doubt = next(reproduce.doubts_of(run, repeats))
-    assert doubt == next(reproduce.doubts_of(run, repeats[::-1]))
-    assert ("the same seed after another run (" in doubt) == (len(seeds) == 2)
-    assert "with the same seed" in doubt

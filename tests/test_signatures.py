@@ -11,20 +11,21 @@ import pytest
 from scipy import linalg
 
 from coartic import Movement, corrective_trial, execute, learn, load_task, movements_of
-from coartic.analysis.control import contexts_of_control, mean_excess, with_control
+from coartic.analysis import TABLES, signatures
+from coartic.analysis.control import contexts_of_control, mean_excess, shared_goal, with_control
 from coartic.analysis.methods import EC1, EC3, EC4, RANDOM_SEARCH
-from coartic.analysis.sections import TABLES, coarticulation
-from coartic.analysis.signatures import context_tests, measures
-from coartic.analysis.signatures.context_tests import distance_of_means, permutation_p
-from coartic.analysis.signatures.measures import SIGNATURES, as_in_isolation
-from coartic.analysis.signatures.two_contexts import (
+from coartic.analysis.signatures import (
+    SIGNATURES,
+    Solutions,
     TwoContexts,
+    as_in_isolation,
     context_pairs,
+    distance_of_means,
     motor_equivalence,
     movable,
+    permutation_p,
 )
-from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics.hypotheses import exchange_test, smallest_p
+from coartic.analysis.statistics import exchange_test, smallest_p
 from coartic.benchmarks.planning import plan_suite
 from coartic.robot import HANDS
 from common.writing import control_suite
@@ -50,11 +51,11 @@ def test_standardised_posture_difference_by_hand():
     first = np.array([[0.0, 0.0], [2.0, 0.0]])  # mean (1, 0), squares 2
     second = np.array([[4.0, 3.0], [4.0, 5.0]])  # mean (4, 4), squares 2
     assert distance_of_means(first, second) == 5.0
-    assert context_tests.standardised_posture_difference(first, second) == pytest.approx(
+    assert signatures.standardised_posture_difference(first, second) == pytest.approx(
         5.0 / math.sqrt(4 / 2)
     )
-    assert math.isnan(context_tests.standardised_posture_difference(first[:1], second[:1]))
-    assert math.isnan(context_tests.standardised_posture_difference(first[[0, 0]], second[[1, 1]]))
+    assert math.isnan(signatures.standardised_posture_difference(first[:1], second[:1]))
+    assert math.isnan(signatures.standardised_posture_difference(first[[0, 0]], second[[1, 1]]))
 
 
 def test_the_smallest_p_is_that_of_the_clearest_case():
@@ -99,7 +100,7 @@ def test_more_than_another_by_brute_force():
         for ours, theirs in (zip(*each, strict=True) for each in itertools.product(*both))
     ]
     observed = distance_of_means(*method) - distance_of_means(*other)
-    p = context_tests.beyond_p(method, other, rng(), resamples=20_000)
+    p = signatures.beyond_p(method, other, rng(), resamples=20_000)
     assert p == pytest.approx(2 * np.mean(np.array(excess) >= observed - 1e-12), abs=0.03)
 
 
@@ -108,21 +109,21 @@ def test_drawn_tests_count_what_was_seen():
     near = [*rng(9).standard_normal((2, 30, 2))]
     far = near[0], near[1] + 100.0
     assert permutation_p(*far, rng(), resamples=9) == 0.1
-    assert context_tests.beyond_p(far, near, rng(), resamples=19) == 2 / 20
-    assert context_tests.beyond_p(near, far, rng(), resamples=19) == 1.0
-    assert math.isnan(context_tests.beyond_p((far[0][:1], far[1]), near, rng()))
-    assert context_tests.posture_difference_below(*near, 50.0, rng(), resamples=9) == 0.1
-    assert math.isnan(context_tests.posture_difference_below(near[0][:1], near[1], 1.0, rng()))
+    assert signatures.beyond_p(far, near, rng(), resamples=19) == 2 / 20
+    assert signatures.beyond_p(near, far, rng(), resamples=19) == 1.0
+    assert math.isnan(signatures.beyond_p((far[0][:1], far[1]), near, rng()))
+    assert signatures.posture_difference_below(*near, 50.0, rng(), resamples=9) == 0.1
+    assert math.isnan(signatures.posture_difference_below(near[0][:1], near[1], 1.0, rng()))
 
 
 def test_posture_difference_below_a_bound_by_brute_force():
     first, second = rng(12).standard_normal((3, 2)), rng(13).standard_normal((2, 2)) + 1.5
     reached = [
-        not context_tests.standardised_posture_difference(np.array(a), np.array(b)) < 2.0
+        not signatures.standardised_posture_difference(np.array(a), np.array(b)) < 2.0
         for a in itertools.product(first, repeat=3)
         for b in itertools.product(second, repeat=2)
     ]  # NaN where resamples have no spread: infinitely far
-    p = context_tests.posture_difference_below(first, second, 2.0, rng())
+    p = signatures.posture_difference_below(first, second, 2.0, rng())
     assert 0.1 < p < 0.9
     assert p == pytest.approx(np.mean(reached), abs=0.02)
 
@@ -172,7 +173,7 @@ def test_parts_of_two_contexts():
 
 
 def isolated_ticks(task, q, goal, hand):
-    return measures.isolated_reaches(
+    return signatures.isolated_reaches(
         task, q[None], np.array([goal]), np.array([HANDS.index(hand)])
     )[0]
 
@@ -186,25 +187,25 @@ def test_isolated_reaches_are_the_corrective_process():
     unreachable = changed("ascending", locked_base=["x", "y"])
     assert np.isnan(isolated_ticks(unreachable, unreachable.q0, 3, "right"))
     stays = posed(unreachable, "", [unreachable.q0])
-    assert measures.ticks_slower(stays)[0, 2] == math.inf
+    assert signatures.ticks_slower(stays)[0, 2] == math.inf
     task = tiny_task(goals=[[2.0, 1.0], [4.4, 0.5]], locked_base=["x", "y"],
                      start={"left": [0.5] * 4, "right": [0.5] * 4})  # fmt: skip
     right = Solutions(task, "", (corrective_trial(task, "RR"),))
-    assert measures.ticks_slower(right)[0, 1] == 0  # the left hand cannot hit it
+    assert signatures.ticks_slower(right)[0, 1] == 0  # the left hand cannot hit it
 
 
 def test_what_a_posture_serves():
     """The corrective process itself gains nothing; half the way ahead, half the way is left."""
     task = AS_RELEASED
     initial = corrective_trial(task, "RRRR")
-    assert measures.gain_at_next(Solutions(task, "", (initial,)))[0] == pytest.approx([0, 0, 0])
+    assert signatures.gain_at_next(Solutions(task, "", (initial,)))[0] == pytest.approx([0, 0, 0])
     alone = initial.configurations
     q = alone.copy()
     q[:-1] += 0.5 * np.diff(alone, axis=0)
 
     def gain_of(q, hands="RRRR"):
         run = SimpleNamespace(configurations=q, hands=hands)
-        return measures.gain_at_next(Solutions(task, "", (run,)))[0, 0]
+        return signatures.gain_at_next(Solutions(task, "", (run,)))[0, 0]
 
     left = isolated_ticks(task, q[0], 2, "right")[0]
     gain = isolated_ticks(task, alone[0], 2, "right")[0] - left
@@ -251,14 +252,14 @@ def test_preshaping_is_what_the_idle_arm_moved_since_its_own_hit_or_the_start():
     """The base does not count, nor the posture that an arm's own hit left."""
     task = load_task("two-armed-1")
     initial, run = corrective_trial(task, "RRRR"), corrective_trial(task, "LRLR")
-    np.testing.assert_array_equal(measures.preshaping(task, run, initial)[:3], [0, 0, 0])
+    np.testing.assert_array_equal(signatures.preshaping(task, run, initial)[:3], [0, 0, 0])
     moved = [posture(0.3, left_1=a, left_2=0.4, right_1=b) for a, b in ((0.5, 0.2), (0.8, 0.4))]
     goals = [task.robot.forward_kinematics(q, hand).tolist()
              for q, hand in zip(moved, ("left", "right"), strict=True)]  # fmt: skip
     small = tiny_task(goals=[*goals, [7.0, 3.0]], initial_hands="LRL")
     initial = corrective_trial(small, "LRL")
     run = execute(small, [*movements_of("LR", moved), Movement(3, "left", "corrective")])
-    shares = measures.preshaping(small, run, initial)
+    shares = signatures.preshaping(small, run, initial)
     for k, idle, kept in ((0, "right", small.q0), (1, "left", run.configurations[0])):
         held, joints = run.configurations[k].copy(), small.robot.joints(idle)
         held[joints] = kept[joints]
@@ -312,7 +313,7 @@ def test_verdicts_on_postures_at_a_shared_goal(method, difference, runs, verdict
     study = study_of_solutions(cells, deterministic=["plan"])
     of_control = study.runs.method == RANDOM_SEARCH
     study.runs["trials"] = np.where(of_control, planted["trials"], 10 * (method == EC1))
-    contexts = coarticulation.shared_goal(study)
+    contexts = shared_goal(study)
     assert contexts.method == method
     rows = TABLES["contexts"](study)
     assert rows.verdict[rows.method == method].tolist() == [verdict]

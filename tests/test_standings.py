@@ -1,42 +1,50 @@
 """How far methods end from the optimum, who is ahead, and what it costs: by hand."""
 
 import math
+import pickle
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from coartic.analysis import standings
-from coartic.analysis.method_frame import (
+from coartic import CoarticError
+from coartic.analysis import FIGURES, TABLES, ranking, running_times, standings, tables
+from coartic.analysis.methods import (
     BY_TRIAL,
     WITHOUT_REWARD,
     headline_methods,
     methods_of,
 )
-from coartic.analysis.report import about, render
-from coartic.analysis.report.render import shown_columns
-from coartic.analysis.sections import FIGURES, SECTIONS, TABLES, costs
-from coartic.analysis.statistics import running_times
-from coartic.analysis.statistics.hypotheses import holm, stratified_test
+from coartic.analysis.report import sections
+from coartic.analysis.report.sections import SECTIONS
+from coartic.analysis.statistics import holm, stratified_test
 from coartic.analysis.study import Study
+from coartic.analysis.tables import shown_columns
 from coartic.analysis.words import number
 from coartic.cli.read import say_ranking
+from coartic.runs.shipped import open_shipped
 from tests.support.made_up import MadeUp, made_up_optima, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
 from tests.support.processes import ROOT
 
-EC1 = "dual-process/EC1"
+EC1, BOTH = "dual-process/EC1", "dual-process (EC1, EC4)"
 LEARNER = {("ascending", EC1): [-300, -301, -302, -303],
            ("two-armed-1", "dual-process/EC4"): [-480, -481, -482, -483]}  # fmt: skip
 CMA = {("ascending", "cma-es/bandit"): [-293, -294, -293, -294],
        ("two-armed-1", "cma-es/bandit"): [-466, -467, -468, -466]}  # fmt: skip
 
 
-def test_the_learner_is_joined_with_each_form():
+def test_conditions_for_one_arm_and_for_two_are_ranked_as_one():
+    """EC1 with EC4, or with EC3 where EC4 did not run; EC1 alone if it ran on both tasks itself."""
     better = {("two-armed-1", "dual-process/EC3"): [-470, -471, -470, -471]}
-    seen = study(LEARNER | better)
-    assert standings.board(seen).index[0] == "dual-process (EC1, EC3)"
+    rows = standings.standings(study(LEARNER | better))
+    assert rows.why.to_dict() == {BOTH: "", "dual-process/EC3": "1 of 2 tasks"}
+    without = {cell: of for cell, of in LEARNER.items() if cell[1] == EC1} | better
+    assert standings.standings(study(without)).why.to_dict() == {"dual-process (EC1, EC3)": ""}
+    alone = standings.standings(study(LEARNER | {("two-armed-1", EC1): [-500] * 4}))
+    assert alone.why.to_dict() == {EC1: "", "dual-process/EC4": "1 of 2 tasks"}
 
 
 def test_a_method_that_makes_one_trial_does_not_use_its_reward():
@@ -47,7 +55,7 @@ def test_a_method_that_makes_one_trial_does_not_use_its_reward():
     alone.runs.loc[alone.runs.method == "corrective-alone/given", "trials"] = 1
     again = MadeUp(alone, optima=made_up_optima("ascending", "two-armed-1"))
     assert again.methods.information["corrective-alone/given"] == WITHOUT_REWARD
-    assert again.methods.information["dual-process (EC1, EC4)"] == BY_TRIAL
+    assert again.methods.information[BOTH] == BY_TRIAL
 
 
 def test_the_interval_of_a_share_by_brute_force():
@@ -73,7 +81,7 @@ def test_a_failed_run_reaches_nothing():
     assert (failed["method"], failed["failed"]) == (other, 2)
     assert failed["reasons"] == "2 × time limit"
     assert TABLES["runtimes"](seen).reached[other] == pytest.approx(2 / 4 * 10 / 20)
-    times = costs.times_of(seen, "ascending", other, "solve_s")
+    times = running_times.times_of(seen, "ascending", other, "solve_s")
     assert np.isfinite(times).sum(axis=1).tolist() == [10, 0, 0]
 
 
@@ -91,14 +99,12 @@ def strangers(*methods, runs):
     }
 
 
-def test_a_method_from_a_file_changes_nobody_elses_p():
-    """Holm's correction is over one method's tasks, and a difference to the best is one test."""
+def test_better_and_worse_are_of_one_methods_tests():
+    """Holm's correction is over one method's tasks, so that other methods change nothing."""
     alone = study(TEN | strangers(("mine", 2), runs=10))
     beside = study(TEN | strangers(("mine", 2), ("yours", 3), ("theirs", 0), runs=10))
-    mine = TABLES["against-learner"](alone).loc[["ascending mine", "two-armed-1 mine"]]
-    again = TABLES["against-learner"](beside).loc[mine.index]
-    assert mine.p_holm.tolist() == again.p_holm.tolist()
-    assert (mine.p_holm < 0.05).all()
+    for seen in (alone, beside):
+        assert TABLES["ranking"](seen).loc["mine", ["better", "worse"]].tolist() == [2, 0]
     unsure = {(task, "unsure"): [reward + 9, reward - 8] * 5
               for task, reward in (("ascending", -303), ("two-armed-1", -485))}  # fmt: skip
     row_of = TABLES["ranking"](study(TEN | unsure)).loc["unsure"]
@@ -113,8 +119,6 @@ def test_a_test_that_cannot_reject_counts_nothing(runs):
     plan = {(task, "my-plan"): [reward] for task, reward in
             (("ascending", -293), ("two-armed-1", -466))}  # fmt: skip
     seen = study(few | plan, deterministic=["my-plan"])
-    rows = TABLES["against-learner"](seen)
-    assert rows.least_p["ascending my-plan"] == pytest.approx(2 / 2**runs)
     row_of = TABLES["ranking"](seen).loc["my-plan"]
     expected = (2, 0) if runs == 10 else (math.nan, math.nan)
     assert (row_of.better, row_of.worse) == pytest.approx(expected, nan_ok=True)
@@ -127,11 +131,11 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     larger = [task.model_copy(update={"radius": 0.11}) for task in seen.tasks.values()]
     unknown = study_of(seen.runs.assign(commit=""), larger)
     ranked = TABLES["ranking"](unknown)
-    gaps = {"mine": [3.5 / 293, 15 / 480], "dual-process (EC1, EC4)": [8.5 / 293, 1.5 / 480]}
+    gaps = {"mine": [3.5 / 293, 15 / 480], BOTH: [8.5 / 293, 1.5 / 480]}
     for method, of_method in gaps.items():
         assert ranked.gap[method] == pytest.approx(sum(of_method) / 2)
-    columns = shown_columns(TABLES["ranking"], ranked)
-    headings = {name: column.header for name, column in columns.items()}
+    columns = shown_columns(TABLES["ranking"], unknown, ranked)
+    headings = {name: column.heading for name, column in columns.items()}
     assert headings["gap"].startswith("gap to the best of this folder (%)")
     for words in (*said(unknown, "ranking"), FIGURES["ranking"](unknown).alt, *headings.values()):
         assert not re.search("optimum|known", words)
@@ -159,16 +163,31 @@ def test_the_ranking_figure_has_every_name_gap_and_interval():
 ON_ONE = {("ascending", "mine"): [-300, -301, -302]}
 
 
-def test_what_a_method_did_not_run_on_leaves_it_its_gap_there():
-    seen = study(LEARNER | CMA | ON_ONE)
-    ranked = TABLES["ranking"](seen)
-    assert ranked.index.tolist()[:2] == ["cma-es/bandit", "dual-process (EC1, EC4)"]
-    assert ranked.gap["mine"] == pytest.approx(9 / 292)
-    assert ranked.tasks[["cma-es/bandit", "mine"]].tolist() == [2, 1]
-    assert ranked.ranked[["cma-es/bandit", "mine"]].tolist() == [True, False]
+def test_ranked_is_who_solved_all_tasks():
+    """The others have a reason, and their gaps on single tasks."""
+    failed = {("ascending", "failed"): [-292] * 3, ("two-armed-1", "failed"): [-465, None, None]}
+    seen = study(LEARNER | CMA | ON_ONE | failed)
+    assert TABLES["ranking"](seen).index.tolist() == ["cma-es/bandit", BOTH]
+    others = TABLES["not-ranked"](seen)
+    why = {"mine": "1 of 2 tasks", "failed": "2 of 6 runs failed"}
+    assert others.why.to_dict() == why
+    assert others["on ascending"].to_dict() == pytest.approx({"mine": 9 / 292, "failed": 0})
+    assert others.gap.isna().all()
     (axes,) = FIGURES["ranking"](seen).figure.axes
-    assert "mine (1 of 2 tasks)" in [text.get_text() for text in axes.get_yticklabels()]
-    assert TABLES["runtimes"](seen).tasks[["mine", "cma-es/bandit"]].tolist() == [1, 2]
+    assert {text.get_text() for text in axes.get_yticklabels()} >= {"CMA-ES", "learner (EC1, EC4)"}
+    assert not {text.get_text() for text in axes.get_yticklabels()} & {*why}
+    assert {*TABLES["runtimes"](seen).index} == {"cma-es/bandit", BOTH, "failed"}
+    ranked = ranking(seen.runs)
+    assert ranked.gap.dropna().to_dict() == TABLES["ranking"](seen).gap.to_dict()
+    assert ranked.why[ranked.why != ""].to_dict() == why
+
+
+def test_equal_gaps_are_a_tie():
+    same = {(task, name): rewards for (task, _), rewards in CMA.items()
+            for name in ("cma-es/bandit", "hill-climbing")}  # fmt: skip
+    (line,) = said(study(same), "ranking")
+    assert "the smallest" not in line
+    assert "place" not in line
 
 
 def with_trials(seen, by_method, suite_trials=None):
@@ -181,87 +200,84 @@ def with_trials(seen, by_method, suite_trials=None):
         plan.append(replace(job, cell=cell, suite_trials=suite_trials))
     optima = made_up_optima("ascending", "two-armed-1")
     parts = {"optima": optima, "rewards": lambda: iter(())}
-    runs = seen.runs.assign(trials=seen.runs.method.map(by_method).fillna(10).astype(int))
+    runs = seen.stored.assign(trials=seen.stored.method.map(by_method).fillna(10).astype(int))
     return MadeUp(Study(seen.folder, plan, seen.made_with, runs), **parts)
 
 
-SIXTEEN = [
-    "cma-es/bandit", "cma-es/goal-by-goal", "hill-climbing", "random-search",
-    "corrective-alone/given", "corrective-alone/best-hands", "posture-qp/goals-ahead",
-    "posture-qp/current-goal", "posture-based/two-goals", "posture-based/one-goal",
-    "nullspace-qp/next-goal-posture", "nullspace-qp/least-motion",
-    *(f"trajectory-optimisation/{each}" for each in ("path-length", "acceleration", "jerk")),
-    "trajectory-optimisation/hand-jerk",
-]  # fmt: skip
 BEST = {("ascending", "mine"): [-292] * 3, ("two-armed-1", "mine"): [-465] * 3}
 
 
 @pytest.mark.parametrize(
-    ("trials", "by_suite", "equal", "is_ranked"),
+    ("trials", "by_suite", "budget", "why"),
     [
-        ({"mine": 40}, None, 10, False),
-        ({"mine": 40}, 10, 10, False),
-        ({"mine": 40}, 40, 40, True),  # which the suite asks for
-        ({"mine": 40, "cma-es/bandit": 40}, 99, 40, True),  # most algorithms have it
-        ({"mine": 4}, None, 10, True),
-        ({}, None, 10, True),
+        ({"mine": 40}, None, 10, "40 trials, not 10"),
+        ({"mine": 40}, 10, 10, "40 trials, not 10"),
+        ({"mine": 40}, 40, 40, ""),  # which the suite asks for
+        ({"mine": 40, "cma-es/bandit": 40}, 99, 40, ""),  # most algorithms have it
+        ({"mine": 4}, None, 10, "4 trials, not 10"),
+        ({"mine": 0}, None, 10, ""),  # without trials
+        ({}, None, 10, ""),
     ],
 )
-def test_a_method_with_more_trials_stands_below(trials, by_suite, equal, is_ranked):
+def test_methods_are_ranked_with_equal_trials(trials, by_suite, budget, why):
     seen = with_trials(study(LEARNER | CMA | BEST), trials, by_suite)
-    assert standings.equal_trials(seen) == equal
-    board = standings.board(seen)
-    assert board.ranked["mine"] == is_ranked
-    assert board.index.tolist().index("mine") == (0 if is_ranked else len(board) - 1)
-    assert TABLES["ranking"](seen).index[0] == board.index[0]
-    unlike = {name for name in board.index if trials.get(name, 10) != equal}
-    unlike |= {"dual-process (EC1, EC4)"} if equal != 10 else set()
-    named = {name for name in board.index if "trials)" in standings.shown_name(seen, name)}
-    assert named == unlike
-    first, *others = said(seen, "ranking")
-    assert ("not with equal trials" in first) == bool(unlike)
-    assert ("mine leaves" in first.replace(" (4 trials)", "")) == is_ranked
-    below = "mine 0.0 % is not ranked: 40 trials, not 10; on these CMA-ES has"
-    assert any(each.replace("\xa0", " ").startswith(below) for each in others) != is_ranked
+    assert standings.ranking_budget(seen) == budget
+    rows = standings.standings(seen)
+    assert rows.why["mine"] == why
+    assert rows.gap["mine"] == 0  # of all tasks, with whatever trials
+    unlike = {name for name in rows.index if trials.get(name, 10) not in (budget, 0)}
+    assert {*TABLES["not-ranked"](seen).index} == unlike
+    assert any("mine leaves" in line for line in said(seen, "ranking")) == (not why)
 
 
-def test_what_is_not_ranked_is_compared_on_the_tasks_of_its_gap():
-    """CMA-ES and mine ran on a third task, which is not compared."""
-    climbing = {(task, "hill-climbing"): [-490] * 3 for task, _ in CMA}
-    third = {("two-armed-2", "cma-es/bandit"): [-612] * 3, ("two-armed-2", "mine"): [-306] * 3}
-    seen = with_trials(study(LEARNER | CMA | climbing | BEST | third), {"mine": 40})
-    seen = MadeUp(seen, optima=made_up_optima("ascending", "two-armed-1", "two-armed-2"))
-    assert standings.common_tasks(seen) == ("ascending", "two-armed-1")
-    (sentence,) = standings.not_ranked(seen)
-    assert sentence.endswith("on these CMA-ES has 0.4 %.")
+def test_two_budgets_are_refused_in_a_frame():
+    seen = with_trials(study(LEARNER | CMA | BEST), {"mine": 40, "cma-es/bandit": 0})
+    with pytest.raises(CoarticError, match="10 and 40 trials.*budget == 10"):
+        ranking(seen.runs)
+    frame = seen.runs
+    ranked = ranking(frame[frame.budget.isna() | (frame.budget == 10)])
+    assert ranked.index.tolist() == ["cma-es/bandit", BOTH]
+    assert (ranked.why == "").all()
 
 
-def test_what_was_asked_for_has_a_row_below():
-    seen = study(LEARNER | CMA)
-    also = frozenset({"dual-process/EC4"})
-    assert "dual-process/EC4" not in standings.board(seen).index
-    board = standings.board(seen, also)
-    assert not board.ranked["dual-process/EC4"]
-    assert board.index[-1] == "dual-process/EC4"
-    (sentence,) = standings.not_ranked(seen, also)
-    assert "is not ranked: 1 of 2 tasks; on it CMA-ES has" in sentence
+def test_a_study_of_numbers_of_trials_is_ranked_whole():
+    settings = "trials=10", "trials=40"
+    seen = with_settings(*settings)
+    assert standings.ranking_budget(seen) is None
+    rows = TABLES["ranking"](seen)
+    assert rows.index.tolist() == [f"{EC1} {setting}" for setting in settings[::-1]]
 
 
-def test_the_terminal_prints_every_ranked_method(capsys, tmp_path):
-    rewards = {
-        (task, name): [first - n, first - 1 - n, first - 2 - n]
-        for n, name in enumerate(SIXTEEN)
-        for task, first in (("ascending", -300), ("two-armed-1", -500))
-    }
-    last = {("ascending", "mine"): [-319] * 3, ("two-armed-1", "mine"): [-600] * 3}
-    rows = [run | {"commit": ""} for cell, of in (rewards | LEARNER | last).items()
+@pytest.mark.parametrize("suite", ["comparison", "families"])
+def test_the_frame_of_shipped_runs_ranks_methods_on_all_tasks(suite):
+    with open_shipped(suite) as store:
+        seen = Study(Path(suite), store.plan(), store.made_with(), store.runs())
+    runs = seen.runs[~seen.runs.method.str.startswith("optimum")]
+    ranked, tasks = ranking(runs), runs.task.nunique()
+    ran = runs.groupby("ranked_as").task.nunique()
+    complete = {*ran.index[ran == tasks]}
+    assert 0 < len(complete) < len(ran)
+    assert {*ranked.index[ranked.why == ""]} == complete
+    assert ranked.gap.notna().sum() == len(complete)
+
+
+def test_the_terminal_prints_every_method_that_was_asked_for(capsys, tmp_path):
+    """Each in the ranking, or with the reason why it is not there."""
+    names = ["cma-es/bandit", "random-search", "posture-qp/goals-ahead", "last"]
+    rewards = {(task, name): [best - n] * 3 for n, name in enumerate(names)
+               for task, best in (("ascending", -300), ("two-armed-1", -500))}  # fmt: skip
+    rows = [{**run, "commit": ""} for cell, of in (rewards | LEARNER | ON_ONE).items()
             for run in runs_of(*cell, of)]  # fmt: skip
+    rows += runs_of("ascending", "hill-climbing", [-300] * 3, setting="width=0.2", commit="")
+    rows += runs_of("ascending", "hill-climbing", [None] * 3, setting="width=0.3", commit="")
     seen = study_of(rows, optima=made_up_optima("ascending", "two-armed-1"))
-    say_ranking(seen, [], tmp_path)
-    printed = [line.partition("  ")[0] for line in capsys.readouterr().out.splitlines()]
-    ranked = standings.board(seen).query("ranked")
-    assert printed[1 : len(ranked) + 1] == ranked.title.tolist()
-    assert len(ranked) > len(SIXTEEN)
+    say_ranking(seen, tmp_path)
+    printed = capsys.readouterr().out
+    ranked = [line.partition("  ")[0] for line in printed.splitlines()[1:6]]
+    assert ranked == seen.methods.title[TABLES["ranking"](seen).index].tolist()
+    reasons = dict(re.findall(r"Not ranked +(.+?): ((?:.|\n {3})+)", printed))
+    assert " ".join(reasons["1 of 2 tasks"].split()) == "hill climbing (width=0.2); mine"
+    assert reasons["1 of 2 tasks; 3 of 3 runs failed"] == "hill climbing (width=0.3)"
 
 
 def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
@@ -279,7 +295,7 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert rows.difference.tolist() == pytest.approx(differences)
     assert math.isnan(rows.difference_low.iloc[0])  # of two runs there is no interval
     assert (rows.tasks == 1).all()
-    texts = render.shown_columns(table, rows)["difference"].texts
+    texts = shown_columns(table, seen, rows)["difference"].texts
     assert texts[0] == number(100 * rows.difference.iloc[0], 1)  # per cent, as the gaps
     assert "positive: this method is better" in table.caption
     better = TABLES["differences"](study(TEN | strangers(("mine", 2), runs=10)))
@@ -288,26 +304,32 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert same.difference_low.iloc[0] < 0  # runs with the same seeds are not matched
 
 
-def test_a_method_that_stops_early_or_solves_nothing_says_so():
+def test_a_method_that_stops_early_says_so_in_a_note():
     rows = [
-        *(run for cell, of in TEN.items() for run in runs_of(*cell, of)),
+        *(run for cell, of in CMA.items() for run in runs_of(*cell, of)),
         *runs_of("ascending", "early", [-305] * 3, trials=[3, 2, 3]),
-        *runs_of("ascending", "never", [None] * 3),
+        *runs_of("two-armed-1", "early", [-505] * 3, trials=[3, 2, 3]),
     ]
-    seen = study_of(rows, optima=made_up_optima("ascending", "two-armed-1"))
-    early = standings.shown_name(seen, "early")
-    assert "at most 3 of 10 trials" in early
-    assert f"{early} against built-in methods" in " ".join(said(seen, "ranking"))
-    sentences = standings.not_ranked(seen)
-    assert "never is not ranked: 0 of 2 tasks, 3 failed runs." in sentences
+    seen = with_trials(study_of(rows), {})
+    runs = seen.stored.assign(trials=[run["trials"] for run in rows])
+    seen = MadeUp(
+        Study(seen.folder, seen.plan, seen.made_with, runs),
+        optima=seen.optima,
+        rewards=seen.rewards,
+    )
+    assert TABLES["ranking"](seen).note.to_dict() == {
+        "cma-es/bandit": "",
+        "early": "made 3 of 10 trials",
+    }
 
 
-def test_a_run_that_failed_after_some_trials_has_no_early_gap():
+def test_a_run_without_a_solution_by_then_leaves_no_early_gap():
     rows = [
         *runs_of("ascending", "hill-climbing", [-300, -301, -302]),
-        *runs_of("ascending", "mine", [-300, -301, None]),
+        *runs_of("ascending", "mine", [-300, -301, -302]),
     ]
     rewards = {row["run_id"]: np.array([-310.0, -305.0]) for row in rows}
+    rewards[rows[-1]["run_id"]] = np.append(np.full(1_000, np.nan), -302)
     seen = study_of(rows, optima=made_up_optima("ascending"), rewards=lambda: iter(rewards.items()))
     early = TABLES["ranking"](seen).gap_early
     assert early["hill-climbing"] == pytest.approx((305 - 292) / 292)
@@ -319,7 +341,7 @@ def test_all_methods_are_compared_with_a_method_of_choice():
     plan = {("ascending", "corrective-alone/given"): [-319],
             ("two-armed-1", "corrective-alone/given"): [-675]}  # fmt: skip
     seen = study(TEN | CMA | plan | strangers(("a", 2), ("b", 0), runs=10))
-    others = {"b", "cma-es/bandit", "corrective-alone/given", "dual-process (EC1, EC4)"}
+    others = {"b", "cma-es/bandit", "corrective-alone/given", BOTH}
     with_a, with_b = (
         TABLES["differences"](MadeUp(seen, against=each, optima=seen.optima)) for each in "ab"
     )
@@ -358,23 +380,20 @@ def with_settings(*settings, tasks=("ascending",), more=()):
     return study_of([*rows, *more], optima=made_up_optima(*tasks))
 
 
-def test_settings_stand_behind_their_method_in_the_ranking():
-    """Behind its defaults, though their gaps are smaller, and each with its interval."""
-    between = runs_of("ascending", "hill-climbing", [-499] * 3)
-    seen = with_settings("", "noise_sd=0.1", "noise_sd=0.2", more=between)
-    ranked = TABLES["ranking"](seen)
-    settings = [f"{EC1} noise_sd=0.2", f"{EC1} noise_sd=0.1"]
-    assert ranked.index.tolist() == ["hill-climbing", EC1, *settings]
-    of_settings = ranked.loc[settings]
-    means = [1480 / 3, 1492 / 3]
-    assert of_settings.gap.tolist() == pytest.approx([(mean - 292) / 292 for mean in means])
-    assert (of_settings.gap_low < of_settings.gap_high).all()
+def test_settings_are_ranked_as_methods_are():
+    between = runs_of("ascending", "hill-climbing", [-494] * 3)
     own = [run for at in ("", "width=0.2") for run in runs_of("ascending", "mine", [-510] * 3,
                                                                setting=at)]  # fmt: skip
-    with_own = TABLES["ranking"](with_settings("", "noise_sd=0.1", more=own))
-    folded = dict(zip(with_own.index, render.classes_of(TABLES["ranking"], with_own), strict=True))
-    assert folded == {EC1: "", f"{EC1} noise_sd=0.1": "setting", "mine": "own",
-                      "mine width=0.2": "own"}  # fmt: skip
+    seen = with_settings("", "noise_sd=0.1", "noise_sd=0.2", more=[*between, *own])
+    ranked = TABLES["ranking"](seen)
+    settings = [f"{EC1} noise_sd=0.2", "hill-climbing", f"{EC1} noise_sd=0.1", EC1]
+    assert ranked.index.tolist() == [*settings, "mine", "mine width=0.2"]
+    means = [1480 / 3, 494, 1492 / 3]
+    assert ranked.gap.tolist()[:3] == pytest.approx([(mean - 292) / 292 for mean in means])
+    assert (ranked.gap_low < ranked.gap_high)[settings[::2]].all()
+    page = tables.html_of(TABLES["ranking"], seen, ranked)
+    bold = re.findall(r'row(\d+) col0 own text"', page)
+    assert ranked.index[[*map(int, bold)]].tolist() == ["mine", "mine width=0.2"]
 
 
 def test_a_title_that_another_method_has_is_not_taken():
@@ -387,10 +406,10 @@ def test_a_title_that_another_method_has_is_not_taken():
     assert shown[names].tolist() == ["CMA-ES", "mine", "Steps", "his", "hers"]
 
 
-def test_common_tasks_have_the_order_of_the_study():
+def test_ranked_tasks_have_the_order_of_the_study():
     """Tests draw signs by position: the order of a set would change p from run to run."""
     tasks = "two-armed-2", "ascending", "two-armed-1"
-    assert standings.common_tasks(with_settings("", "noise_sd=0.1", tasks=tasks)) == tasks
+    assert standings.ranked_tasks(with_settings("", "noise_sd=0.1", tasks=tasks)) == tasks
 
 
 def test_learners_over_all_tasks_stand_for_their_conditions():
@@ -404,8 +423,8 @@ def test_learners_over_all_tasks_stand_for_their_conditions():
         for task, label in (("ascending", one), ("two-armed-1", two))
     }
     learned = study(rewards)
-    together = ["dual-process (EC1, EC4)", "dual-process (EC1-informed, EC4-informed)"]
-    assert headline_methods(learned.methods) == together
+    together = [BOTH, "dual-process (EC1-informed, EC4-informed)"]
+    assert headline_methods(learned.methods.loc[learned.runs.ranked_as.unique()]) == together
     titles = ["learner (EC1, EC4)", "informed learner (EC1, EC4)"]
     assert learned.methods.title[together].tolist() == titles
     both = study({("two-armed-1", label): [-400, -401, -402] for label in learner})
@@ -439,10 +458,18 @@ GOLDEN = (ROOT / "tests" / "golden.md").read_text("utf-8")
 
 def said(seen, section):
     """The sentence of a section, its lines."""
-    return about.finding(seen, next(each for each in SECTIONS if each.id == section))
+    return sections.finding(seen, next(each for each in SECTIONS if each.id == section))
 
 
 @pytest.mark.parametrize("name", SENTENCES)
 def test_sentences_are_those_of_the_golden_page(name):
     lines = "\n".join(said(SENTENCES[name](), name.partition(":")[0]))
     assert f"## {name}\n\n{lines}\n\n## " in f"{GOLDEN}\n## "
+
+
+def test_a_study_pickles_with_what_was_asked_of_it(traced):
+    """As other libraries send it to their workers."""
+    before = TABLES["ranking"](traced)
+    copy = pickle.loads(pickle.dumps(traced))
+    assert copy.runs.equals(traced.runs)
+    assert TABLES["ranking"](copy).equals(before)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from coartic import estimates as statistics
-from coartic.analysis.statistics import hypotheses
+from coartic.analysis import statistics as hypotheses
 
 
 def studentised(x, y=(0.0,)):

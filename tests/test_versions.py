@@ -1,49 +1,63 @@
-"""Versions of built-in methods: folders of version 4.0.0, whose runs have hashes, and later."""
+"""Versions of built-in methods, and the shipped runs of each."""
 
-import lzma
-import sqlite3
-from contextlib import closing
+from dataclasses import replace
 
 import check_shipped
 import pytest
+from pydantic import create_model
 
 from coartic import CoarticError, execute, load_task
 from coartic.analysis.study import load
-from coartic.analysis.verify import check_runs
 from coartic.benchmarks.include import include_folders
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in
-from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again
+from coartic.benchmarks.reproduce import compare_runs, perform_runs_again
 from coartic.benchmarks.runner import perform
 from coartic.method import run_method
-from coartic.runs.method_info import run_identity, version_of
+from coartic.runs.method_info import BUILT_IN, answer, method_info
+from coartic.runs.plan import Cell, cell_of
 from coartic.runs.record import PARTS
-from coartic.runs.store import RUNS_FILE, open_store, writing
+from coartic.runs.shipped import open_shipped
+from coartic.runs.store import open_store
 from tests.support.processes import python
-from tests.support.suites import ROOT, InProcess
+from tests.support.suites import InProcess, cell_on, planned, run_and_write
 
 TASK = load_task("two-armed-2")
-SAME = ["dual-process/EC1", "random-search", "hill-climbing", "corrective-alone/given"]
-CHANGED = ["cma-es/bandit", "posture-qp/current-goal"]
-"""Methods whose versions are 1.2 since version 5.0.0."""
+EC1 = built_in()["dual-process/EC1"]
+SMALL = {"runs": 3, "trials": 30}
 
 
 @pytest.fixture
 def old(tmp_path):
-    """A folder as version 4.0.0 left it."""
-    folder = tmp_path / "old"
-    folder.mkdir()
-    packed = (ROOT / "tests" / "folders" / "of_4_0_0.sqlite.xz").read_bytes()
-    (folder / RUNS_FILE).write_bytes(lzma.decompress(packed))
-    return folder
+    """A folder of runs by another version of a method."""
+    before = cell_on(load_task("ascending"), replace(EC1, code="1.0"))
+    return run_and_write(tmp_path / "old", [before], **SMALL).folder
 
 
-def planned(methods=(*SAME, *CHANGED), runs=3):
-    return plan_suite("comparison", tasks=["ascending"], methods=methods, runs=runs, trials=200)
+def test_runs_of_another_version_are_kept_and_made_again(old, coartic, in_this_process):
+    before = load(old).runs
+    now = planned([cell_on(load_task("ascending"), EC1)], **SMALL)
+    progress = perform(now, old, executor=InProcess())
+    assert (progress.present, progress.done) == (0, 3)
+    assert dict(progress.stale) == {(EC1.name, "1.0", EC1.code): 3}
+    after = load(old).runs
+    assert after.reward.tolist() == before.reward.tolist()
+    assert {run_id[:16] for run_id in after.run_id} == {run_id[:16] for run_id in before.run_id}
+    text = coartic("verify", old, "--run", before.run_id[0])[1]
+    assert f"Another version of the method made the run (1.0; here is {EC1.code})." in text
+    assert "1 run performed again: none with another result" in text
 
 
-def performed(folder, methods=(*SAME, *CHANGED), runs=3):
-    return perform(planned(methods, runs), folder, executor=InProcess())
+def test_runs_of_another_version_are_included_as_they_are_or_not_at_all(old, tmp_path):
+    def asked(runs):
+        return planned([cell_on(load_task("ascending"), EC1)], **SMALL | {"runs": runs})
+
+    joined = include_folders(asked(3), [old], tmp_path / "all")
+    assert perform(joined, tmp_path / "all", executor=InProcess()).done == 0
+    assert {*load(tmp_path / "all").runs.code} == {"1.0"}
+    words = f"version 1.0 in .*old and version {EC1.code} in this command: leave it out"
+    with pytest.raises(CoarticError, match=words):
+        include_folders(asked(4), [old], tmp_path / "more")
 
 
 def runs_of(folder):
@@ -52,81 +66,37 @@ def runs_of(folder):
         return [store.run(run_id) for run_id in sorted(store.ids())]
 
 
-def numbers(study, methods=SAME):
-    """What runs of some methods came to, by method and number."""
-    runs = study.runs[study.runs.method.isin(methods)].sort_values(["method", "run"])
-    return runs[["method", "run", "seed", "reward", "hands", "result"]].to_numpy().tolist()
+def test_ids_are_those_of_the_shipped_runs():
+    with open_shipped("comparison") as store:
+        shipped = store.plan()
+    planned_now = {job.cell.digest for job in plan_suite("comparison")}
+    assert planned_now == {job.cell.digest for job in shipped}
 
 
-def test_a_folder_of_4_0_0_is_resumed(old):
-    before = load(old)
-    assert {version_of(code) for code in before.runs.code} == {"1.1"}
-    progress = performed(old, runs=4)
-    assert (progress.present, progress.done) == (3 * 3 + 1, 3 + 4 + 1)
-    assert dict(progress.stale) == {
-        ("cma-es/bandit", "1.1", "1.2"): 3,
-        ("posture-qp/current-goal", "1.1", "1.2"): 1,
-    }
-    after = load(old)
-    kept = after.runs[after.runs.run < 3]
-    assert [row for row in numbers(after) if row[1] < 3] == numbers(before)
-    assert set(kept.run_id[kept.method.isin(SAME)]) <= {*before.runs.run_id}
-    assert check_runs(old).wrong == []
-    assert performed(old, runs=4).done == 0
+def digests(method, **parameters):
+    """What cells of a class of methods are known by."""
+    info = method_info(method, BUILT_IN, method.__module__, "1.1")
+    answers = answer(method, "complete", parameters)
+    return Cell(TASK, info, answers).digest
 
 
-def test_earlier_runs_of_a_version_are_counted_whatever_stands_for_it(old):
-    with closing(sqlite3.connect(old / RUNS_FILE)) as db:
-        rows = [name for _, name, *_ in db.execute("PRAGMA table_info(cells)")]
-        names = ", ".join(name for name in rows if name not in ("id", "code"))
-        (there,) = db.execute("SELECT id FROM cells WHERE method = 'cma-es/bandit'").fetchone()
-        copy = f"INSERT INTO cells ({names}, code) SELECT {names}, '1.1' FROM cells WHERE id = ?"
-        other = db.execute(copy, (there,)).lastrowid
-        db.execute("UPDATE results SET cell = ? WHERE cell = ? AND run = 0", (other, there))
-        db.commit()
-    with writing(old) as store:
-        store.replace_plan(planned(), store.made_with())
-        assert store.stale()["cma-es/bandit", "1.1", "1.2"] == 3
+def test_a_new_field_at_its_default_changes_no_id():
+    """Of a method, and of an exploration condition, which every learner has. Another value does."""
+    search = built_in()["hill-climbing"].load()
+    more = create_model("More", __base__=search.Parameters, patience=(int, 7))
+    longer = type("Longer", (search,), {"Parameters": more})
+    assert digests(longer) == digests(search) == digests(longer, patience=7)
+    assert digests(longer, patience=8) != digests(search)
+    custom = built_in()["dual-process/custom"].load()
+    more = create_model("More", __base__=custom.Parameters, tremor=(float | None, None))
+    shaking = type("Shaking", (custom,), {"Parameters": more})
+    assert digests(shaking) == digests(custom) == built_in_digest("dual-process/custom")
+    assert digests(shaking, tremor=0.1) != digests(custom)
 
 
-def test_a_folder_of_4_0_0_and_one_of_now_have_the_same_runs(old, tmp_path):
-    performed(tmp_path / "new", SAME)
-    assert numbers(load(tmp_path / "new")) == numbers(load(old))
-    for first, second in ((old, tmp_path / "new"), (tmp_path / "new", old)):
-        out = tmp_path / f"of {first.name}"
-        joined = include_folders(planned(SAME), [first, second], out)
-        assert perform(joined, out, executor=InProcess()).done == 0
-        assert numbers(load(out)) == numbers(load(old))
-        assert check_runs(out).wrong == []
-        with open_store(out) as store:
-            assert len({*map(run_identity, store.ids())}) == len(store.ids())
-
-
-def test_runs_of_an_earlier_version_are_included_as_they_are_or_not_at_all(old, tmp_path):
-    joined = include_folders(planned(), [old], tmp_path / "all")
-    assert perform(joined, tmp_path / "all", executor=InProcess()).done == 0
-    study = load(tmp_path / "all")
-    assert {study.declared[name].version for name in CHANGED} == {"1.1"}
-    words = r"method 'cma-es/bandit' is version 1.1 in .*old and version 1.2 in this command"
-    with pytest.raises(CoarticError, match=f"{words}: leave it out of one of them"):
-        include_folders(planned(CHANGED[:1], runs=4), [old], tmp_path / "more")
-
-
-def test_a_run_is_found_in_both_forms(old, tmp_path):
-    performed(tmp_path / "new", SAME)
-    runs = load(tmp_path / "new").runs
-    (run_id,) = runs.run_id[(runs.method == "dual-process/EC1") & (runs.run == 1)]
-    assert run_id.endswith("-1.1")
-    for folder in (old, tmp_path / "new"):
-        assert find_run(run_id[:16], folder).number == 1
-
-
-def test_a_run_of_another_version_is_performed_again_and_named(old, coartic, in_this_process):
-    with open_store(old) as store:
-        (run_id, *_) = (r for r in store.ids() if store.run(r).cell.method.name == CHANGED[0])
-    text = coartic("verify", old, "--run", run_id)[1]
-    assert "Another version of the method made the run (1.1; here is 1.2)." in text
-    assert "1 run performed again: " in text
+def built_in_digest(name):
+    info = built_in()[name]
+    return cell_of(TASK, info, {}).digest
 
 
 SLOW = {"receding-horizon"}
@@ -196,8 +166,9 @@ def test_what_is_checked_before_a_release(runs):
 def test_workers_round_alike_whatever_the_environment_says(tmp_path):
     """The environment of these tests is that of workers (tests/conftest.py): this process rounds as
     they should, and a command in another environment is a process of its own."""
-    methods = ",".join(CHANGED)
-    plan = plan_suite("comparison", tasks=["descending"], methods=CHANGED, runs=1, trials=100)
+    solvers = ["cma-es/bandit", "posture-qp/current-goal"]
+    methods = ",".join(solvers)
+    plan = plan_suite("comparison", tasks=["descending"], methods=solvers, runs=1, trials=100)
     perform(plan, tmp_path / "here", executor=InProcess())
     python(
         "-m", "coartic", "run", "comparison", "--tasks", "descending", "--methods", methods,

@@ -1,7 +1,7 @@
 """Figures of your own, which look like the figures of the report.
 
 :func:`panels` and :func:`means` draw in a function with the decorator ``styled``; :func:`picture`
-returns the bytes of a file. ``coartic.analysis.sections.FIGURES["ranking"](study)`` draws a figure
+returns the bytes of a file. ``coartic.analysis.FIGURES["ranking"](study)`` draws a figure
 of the report.
 """
 

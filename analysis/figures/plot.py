@@ -7,7 +7,7 @@ import io
 import re
 import textwrap
 import zlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -18,12 +18,11 @@ from matplotlib import rc_context
 from matplotlib import style as styles
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
 from coartic.analysis.methods import COLORS, MARKS
-from coartic.analysis.standings import reference, shown_name
+from coartic.analysis.standings import reference
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, id_of, number
 from coartic.errors import CoarticError
@@ -70,9 +69,8 @@ caption, sentences on what only some of these figures show."""
 DrawsFigure = Callable[..., Plot | None]
 """A figure of the report, as a function of a study; None if the folder has no runs for it.
 
-Further arguments: ``width``, inches, such as 3.4, 5.5 or 7.2; ``methods`` and ``tasks``, labels and
-names of the only ones to draw (:meth:`.Study.only`); ``style``: settings of Matplotlib that count
-more than the project's, in a form of ``matplotlib.style.use``.
+Further arguments: ``width``, inches, such as 3.4, 5.5 or 7.2; ``style``: settings of Matplotlib
+that count more than the project's, in a form of ``matplotlib.style.use``.
 """
 
 
@@ -88,23 +86,16 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
         @wraps(draw)
-        def plot(
-            study: Study,
-            /,
-            *,
-            width: float | None = None,
-            methods: Sequence[str] | None = None,
-            tasks: Sequence[str] | None = None,
-            style: Any = (),
-        ) -> Plot | None:
+        def plot(study: Study, /, *, width: float | None = None, style: Any = ()) -> Plot | None:
             check_study(study)
-            if methods is not None or tasks is not None:
-                study = study.only(methods, tasks)
             with styles.context(["default", RC, *([style] if style else [])]), drawn_at(width):
                 if (parts := draw(study)) is None:
                     return None
                 drawing, data, alt, more = parts
-            has_dagger = any("†" in text.get_text() for text in drawing.findobj(Text))
+            texts = [text.get_text() for axes in drawing.axes for text in axes.texts]
+            for axes in drawing.axes:
+                texts += [axes.get_xlabel(), axes.get_title(), axes.get_title(loc="left")]
+            has_dagger = any("†" in text for text in texts)
             words = f"{caption}{more}{f' {RECONSTRUCTED}' * has_dagger}"
             ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
             to = reference(study, study.optima)
@@ -132,20 +123,18 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
 
 
 def name_in_figure(study: Study, method: str) -> str:
-    """Return the name of a method, given by label, in the figure that is being drawn: as
-    :func:`.shown_name`, in a narrow figure with its short name; a long name on several lines."""
-    title, longest = study.methods.title[method], _LONGEST_NAME
-    name = shown_name(study, method)
+    """Return the name of a method, given by label, in the figure that is being drawn: its title, in
+    a narrow figure its short name; a long name on several lines."""
     if style.is_narrow():
-        name, longest = name.replace(title, study.methods.short[method]), longest // 2
-    return "\n".join(textwrap.wrap(name, longest))
+        return "\n".join(textwrap.wrap(study.methods.short[method], _LONGEST_NAME // 2))
+    return "\n".join(textwrap.wrap(study.methods.title[method], _LONGEST_NAME))
 
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
     """Return the rows in words, for an alternative text: the template filled in for each row,
-    joined by ``; ``. Names in ``{}`` are columns, ``{title}`` is the name (:func:`.shown_name`) of
-    the method whose label is in column ``method``."""
-    rows = rows.assign(title=[shown_name(study, method) for method in rows.method])
+    joined by ``; ``. Names in ``{}`` are columns, ``{title}`` is the title of the method whose
+    label is in column ``method``."""
+    rows = rows.assign(title=rows.method.map(study.methods.title))
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 
 

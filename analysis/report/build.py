@@ -15,16 +15,24 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
+from coartic.analysis.figures.drawings import draw_postures, draw_ranking
 from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.figures.style import ONE
-from coartic.analysis.report import about
+from coartic.analysis.report import sections
 from coartic.analysis.report.player import player
-from coartic.analysis.report.render import IN_LATEX, classes_of, html_table, latex_table, table_csv
-from coartic.analysis.sections import SECTIONS, TABLES, Section, coarticulation, ranking
+from coartic.analysis.report.sections import SECTIONS, Section
 from coartic.analysis.standings import reference
-from coartic.analysis.study import Study, cached
-from coartic.analysis.table import Table, caption_of, is_setting
-from coartic.analysis.words import listed, number
+from coartic.analysis.study import Study
+from coartic.analysis.tables import (
+    TABLES,
+    Table,
+    caption_of,
+    csv_of,
+    html_of,
+    is_setting,
+    latex_of,
+)
+from coartic.analysis.words import id_of, listed, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of
@@ -72,14 +80,14 @@ def write_report(
         files = {"report.html": _page(study, home, failures, watch).encode()}
         names = {table.id: section.title for section in SECTIONS for table in section.tables}
         for name, table in TABLES.items():
-            made = about.attempt(
+            made = sections.attempt(
                 failures, names.get(name, name), _files_of_table, study, table, for_paper
             )
             files |= made or {}
-        for section in about.visible_sections(study) if for_paper else ():
+        for section in sections.visible_sections(study) if for_paper else ():
             watch(f"{section.title}, for print")
             files |= (
-                about.attempt(failures, section.title, _files_of_figures, study, section, width)
+                sections.attempt(failures, section.title, _files_of_figures, study, section, width)
                 or {}
             )
         publish(folder, files)
@@ -87,16 +95,15 @@ def write_report(
 
 
 def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
-    """Return files of a table, contents by path: CSV, and ``for_paper`` LaTeX, if the table is in
-    ``IN_LATEX``; an empty dictionary for a table without rows."""
+    """Return files of a table, contents by path: CSV, and ``for_paper`` LaTeX, if it has columns of
+    the table; an empty dictionary for a table without rows."""
     frame = table(study)
     if not len(frame):
         return {}
-    files = {f"tables/{table.id}.csv": table_csv(frame).encode()}
-    if for_paper and table.id in IN_LATEX:
-        text = latex_table(
-            table, frame, caption_of(table, frame), about.notes_of(study, frame.columns)
-        )
+    files = {f"tables/{table.id}.csv": csv_of(frame).encode()}
+    if for_paper and any(column.in_latex for column in table.columns):
+        notes = sections.notes_of(study, frame.columns)
+        text = latex_of(table, study, _rows_shown(study, table), notes)
         files[f"tables/{table.id}.tex"] = text.encode()
     return files
 
@@ -105,46 +112,40 @@ def _files_of_figures(study: Study, section: Section, width: float | None) -> di
     """Return the files of a section's figures of a width, inches, contents by path: SVG and PDF of
     each; None: each of its usual width."""
     files = {}
-    for plot in _plots_of(study, section, width):
+    drawn = (draw(study, width=width) for draw in section.figures)
+    for plot in filter(None, drawn):
         for ending in (".svg", ".pdf"):
             files[f"figures/{plot.id}{ending}"] = picture(plot.figure, ending)
             plot.figure.set_layout_engine("none")  # the next is laid out alike
     return files
 
 
-@cached
-def _plots_of(study: Study, section: Section, width: float | None = None) -> list[Plot]:
-    """Return the figures of a section for which the folder has runs, of a width, inches; None:
-    each of its usual width."""
-    drawn = (draw(study, width=width) for draw in section.figures)
-    return [plot for plot in drawn if plot is not None]
+def _rows_shown(study: Study, table: Table) -> pd.DataFrame:
+    """Return the rows of a table that page and LaTeX show: all, or all but settings and ablations
+    (:func:`.is_setting`)."""
+    frame = table(study)
+    return frame if table.with_settings else frame[~is_setting(study, frame)]
 
 
-def _parts_of(study: Study, section: Section) -> dict[str, Any]:
+def _parts_of(study: Study, section: Section, lead: Plot | None) -> dict[str, Any]:
     """Return the values of a section for the template by name. ``finding``: a list of lines;
-    ``figures``: a list of plots, each with its SVG and, for the ranking alone, an SVG at one
-    column, for phones; ``shown``: for each table with rows a dictionary of its ``id``, ``caption``,
-    numbers of ``rows`` and ``settings``, and ``html``. Rows of settings and ablations
-    (:func:`.is_setting`) are left out of all tables but ``ranking``, ``contexts`` and
-    ``methods``."""
+    ``figures``: a list of plots, without the one that leads the page (``lead``), each with its SVG
+    and, for the ranking, an SVG at one column, for phones; ``shown``: for each table with rows a
+    dictionary of its ``id``, ``caption``, number of ``rows`` and ``html``."""
     tables = []
     for table in section.tables:
-        frame = table(study)
-        if table.id not in ("ranking", "contexts", "methods"):
-            frame = frame[~is_setting(frame)]
-        if len(frame):
-            settings = sum("setting" in names for names in classes_of(table, frame))
-            tables.append({
-                "id": table.id, "caption": caption_of(table, frame), "rows": len(frame),
-                "settings": settings, "html": html_table(table, frame, caption_of(table, frame)),
-            })  # fmt: skip
-    on_phones = _plots_of(study, section, ONE) if section.id == "ranking" else []
-    narrow = {plot.id: for_page(replace(plot, id=f"{plot.id}-narrow")) for plot in on_phones}
+        if len(frame := _rows_shown(study, table)):
+            caption, page = caption_of(table, study), html_of(table, study, frame)
+            tables.append({"id": table.id, "caption": caption, "rows": len(frame), "html": page})
+    draws = [draw for draw in section.figures if not lead or id_of(draw) != lead.id]
+    figures = [plot for draw in draws if (plot := draw(study)) is not None]
+    on_phones = [draw(study, width=ONE) for draw in draws if section.id == "ranking"]
+    narrow = {
+        plot.id: for_page(replace(plot, id=f"{plot.id}-narrow")) for plot in on_phones if plot
+    }
     return {
-        "finding": about.finding(study, section),
-        "figures": [
-            (plot, for_page(plot), narrow.get(plot.id, "")) for plot in _plots_of(study, section)
-        ],
+        "finding": sections.finding(study, section),
+        "figures": [(plot, for_page(plot), narrow.get(plot.id, "")) for plot in figures],
         "shown": tables,
     }
 
@@ -161,15 +162,17 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
     parts that could not be made, by the name of the part; ``watch`` is called with each section's
     title.
     """
-    sections = []
-    for section in about.visible_sections(study):
+    draw = draw_ranking if study.varied[0] else draw_postures
+    lead = sections.attempt(failures, "Picture", partial(draw, width=ONE), study)
+    made = []
+    for section in sections.visible_sections(study):
         watch(section.title)
-        parts = about.attempt(failures, section.title, _parts_of, study, section)
+        parts = sections.attempt(failures, section.title, _parts_of, study, section, lead)
         parts = parts or {"finding": [], "figures": [], "shown": []}
         failure = failures.get(section.title, "")
         if failure or parts["figures"] or parts["shown"]:
             note = section.note.replace("{reference}", reference(study, study.optima))
-            sections.append({**vars(section), **parts, "failure": failure, "note": note})
+            made.append({**vars(section), **parts, "failure": failure, "note": note})
     environment = Environment(
         loader=FileSystemLoader(HERE),
         undefined=StrictUndefined,
@@ -177,12 +180,10 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        finalize=lambda value: about.shown(value) if type(value) is str else value,
+        finalize=lambda value: sections.shown(value) if type(value) is str else value,
     )
     environment.filters |= {"number": number, "listed": listed}
-    there = [section["id"] for section in sections]
-    draw = ranking.draw_ranking if study.varied[0] else coarticulation.draw_postures
-    lead = about.attempt(failures, "Picture", partial(draw, width=ONE), study)
+    there = [section["id"] for section in made]
     stage = next((name for name in ("coarticulation", "ranking", "tasks") if name in there), "")
     try:
         links = metadata("coartic").get_all("Project-URL") or []
@@ -193,9 +194,9 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         title=study.question[0] or f"Coarticulation of a simulated robot: suite {study.suite}",
         question=study.question[1],
         styles=(HERE / "page.css").read_text("utf-8") + part_of_page("play.css"),
-        player=about.attempt(failures, "Film", player, study) or "",
+        player=sections.attempt(failures, "Film", player, study) or "",
         script=(HERE / "page.js").read_text("utf-8"),
-        sections=sections,
+        sections=made,
         lead=lead and (lead, for_page(lead)),
         stage=stage,
         suite=study.suite,
@@ -205,7 +206,7 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         version=made_with["coartic"],
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
-        limits=about.limits(study),
+        limits=sections.limits(study),
         conditions={*study.methods.condition},
         failures=failures,
         links=dict(link.split(", ", 1) for link in links),

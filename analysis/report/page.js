@@ -40,15 +40,13 @@
   document.querySelectorAll("[data-table]").forEach((tools) => {
     const table = document.getElementById(tools.dataset.table);
     const search = tools.querySelector("[type=search]");
-    const unfold = tools.querySelector("[type=checkbox]");
     const status = tools.querySelector("output");
     const show = () => {
       const words = (search ? search.value : "").toLowerCase().split(/\s+/).filter(Boolean);
       let shown = 0;
       [...table.tBodies[0].rows].forEach((row) => {
         const text = row.textContent.toLowerCase();
-        const folded = unfold && !unfold.checked && !words.length && row.classList.contains("setting");
-        row.hidden = folded || !words.every((word) => text.includes(word));
+        row.hidden = !words.every((word) => text.includes(word));
         shown += !row.hidden;
       });
       status.textContent = search ? `${shown} of ${table.tBodies[0].rows.length} rows` : "";
@@ -66,11 +64,10 @@
     show();
   });
 
-  /* A link to a row unfolds its table, and a link to a claim its evidence. */
+  /* A link to a part that is folded unfolds it. */
   const reveal = () => {
     const target = document.querySelector(":target");
-    const folded = target && (target.querySelector("details") || target.closest("details"));
-    if (target) target.hidden = false;
+    const folded = target && target.closest("details");
     if (!folded) return;
     folded.open = true;
     target.scrollIntoView({ block: "center", inline: "start" });

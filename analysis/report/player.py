@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
-from coartic.analysis.control import contexts_of_control
-from coartic.analysis.sections.coarticulation import shared_goal
-from coartic.analysis.standings import cells_of, compared, own_methods, shown_name
-from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, one_by_one, solved, typical_run
-from coartic.analysis.table import SHORT_ID
+from coartic.analysis.control import contexts_of_control, shared_goal
+from coartic.analysis.standings import cells_of, runs_by_method, standings
+from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, solved, typical_run
+from coartic.analysis.tables import SHORT_ID, list_not_ranked, list_ranking, shown_columns
 from coartic.play.page import player_figure, preset_of
 from coartic.robot import HANDS
 
@@ -17,12 +17,12 @@ from coartic.robot import HANDS
 def player(study: Study) -> str:
     """Return the interactive figure with the runs of a folder as HTML; empty without a preset.
 
-    The figure has a preset for each task of :func:`.one_by_one` on which a method that moves
+    The figure has a preset for each individual task on which a method that moves
     straight has a solution, with the run of each such method nearest the median reward. If goal 1
     is the :func:`.shared_goal` and such a method solved both tasks, this goal is the first preset,
     with the standardised posture difference of random search there, if any. The method shown first
-    is the first of :func:`.own_methods` in a preset, or else the method at the shared goal, if it
-    is in the first preset, or the first one there.
+    is the first method from a file, in the order of :func:`.standings`, in a preset, or else the
+    method at the shared goal, if it is in the first preset, or the first one there.
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
@@ -39,7 +39,7 @@ def player(study: Study) -> str:
         presets.append(both | {"by_chance": by_chance if math.isfinite(by_chance) else None})
     alone = {
         name: preset_of(task) | {"runs": methods_played(study, [name])}
-        for name, task in one_by_one(study).items()
+        for name, task in study.individual_tasks.items()
     }
     alone = {name: preset for name, preset in alone.items() if preset["runs"]}
     presets = [preset for preset in (*presets, *alone.values()) if preset["runs"]]
@@ -48,7 +48,7 @@ def player(study: Study) -> str:
     ids = [[run["id"] for run in preset["runs"]] for preset in presets]
     own = (
         {"preset": number, "who": method}
-        for method in own_methods(study)
+        for method in standings(study).query("not built_in").index
         for number, there in enumerate(ids)
         if method in there
     )
@@ -59,12 +59,24 @@ def player(study: Study) -> str:
         folder=study.folder_in_commands,
         first=next(own, {"who": first if first in ids[0] else ids[0][0]}),
         cells=[
-            (method, f"on {task}", {"preset": where[task], "who": label})
-            for method, runs in compared(study).items()
-            for task, label in cells_of(runs)
+            (cell, {"preset": where[task], "who": label})
+            for cell, task, label in _cells_shown(study)
             if task in where and label in {run["id"] for run in alone[task]["runs"]}
         ],
     )
+
+
+def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
+    """Yield the id of each cell of the page with the gap of a method on a task, in the tables of
+    methods that are ranked and that are not, with the task and the label of the method's runs."""
+    for table in (list_ranking, list_not_ranked):
+        frame = table(study)
+        columns = [*shown_columns(table, study, frame)]
+        for row, method in enumerate(frame.method):
+            for task, label in cells_of(runs_by_method(study)[method]):
+                if f"on {task}" in columns:
+                    column = columns.index(f"on {task}")
+                    yield f"T_{table.id}_row{row}_col{column}", task, label
 
 
 def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
@@ -82,7 +94,7 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
             if len(tasks) > 1:
                 for film, name in zip(films, tasks, strict=True):
                     film["reached"] = study.configurations(name, label)[:, 0].round(3).tolist()
-            runs.append({"id": label, "name": shown_name(study, label), "films": films})
+            runs.append({"id": label, "name": study.methods.title[label], "films": films})
     return runs
 
 

@@ -7,7 +7,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -48,8 +48,8 @@ def report(
     if width is not None and not for_paper:
         raise CoarticError("--width has no effect without --for-paper")
     out = folder / "report" if out is None else out
+    from coartic.analysis import TABLES
     from coartic.analysis.report.build import write_report
-    from coartic.analysis.sections import TABLES
     from coartic.analysis.study import load
 
     started = time.monotonic()
@@ -77,25 +77,33 @@ def report(
         sys.exit(1)
 
 
-def say_ranking(study: Study, asked: Iterable[str], folder: Path) -> None:
+def say_ranking(study: Study, folder: Path) -> None:
     """Print the ranking of a study, who is not ranked and why, to what the gaps are, why runs
-    failed, and where ``coartic report`` writes the page of ``folder``. ``asked`` has the labels of
-    methods that the command named."""
-    from coartic.analysis.report.about import limits
-    from coartic.analysis.standings import board, common_tasks, not_ranked, reference, shown_name
+    failed, and where ``coartic report`` writes the page of ``folder``."""
+    from coartic.analysis.report.sections import limits
+    from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
 
-    also, rows = frozenset(asked), list[tuple[str, ...]]()
-    ranked, what = board(study, also).query("ranked"), limits(study)
-    for method, row in ranked.iterrows():
-        name = shown_name(study, str(method))
-        has_id = row["built_in"] or name.startswith(row["base"])
-        gap, share = interval(row, "gap", scale=100), interval(row, "share", 0, 100)
-        rows.append((name if has_id else f"{row['base']}: {name}", gap, share, number(row["runs"])))
-    say_table(("method", "gap (%)", "share (%)", "runs"), rows)
-    pairs = [("Not ranked", sentence) for sentence in not_ranked(study, also)]
-    if len(ranked):
-        pairs.append(("Reference", f"gaps are to the {reference(study, common_tasks(study))}"))
+    every, what = standings(study), limits(study)
+    names = [
+        row.title if row.built_in or row.title.startswith(row.base) else f"{row.base}: {row.title}"
+        for _, row in every.iterrows()
+    ]
+    every = every.assign(name=names)
+    rows, others = every[every.why == ""], every[every.why != ""]
+    heads = ["method", "gap (%)", "share (%)", "runs"] + ["note"] * any(rows.note)
+    cells = [
+        [row["name"], interval(row, "gap", scale=100), interval(row, "share", 0, 100),
+         number(row["runs"]), row["note"]][: len(heads)]
+        for row in rows.to_dict("records")
+    ]  # fmt: skip
+    say_table(heads, cells)
+    pairs = [
+        ("Not ranked", f"{why}: {'; '.join(of_reason['name'])}")
+        for why, of_reason in others.groupby("why", sort=False)
+    ]
+    if len(rows):
+        pairs.append(("Reference", f"gaps are to the {reference(study, ranked_tasks(study))}"))
     if what["own"]:
         known = f"of {listed(what['own'])} only the best reward of this folder is known"
         again = "repeat the command with optimum/search among its --methods"
@@ -131,7 +139,7 @@ def verify(
         raise CoarticError("--method-file has no effect without --again or --run")
     is_right = True
     if not alone:
-        with Display() as display, open_store(folder), explain_errors(folder):  # explain an error
+        with Display() as display, open_store(folder), explain_errors(folder):
             display.show(f"Executing the solutions of {folder}")
             report = check_runs(folder)
         is_right = not (report.wrong or report.unfinished)
@@ -140,8 +148,6 @@ def verify(
             f"{counted(report.movements, 'movement')} executed.",
             *(report.wrong or ["Nothing differs."]),
             *report.unfinished,
-            "Not checked:",
-            *(f"- {words}" for words in report.unchecked if not (again and "--again" in words)),
         )
     unlike = _perform_again(folder, again, run, method_file) if again or alone else 0
     if unlike or not is_right:
@@ -202,8 +208,8 @@ def _describe_run(run: Run, code: str) -> None:
             ("Result", result),
         ]
     )
-    if code != cell.method.version:
-        say(f"Another version of the method made the run ({cell.method.version}; here is {code}).")
+    if code != cell.method.code:
+        say(f"Another version of the method made the run ({cell.method.code}; here is {code}).")
 
 
 def cite(
@@ -303,8 +309,8 @@ def draw(
         raise CoarticError("--replace has no effect on a folder, whose pictures are written again")
     names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
     chosen = [*tasks_by_name(map(load_task, names)).values()]
+    from coartic.analysis.figures.drawings import picture_of_tasks
     from coartic.analysis.figures.plot import FORMATS, picture  # slow imports, after the checks
-    from coartic.analysis.sections.tasks import picture_of_tasks
 
     if out.suffix:
         check_ending(out, FORMATS)
@@ -332,6 +338,7 @@ def _draw_recording(
         hits_from_markers,
         is_of_markers,
         read_hits,
+        solutions_of,
     )
     from coartic.internal.files import check_ending, check_output, write_output
 
@@ -344,12 +351,14 @@ def _draw_recording(
     else:
         drawing = draw_recording(recording, task, ticks_per_unit=ticks_per_unit)
     write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
+    say(f"{out}: {recording}.")  # also where the hits are refused
     if has_markers:
         hits = hits_from_markers(recording, task, ticks_per_unit=ticks_per_unit or 100.0)
     else:
         hits = read_hits(recording, task, ticks_per_unit=ticks_per_unit or 1.0)
-    trials = counted(len(hits.drop_duplicates(["subject", "trial"])), "trial")
-    say(f"{out}: {counted(len(hits), 'hit')} in {trials}.")
+    solutions = solutions_of(task, hits)
+    finished = counted(len(solutions.runs), "trial")
+    say(f"{finished} with all goals hit, {solutions.unfinished} with a goal missed.")
 
 
 def _film(

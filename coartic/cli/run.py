@@ -21,7 +21,7 @@ from coartic.internal.text import counted, one_line, unknown
 from coartic.internal.threads import MOST_JOBS
 
 if TYPE_CHECKING:
-    from coartic.benchmarks.conformance import Law
+    from coartic.benchmarks.conformance import CheckResult
     from coartic.benchmarks.suites import Suite
     from coartic.runs.method_info import MethodInfo
     from coartic.tasks.families import Family
@@ -119,7 +119,6 @@ def run(
             **{"time_limit_s": time_limit, "trial_budget": trial_budget},
         )
         asked = plan(chosen, request, registered)
-        labels = {job.cell.label for job in asked} if names else set[str]()
         if include:
             only = {job.cell.task.name for job in asked} if tasks else None
             display.show(f"Including the runs of {' and '.join(include)}")
@@ -132,7 +131,7 @@ def run(
         part = f"--include {quote(str(out))}, with all other parts, joins them"
         say_pairs([("Next", f"{out} has runs {runs[0]} to {runs[-1]}: {part}")])
     else:
-        say_ranking(load(out), labels, out)
+        say_ranking(load(out), out)
     if progress.crashed:
         sys.exit(1)
 
@@ -292,8 +291,8 @@ def check(
             raise CoarticError("--verbose has no effect: it shows what a method prints")
         with Display() as display:
             display.show(f"Performing runs on {subject}")
-            laws = check_task_file(Path(subject), registered)
-        broken = _show_laws(subject, laws)
+            results = check_task_file(Path(subject), registered)
+        broken = _show_results(subject, results)
     else:
         names = given.methods_meant([subject], registered)
         given.check_used(method_file, registered, names)
@@ -301,24 +300,20 @@ def check(
         for name in names:
             with Display() as display:
                 display.show(f"Performing runs of {name}")
-                laws = check_method(registered[name], verbose=verbose)
-            broken += _show_laws(name, laws)
+                results = check_method(registered[name], verbose=verbose)
+            broken += _show_results(name, results)
     if broken:
         sys.exit(1)
 
 
-def _show_laws(name: str, laws: Sequence[Law]) -> int:
-    """Print the finding of each law (a rule that was checked) of ``name``, a method or a task file,
-    and how many hold; return the number of broken laws."""
-    for law in laws:
-        first, *more = law.finding.splitlines() or [""]
-        say(
-            f"{'pass' if law.passed else 'FAIL'}  {law.name}: {first}",
-            *(f"      {m}" for m in more),
-        )
-    passed = sum(law.passed for law in laws)
-    say(f"{name}: {passed} of {counted(len(laws), 'check')} passed.")
-    return len(laws) - passed
+def _show_results(name: str, results: Sequence[CheckResult]) -> int:
+    """Print the results of the checks of ``name``, a method or a task file, and how many passed;
+    return the number of others."""
+    for result in results:
+        say(f"{'pass' if result.passed else 'FAIL'}  {result.name}: {result.finding}")
+    passed = sum(result.passed for result in results)
+    say(f"{name}: {passed} of {counted(len(results), 'check')} passed.")
+    return len(results) - passed
 
 
 def new(

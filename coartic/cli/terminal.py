@@ -149,9 +149,10 @@ class Display:
 
     def _say_what_is_there(self, progress: Progress) -> None:
         self.line(*progress.unused)
-        if others := (+progress.others).total():
+        if progress.others > 0:
+            others = counted(progress.others, "other run")
             words = "which this command does not ask for: they are kept, and not reported"
-            self.line(f"{progress.folder} holds {counted(others, 'run')}, {words}.")
+            self.line(f"{progress.folder} holds {others}, {words}.")
         if progress.present:
             coming = counted(progress.total - progress.present, "run")
             self.line(f"Already there: {progress.present} of {progress.total}; to come: {coming}.")

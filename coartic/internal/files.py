@@ -11,6 +11,7 @@ from pathlib import Path
 from coartic.errors import CoarticError
 from coartic.internal.text import plain
 
+_PART = ".coartic-"  # beginning of the name of a file that is being written
 LISTING = ".coartic-files"
 """File in a folder that lists the files that a command wrote there, or began to, a path a line."""
 
@@ -18,7 +19,7 @@ LISTING = ".coartic-files"
 def write_atomically(path: Path, data: bytes) -> None:
     """Write ``data`` as file ``path``, in place of an earlier file; if writing fails, the earlier
     file stays as it was, and OSError is raised."""
-    part = path.with_name(f".coartic-{os.getpid()}-{path.name}")
+    part = path.with_name(f"{_PART}{os.getpid()}-{path.name}")
     try:
         part.unlink(missing_ok=True)
         with part.open("xb") as file:  # which follows no link
@@ -33,6 +34,9 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
     that an earlier call wrote there are replaced, or removed if they are not among ``files``.
     Raises CoarticError as :func:`make_folder`, before a file is written, and if writing fails."""
     before = make_folder(folder, files)
+    for place in (folder, *(each for each in folder.glob("*/") if not each.is_symlink())):
+        for part in place.glob(f"{_PART}[0-9]*"):  # of a command that was killed
+            part.unlink()
 
     def list_files(names: Collection[str]) -> None:
         write_atomically(folder / LISTING, "".join(f"{name}\n" for name in sorted(names)).encode())

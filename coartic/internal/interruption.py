@@ -6,18 +6,12 @@ removes its temporary folders.
 
 from __future__ import annotations
 
-import math
 import os
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from sys import UnraisableHookArgs
 
 ENDING = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
 """Signals by which people and systems end a program."""
@@ -28,9 +22,8 @@ _words = ["Interrupted."]
 
 def catch_signals() -> None:
     """Have the signals :data:`ENDING` (Ctrl-C, SIGTERM, SIGHUP) raise KeyboardInterrupt from now
-    on, and unblock all signals. For 5 s after a signal has done so others are
-    ignored, unless Python lost the KeyboardInterrupt (:func:`_interrupt_again`). A signal that was
-    ignored before, as by ``nohup``, stays so."""
+    on, and unblock all signals. For 5 s after a signal has done so others are ignored. A signal
+    that was ignored before, as by ``nohup``, stays so."""
 
     def interrupt(number: int, _: object) -> None:
         if not _heard or time.monotonic() > _heard[-1][1] + _CLEANING_S:
@@ -41,28 +34,6 @@ def catch_signals() -> None:
     for number in ENDING:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, interrupt)
-    sys.unraisablehook = _interrupt_again
-
-
-def _interrupt_again(lost: UnraisableHookArgs) -> None:
-    """Repeat a KeyboardInterrupt of a signal that Python could not pass on from a destructor or a
-    callback, such as LLVM's; report any other lost exception. A signal that comes before this hook
-    returns would be lost, too: so the signal is sent three times, and ignored once it has raised
-    KeyboardInterrupt."""
-    if lost.exc_type is not KeyboardInterrupt or not _heard:
-        sys.__unraisablehook__(lost)
-        return
-    number, _ = _heard[-1]
-    main = threading.main_thread().ident or 0
-
-    def send() -> None:
-        for pause in (0.01, 0.1, 1.0):
-            time.sleep(pause)
-            signal.pthread_kill(main, number)
-
-    _heard[-1] = number, math.inf
-    threading.Thread(target=send, daemon=True).start()
-    _heard[-1] = number, -_CLEANING_S
 
 
 @contextmanager

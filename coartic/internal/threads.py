@@ -85,23 +85,31 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     """Make this process a worker: the leader of a new group of processes, with the
-    first ``streams`` of input, output and errors connected to the null device. When its parent by
-    ``multiprocessing`` has ended, a thread removes ``folder``, if given, and kills this process
-    with its group."""
-
-    def end_with_parent() -> None:
-        if (parent := multiprocessing.parent_process()) is not None:
-            parent.join()
-            if folder is not None:
-                shutil.rmtree(folder, ignore_errors=True)
-            end_group(os.getpid())
-
+    first ``streams`` of input, output and errors connected to the null device. SIGTERM kills the
+    process with its group, and so does :func:`end_with_parent`, which removes ``folder`` before."""
     nobody = os.open(os.devnull, os.O_RDWR)
     for stream in range(streams):
         os.dup2(nobody, stream)
     os.setpgid(0, 0)
+    signal.signal(signal.SIGTERM, lambda *_: end_group(os.getpid()))
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    end_with_parent(folder, lambda: end_group(os.getpid()))
+
+
+def end_with_parent(
+    folder: Path | None = None, end: Callable[[], object] = lambda: os._exit(1)
+) -> None:
+    """Start a thread that, when the parent of this process by ``multiprocessing`` has ended,
+    removes ``folder``, if given, and calls ``end``."""
+
+    def wait() -> None:
+        if (parent := multiprocessing.parent_process()) is not None:
+            parent.join()
+            if folder is not None:
+                shutil.rmtree(folder, ignore_errors=True)
+            end()
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def end_group(pid: int) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import stat
 import tomllib
 from pathlib import Path
@@ -15,28 +14,16 @@ from coartic.internal.limits import MOST_BYTES
 from coartic.internal.text import LONGEST_LINE, plain
 
 _MOST_TOML = 1_000_000  # bytes
-_TEXTS = re.compile(
-    r'"{3}(?:\\.|[^\\])*?(?:"{3}|\Z)|"(?:\\.|[^"\\\n])*"?'
-    r"|'{3}.*?(?:'{3}|\Z)|'[^'\n]*'?|#[^\n]*",
-    re.DOTALL,
-)
-"""Texts and comments of TOML."""
-_MANY_PARTS = re.compile(r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){100}")
-"""Beginning of a name of more than 100 parts, in TOML without texts; far longer names take Python
-minutes to read."""
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
     """Return the content of a TOML file as a dictionary. Raises an exception of class ``error``,
-    which names the file, if it cannot be read, has more than 1,000,000 bytes or a name of more than
-    100 parts, or is not TOML in UTF-8."""
+    which names the file, if it cannot be read, has more than 1,000,000 bytes, or is not TOML in
+    UTF-8."""
     check_file(path, error=error, most=_MOST_TOML)
     shown = plain(str(path), LONGEST_LINE)
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
-        if many := _MANY_PARTS.search(_TEXTS.sub("text", text)):
-            name = plain(many[0], 30)
-            raise error(f"{shown}: the name {name} has more than 100 parts, divided by dots")
         return tomllib.loads(text)
     except UnicodeDecodeError:
         raise error(f"{shown}: is not a text file in UTF-8") from None

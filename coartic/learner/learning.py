@@ -155,7 +155,7 @@ def learn_many(
     task : Task, str or pathlib.Path
     condition : str or ExplorationCondition
     seeds : iterable of int
-        A seed for each run.
+        A seed for each run, no two of them equal.
     trials : int
     model : MotionModel
     start : sequence of Movement
@@ -173,9 +173,9 @@ def learn_many(
     TaskError, NotApplicableError, CoarticError, SolutionError
         Task, condition or first solution cannot be used, as in :func:`learn`.
     TypeError, ValueError
-        An argument is refused by :func:`learn`, seeds are a text, not iterable or too many (the
-        rewards of at most 1,000,000 runs and 200,000,000 trials are kept), or ``jobs`` is neither
-        -1 nor from 1 to 10,000.
+        An argument is refused by :func:`learn`, seeds are a text, not iterable, equal or too many
+        (the rewards of at most 1,000,000 runs and 200,000,000 trials are kept), or ``jobs`` is
+        neither -1 nor from 1 to 10,000.
     """
     task = as_task(task)
     condition = load_condition(condition)
@@ -194,6 +194,9 @@ def learn_many(
     for seed in ordered:
         check_limits("seed", seed, 0, MOST_RUN_SEED)
     ordered = [int(seed) for seed in ordered]
+    if len({*ordered}) < len(ordered):
+        twice = next(seed for seed in ordered if ordered.count(seed) > 1)
+        raise ValueError(f"seeds has {twice} more than once; each run needs a seed of its own")
     if start:
         first = [movements[0] for movements in movements_by_goal(task, start)]
         for movement in first:

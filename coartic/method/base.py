@@ -92,9 +92,6 @@ class Method(ABC):
     version: ClassVar[int] = 1
     """Version of the method's results, raised with every change of them, a default's as well: runs
     of two versions are not compared."""
-    later: ClassVar[frozenset[str]] = frozenset()
-    """Names of parameters that the method got after runs of it were published. While such a
-    parameter has its default, the identity of a run leaves it out: earlier runs stay valid."""
     files: ClassVar[tuple[str, ...]] = ()
     """Names of data files in the folder of the method's file. They count as its code."""
     quick: ClassVar[Mapping[str, Any]] = {}

@@ -599,7 +599,8 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
     ``(W, dof)``, in joint space, as an array ``(n + 1, dof)``, length unit and rad. Point k < n
     lies k times ``model.step`` along the path; point n is the last waypoint. Raises ValueError for
     a wrong shape or a figure that is not finite or beyond 100,000."""
-    corners = np.vstack([configuration(robot, q), *(configuration(robot, w) for w in waypoints)])
+    shape = (len(waypoints), robot.dof)
+    corners = np.vstack([configuration(robot, q), finite_array("waypoints", waypoints, shape)])
     ends = np.concatenate([[0.0], np.cumsum(segment_lengths(corners))])
     at = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
     points = np.stack([np.interp(at, ends, joint) for joint in corners.T], axis=1)

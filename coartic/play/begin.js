@@ -16,12 +16,10 @@
   const figure = new Play(root, { ...data, source, keep, address }, own ? here() : "");
   root.querySelector("[data-is=link]").hidden = data.page === null;
   if (own) window.addEventListener("hashchange", () => { if (figure.link !== here()) figure.restore(here()); });
-  /* Cells of the ranking, which stands below, show their films. */
-  document.addEventListener("DOMContentLoaded", () => (data.cells || []).forEach(([row, column, choice]) => {
-    const head = document.querySelector(`#table-ranking [data-column="${column}"]`);
-    const name = [...document.querySelectorAll("#table-ranking [title]")].find((each) => each.title === `row ${row}`);
-    if (!head || !name) return;
-    const cell = name.closest("tr").cells[head.closest("th").cellIndex];
+  /* Cells of tables of the report, by their ids, show their films. */
+  document.addEventListener("DOMContentLoaded", () => (data.cells || []).forEach(([id, choice]) => {
+    const cell = document.getElementById(id);
+    if (!cell) return;
     const button = document.createElement("button");
     Object.assign(button, { type: "button", className: "film-of", title: "Watch its median run" });
     button.append(...cell.childNodes);

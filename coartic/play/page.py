@@ -46,8 +46,8 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
     ``presets`` are the tasks that the figure offers (:func:`preset_of`). ``more`` is optional data
     for the scripts, such as :func:`coartic.analysis.report.player.player` gives: ``page``, the
     address to which links lead, None for no link; ``first``, what is shown at first; ``folder``,
-    the folder with the stored runs, quoted for a shell; ``cells``, the fields of table ``ranking``
-    that start films, each with row, column and the film.
+    the folder with the stored runs, quoted for a shell; ``cells``, the fields of tables that
+    start films, each with the id of the field and the film.
     """
     content = {"presets": presets, "version": coartic.__version__, **more}
     data = json.dumps(content, allow_nan=False, separators=(",", ":"))

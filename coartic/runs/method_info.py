@@ -25,30 +25,19 @@ from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
 """Origin of this project's methods."""
-_OF_4_0_0 = frozenset(
+ALWAYS_IN_IDS = frozenset(
     {
-        *("a376743cb1ef", "292a8ac3c3d1", "091fc0a85706", "92d917aefff4", "e170d8157b57"),
-        *("c78f0b6537fb", "87012e34e985", "1463a2ac660d", "4e5457291651", "c3960228006c"),
-        "e69d581d1096",
+        *("base", "chains", "corrects", "counted", "credit", "direction", "discount", "drift"),
+        *("epsilon", "exploration", "graphs", "hand_exploration", "hands", "horizon", "learned"),
+        *("modify_chosen", "modify_other", "most_sequences", "nodes", "noise_sd", "noisy_starts"),
+        *("other_arm", "period", "pull", "rounds", "sigma", "starts", "stop", "stored", "trials"),
     }
 )
-"""Hashes by which coartic 4.0.0 knew the code of its methods."""
+"""Names of parameters that count in the id of a run whatever their values. Add none: any other
+parameter counts only if its value is not the default. So a new field of a method, or of an
+exploration condition, changes no id of a run that does not use it."""
 VERSION = re.compile(r"\d+\.\d+")
 """Code of a built-in method, versions of model and method, in place of a hash."""
-
-
-def version_of(code: str) -> str:
-    """Return the version that a stored ``code`` of a method stands for: the code itself, except for
-    the hashes of coartic 4.0.0, whose methods are version 1.1 each."""
-    return "1.1" if code in _OF_4_0_0 else code
-
-
-def run_identity(run_id: str) -> tuple[str, str]:
-    """Return what identifies a run, from its id: the hex digits at its beginning, and the version
-    for which the code at its end stands (:func:`version_of`). Ids of equal pairs name the same
-    run."""
-    digits, _, code = run_id.partition("-")
-    return digits, version_of(code)
 
 
 @dataclass(frozen=True)
@@ -69,7 +58,9 @@ class MethodInfo:
     """``built in``, or the path of a method file, as a printable line."""
     code: str
     """Versions of model and method, such as ``1.2``; for a method file, the hash of what its
-    results come from (:mod:`coartic.benchmarks.own_code`)."""
+    results come from (:mod:`coartic.benchmarks.method_files`)."""
+    packages: dict[str, str] = field(default_factory=dict, compare=False)
+    """Versions of the installed packages that its method file imports, by name."""
     tuned_on: str = field(default="", compare=False)
     """Tasks on which its parameters were chosen; not stored."""
     where: str = field(default="", compare=False)
@@ -79,12 +70,6 @@ class MethodInfo:
     def is_ours(self) -> bool:
         """True for a built-in method of coartic."""
         return self.origin == BUILT_IN
-
-    @property
-    def version(self) -> str:
-        """The code, in which ``1.1`` stands for the hashes of coartic 4.0.0: codes are compared in
-        this form."""
-        return version_of(self.code)
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -104,8 +89,9 @@ class MethodInfo:
         return method(method.Parameters(**parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all parameters by name, defaults included, as plain data, except parameters in
-        :attr:`Method.later` that have their defaults. Raises CoarticError for a wrong parameter."""
+        """Return the parameters that identify a run, by name, as plain data: those of
+        :data:`ALWAYS_IN_IDS`, and others that do not have their defaults. Raises CoarticError for a
+        wrong parameter."""
         return dict(self._ask("complete", parameters))
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
@@ -158,7 +144,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         return {
             name: value
             for name, value in values.items()
-            if name not in method.later or value != _defaults(method)[name]
+            if name in ALWAYS_IN_IDS or value != _defaults(method)[name]
         }
     task = Outline(*outline)._replace(hands=tuple(outline[3]))
     try:
@@ -197,14 +183,15 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
     return dict(json.loads(json.dumps(defaults, default=str)))
 
 
-@cache
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
     """Return the class of the method with id ``name`` from ``where``, a module or the path of a
-    method file, which is imported once for each id and ``code``, a hash. Raises CoarticError if no
-    method there has this id; an error of the import passes."""
-    is_file = where.endswith(".py")
-    module = load_file(Path(where)) if is_file else importlib.import_module(where)
-    for method in methods_in(module) if is_file else module.METHODS:
+    method file, which is imported once for each ``code``, a hash. Raises CoarticError if no method
+    there has this id; an error of the import passes."""
+    if where.endswith(".py"):
+        methods = methods_in(load_file(Path(where), code)[0])
+    else:
+        methods = importlib.import_module(where).METHODS
+    for method in methods:
         if method.name == name:
             return method
     raise CoarticError(f"{where} defines no method {name!r}")
@@ -223,16 +210,19 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
     ]
 
 
-def load_file(path: Path) -> ModuleType:
-    """Import a method file, again if it was imported before, and return the module; an error of the
-    file passes. The folder of the file is added to ``sys.path``, for modules from there."""
+@cache
+def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
+    """Import a method file, once for each ``code``, a hash, and return the module, and the names of
+    the modules that the import has loaded; an error of the file passes. The folder of the file is
+    added to ``sys.path``, for modules from there."""
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
+    before = {*sys.modules}
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
-    return module
+    return module, frozenset({*sys.modules} - before - {name})

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -50,6 +50,12 @@ class Cell:
         return label_of(self.method.name, self.setting)
 
     @cached_property
+    def id(self) -> str:
+        """Id of the cell: 16 hex digits of :attr:`digest`, a hyphen, and the version or code of the
+        method."""
+        return f"{self.digest[:16]}-{self.method.code}"
+
+    @cached_property
     def definition(self) -> dict[str, Any]:
         """The task as plain data: its fields, such as ``goals`` and ``start``, by name."""
         return self.task.model_dump(mode="json")
@@ -58,15 +64,19 @@ class Cell:
     def digest(self) -> str:
         """Hash, 64 hex digits, of task, method, parameters, model and trial budget; not of the
         method's code, nor of a time limit."""
-        return hash_of(
-            {
-                "task": self.definition,
-                "method": self.method.name,
-                "parameters": self.parameters,
-                "model": PAPER.for_radius(self.task.radius)._asdict(),
-                "trial_budget": self.trial_budget,
-            }
-        )
+        return hash_of(self.content | {"method": self.method.name})
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """The cell as plain data, with the motion model, and without fields of its method that are
+        not stored."""
+        return {
+            "task": self.definition,
+            "method": asdict(replace(self.method, tuned_on="", where="")),
+            "parameters": self.parameters,
+            "model": PAPER.for_radius(self.task.radius)._asdict(),
+            "trial_budget": self.trial_budget,
+        }
 
 
 @dataclass(frozen=True)
@@ -89,12 +99,12 @@ class Job:
     question: tuple[str, str] | None = None
     """Title and description of a suite of the user's own, run on its own tasks; or None."""
 
-    def run_id(self, number: int, code: str | None = None) -> str:
+    def run_id(self, number: int) -> str:
         """Return the id of a run: 16 hex digits of a hash of cell, seed and number, a hyphen, and
-        ``code``, by default the method's (:attr:`MethodInfo.code`)."""
+        the version or code of the method (:attr:`MethodInfo.code`)."""
         text = f"{self.cell.digest} {self.seed} {number}"
         digits = hashlib.sha256(text.encode()).hexdigest()[:16]
-        return f"{digits}-{self.cell.method.code if code is None else code}"
+        return f"{digits}-{self.cell.method.code}"
 
     def run_seed(self, number: int) -> int:
         """Return the seed of the random numbers of run ``number`` (:func:`run_seed`)."""

@@ -32,17 +32,12 @@ PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 """Prefixes of columns by the part of a run that the columns score: ``solution``, ``initial`` (the
 first trial of a learner) and ``replay`` (one noiseless greedy trial after learning)."""
 PARTS = tuple(PREFIXES)
-LATE = "late_imports"
-"""Entry of the details of a run: files of the user's that a run of its process was the first to
-load, too late to count as the code of its method."""
-EARLIER = "earlier_runs"
-"""Entry of the details of a run whose result differed after another run: its task, in a list."""
+UNREPEATED = "made_again"
+"""Entry of the details of a run that was made again with another result: what differs."""
 _MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
 _MOST_NUMBERS = 400_000
-"""Most numbers in the start, targets and waypoints of a solution, of at most 25 characters each."""
-LONGEST_SOLUTION = 25 * _MOST_NUMBERS
-"""Most characters of the stored paths of a solution."""
+"""Most numbers in the start, targets and waypoints of a solution."""
 MOST_STEPS = 1_000_000
 """Most movement steps of a solution from the start straight through its targets and waypoints."""
 
@@ -61,21 +56,6 @@ class Score(NamedTuple):
     """Corrective movements that a solution needed."""
     other_arm_travel: float | None = None
     """Joint travel of the arm that a solution does not choose, rad."""
-
-
-def mark_of(method: str, kind: str, names: Sequence[str]) -> str:
-    """Return a warning about the runs of a method, in a sentence: with ``kind`` :data:`LATE` that
-    the files ``names``, 5 of them at most, were first loaded during a run, so that changes are
-    not seen; with :data:`EARLIER` that results on the tasks ``names`` depend on earlier
-    runs."""
-    if kind == EARLIER:
-        return f"{method}: results depend on earlier runs (seen on {', '.join(names)})"
-    some = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-    was = "was" if len(names) == 1 else "were"
-    return (
-        f"{method}: {some} {was} first loaded during a run, so that a change there is "
-        "not seen, and its runs stay: import it at the top of the method file"
-    )
 
 
 @dataclass(frozen=True)
@@ -105,7 +85,7 @@ class Outcome:
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
     """Movements by part (``solution``, ``initial``, ``replay``), not yet executed and scored."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Further data that the method or the process keeps, by name, such as :data:`EARLIER`."""
+    """Further data that the method or the process keeps, by name."""
     used: tuple[str, ...] = ()
     """Declared information that the method used."""
     meter: Meter | None = None

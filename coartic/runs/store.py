@@ -1,10 +1,10 @@
 """The runs of a results folder: one SQLite file, ``runs.sqlite``.
 
-``plan`` has a row for each cell that the last ``coartic run`` asked for; ``cells`` has these cells
-and the cells of earlier commands. ``results`` has a row for each run, ``movements`` for each
-movement of its parts, ``learning`` the rewards of its trials. The views ``runs`` and
-``solutions`` show the runs of the plan; docs/results.md lists their columns. One process writes, a
-batch of finished runs at a time; whatever interrupts it, a batch is there whole or not at all.
+Table ``cells`` has a row for each cell that was ever asked for; ``position`` and ``runs`` are set
+in the cells that the last ``coartic run`` asked for, its plan. Table ``results`` has a row for each
+run, with its movements and the rewards of its trials. The views ``runs`` and ``solutions`` show the
+runs of the plan; docs/results.md lists their columns. One process writes, a batch of finished runs
+at a time; whatever interrupts it, a batch is there whole or not at all.
 """
 
 from __future__ import annotations
@@ -13,63 +13,45 @@ import fcntl
 import itertools
 import json
 import os
-import pickle
-import re
 import sqlite3
-import time
 import warnings
 import zlib
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from coartic.errors import CoarticError
 from coartic.internal.files import make_folder
-from coartic.internal.limits import (
-    MOST_RUNS,
-    MOST_SECONDS,
-    MOST_SEED,
-    MOST_TRIALS,
-    check_limits,
-)
-from coartic.internal.text import one_line, plain
+from coartic.internal.text import plain
 from coartic.internal.validation import explain_inline
 from coartic.method import Meter
-from coartic.model import PAPER
 from coartic.motion.solution import Movement
 from coartic.robot import Array
-from coartic.runs.method_info import version_of
 from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
-    EARLIER,
-    LATE,
-    LONGEST_SOLUTION,
     PREFIXES,
+    UNREPEATED,
     Outcome,
     Run,
     Score,
-    Status,
     Times,
-    mark_of,
-    movement_data,
     movement_from,
     reward_bytes,
 )
-from coartic.tasks.task import parse_task
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_FILE = "runs.sqlite"
-FORMAT = 6
+FORMAT = 7
 """Number of the format: a change of a table or of a view raises it."""
 _APPLICATION = 0x636F6172  # "coar"
 
@@ -81,179 +63,111 @@ _DTYPES: dict[str, Any] = {
 }
 """Types of the columns of views in data frames; all have room for missing values."""
 _CELL = TypeAdapter(Cell)
-_OF_METHOD = ("title", "citation", "stochastic", "defaults", "origin", "code")
-"""Columns of table ``cells`` that are fields of the method."""
-
-
-def _rule(name: str, kind: str) -> str:
-    """Return the condition, in SQL, that SQLite checks for a column of table ``results``, from its
-    name and its type, such as ``TEXT NOT NULL``."""
-    if kind.startswith("TEXT"):
-        letters = f" AND {name} NOT GLOB '*[^LR]*'" if name.endswith("hands") else ""
-        return f"typeof({name}) != 'blob'{letters}"
-    if kind == "BOOLEAN":
-        return f"{name} BETWEEN 0 AND 1"
-    limits = "-1e19 AND 0" if name.endswith("reward") else "0 AND 1e19"  # minus a count of ticks
-    whole = "" if kind == "REAL" else f" AND typeof({name}) != 'real'"
-    return f"{name} BETWEEN {limits}{whole}"
-
-
-_STORED = ", ".join(
-    f"{name} {kind} CHECK ({_rule(name, kind)})" for name, kind, source, _ in COLUMNS if source
-)
+_STORED = ", ".join(f"{name} {kind}" for name, kind, source, _ in COLUMNS if source)
 _IN_VIEW = ", ".join(f'"{name}"' for name, *_ in COLUMNS)
-_ASKED = """SELECT position, results.*, suite.name AS suite, task, method, setting,
-    information, parameters, code, commit_id AS "commit", packages
-    FROM suite JOIN plan JOIN cells ON cells.id = plan.cell JOIN results
-    ON results.cell = plan.cell AND suite_seed = suite.seed AND run < plan.runs
-    JOIN environments ON environments.id = results.environment"""
-_RUNS = f"SELECT {_IN_VIEW} FROM asked ORDER BY position, run"
-_SOLUTIONS = """SELECT run_id, "order", goal, hand, kind, ticks, path
-    FROM asked JOIN movements ON result_id = asked.id AND part = 'solution'
-    ORDER BY position, run, movements."order\""""
-_SCHEMA = (
-    """CREATE TABLE suite (name TEXT, seed INTEGER, time_limit_s REAL, command TEXT, date TEXT,
-    environment INTEGER, plan_hash TEXT)""",
-    """CREATE TABLE plan (position INTEGER PRIMARY KEY,
-    cell INTEGER NOT NULL UNIQUE REFERENCES cells, runs INTEGER NOT NULL)""",
-    """CREATE TABLE cells (id INTEGER PRIMARY KEY, digest TEXT NOT NULL, code TEXT NOT NULL,
-    task TEXT NOT NULL, definition TEXT NOT NULL, method TEXT NOT NULL, title TEXT NOT NULL,
-    citation TEXT NOT NULL, information TEXT NOT NULL, stochastic INTEGER NOT NULL,
-    defaults TEXT NOT NULL, origin TEXT NOT NULL, parameters TEXT NOT NULL, setting TEXT NOT NULL,
-    model TEXT NOT NULL, trial_budget INTEGER, UNIQUE (digest, code))""",
-    """CREATE TABLE environments (id INTEGER PRIMARY KEY, content TEXT NOT NULL UNIQUE,
-    commit_id TEXT, packages TEXT)""",
-    f"""CREATE TABLE results (id INTEGER PRIMARY KEY, cell INTEGER NOT NULL REFERENCES cells,
-    suite_seed INTEGER NOT NULL, environment INTEGER NOT NULL REFERENCES environments,
-    details TEXT NOT NULL, {_STORED}, UNIQUE (cell, suite_seed, run),
-    CHECK (status IN {get_args(Status)}),
-    CHECK ((status = 'ok') = (reward IS NOT NULL) AND (status = 'ok') = (hands IS NOT NULL)))""",
-    """CREATE TABLE movements (result_id INTEGER NOT NULL, part TEXT NOT NULL,
-    "order" INTEGER NOT NULL, goal INTEGER NOT NULL, hand TEXT NOT NULL, kind TEXT NOT NULL,
-    ticks INTEGER NOT NULL, path TEXT NOT NULL, PRIMARY KEY (result_id, part, "order"))
-    WITHOUT ROWID""",
-    "CREATE TABLE learning (result_id INTEGER PRIMARY KEY, rewards BLOB NOT NULL)",
-    f"CREATE VIEW asked AS {_ASKED}",
-    f"CREATE VIEW runs AS {_RUNS}",
-    f"CREATE VIEW solutions AS {_SOLUTIONS}",
-)
-"""Statements that make the tables and views, each as SQLite keeps it. The views are for people and
-their scripts: this module asks by the same queries, whatever the views of a file say."""
-_PLANNED = (
-    """SELECT name, seed, time_limit_s, command, date, content FROM suite
-    JOIN environments ON environments.id = environment""",
-    "SELECT * FROM plan JOIN cells ON cells.id = cell ORDER BY position",
-)
-"""Queries of all that a plan says; ``plan_hash`` is a hash of their rows."""
+_SOLUTIONS = """SELECT run_id, key AS "order", json_extract(value, '$[0]') AS goal,
+    json_extract(value, '$[1]') AS hand, json_extract(value, '$[2]') AS kind,
+    json_extract(value, '$[3]') AS ticks, json_extract(value, '$[4]') AS path
+    FROM asked, json_each(movements, '$.solution') ORDER BY position, run, key"""
+"""Query of view ``solutions``. The view is for people: without trust in the schema of a file, some
+versions of SQLite call no function of JSON in a view."""
+_SCHEMA = f"""BEGIN;
+CREATE TABLE suite (name TEXT NOT NULL, seed INTEGER NOT NULL, content TEXT NOT NULL);
+CREATE TABLE cells (id TEXT PRIMARY KEY, position INTEGER, runs INTEGER, digest TEXT NOT NULL,
+    code TEXT NOT NULL, task TEXT NOT NULL, method TEXT NOT NULL, setting TEXT NOT NULL,
+    information TEXT NOT NULL, parameters TEXT NOT NULL, content TEXT NOT NULL);
+CREATE TABLE environments (id TEXT PRIMARY KEY, content TEXT NOT NULL, "commit" TEXT,
+    packages TEXT);
+CREATE TABLE results (cell TEXT NOT NULL REFERENCES cells, suite_seed INTEGER NOT NULL,
+    environment TEXT NOT NULL REFERENCES environments, details TEXT NOT NULL,
+    movements TEXT NOT NULL, rewards BLOB, noisy_ticks REAL, {_STORED},
+    UNIQUE (cell, suite_seed, run));
+CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, method, setting,
+    information, parameters, code, "commit", packages
+    FROM suite JOIN cells ON runs IS NOT NULL
+    JOIN results ON results.cell = cells.id AND suite_seed = suite.seed AND run < runs
+    JOIN environments ON environments.id = results.environment;
+CREATE VIEW runs AS SELECT {_IN_VIEW} FROM asked ORDER BY position, run;
+CREATE VIEW solutions AS {_SOLUTIONS};
+PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"""
+"""Statements that make the tables and views. ``noisy_ticks`` has room for the mean ticks of the
+solution under motor noise."""
 
-LONGEST_VALUE = 50_000_000  # bytes of a value in the file
-LONGEST_TASK = 100_000  # characters of the definition of a task
-_LOCKED = "SQLITE_BUSY", "SQLITE_LOCKED"  # beginnings of names of errors
+WAIT_S = 5.0  # wait for another program before the user is told
 _ROWS_AT_ONCE = 5_000  # of a frame, as objects
-_UNIQUE = "run_id", "result", "path"  # columns whose texts differ: others are kept once
-WAIT_S = 1.0  # wait for another program
-_LONGEST_PATH = 500  # letters of the path of a file; SQLite adds those of its journal
-
-
-class _Commit(BaseModel):
-    id: str
-    dirty: bool
-
-
-class _Surroundings(BaseModel):
-    """Facts on the last ``coartic run`` that reports and citations state."""
-
-    coartic: str
-    commit: _Commit | None
-    processor: str
-    cores: int
-    command: list[str]
-    date: str
-    question: Annotated[list[str], Field(min_length=2, max_length=2)] = ["", ""]
 
 
 class Store:
     """The runs of one results folder."""
 
-    def __init__(self, folder: Path, connection: sqlite3.Connection) -> None:
+    def __init__(
+        self, folder: Path, connection: sqlite3.Connection, content: bytes | None = None
+    ) -> None:
+        """Use an open ``connection``; ``content`` is that of a file which is only in memory."""
         self.folder = folder
-        self._db = connection
-        self._cells = dict[sqlite3.Row, Cell]()  # that were read
+        self._db, self._content = connection, content
 
     # The plan.
 
-    def begin_as(self, other: Store) -> bool:
-        """Replace the content of this store by a copy of another store's content, and return True,
-        if this store has no run; else return False."""
-        if empty := not self.ids():
-            other._db.backup(self._db)
-        return empty
-
     def replace_plan(self, plan: Sequence[Job], made_with: Mapping[str, Any]) -> None:
-        """Put a plan, a list of jobs, in place of the earlier plan, whose runs stay in the file.
-        ``made_with`` has versions, platform, commit, ``command`` and ``date`` of this command, by
-        name. Raises CoarticError if the folder holds another suite."""
+        """Store a plan in place of the earlier plan, whose runs stay in the file.
+
+        Parameters
+        ----------
+        plan : sequence of Job
+            At least one job.
+        made_with : mapping
+            Versions, platform, commit, ``command`` and ``date`` of this command, by name.
+
+        Raises
+        ------
+        CoarticError
+            The folder holds another suite, or cannot be written.
+        """
         first = plan[0]
-        environment = dict(made_with)
-        if first.suite_trials is not None:
-            environment["suite_trials"] = first.suite_trials
-        if first.question is not None:
-            environment["question"] = first.question
-        suite = {"name": first.suite, "seed": first.seed, "time_limit_s": first.time_limit_s}
-        suite |= {name: environment.pop(name) for name in ("command", "date")}
+        content = dict(made_with) | {"time_limit_s": first.time_limit_s}
+        content |= {"suite_trials": first.suite_trials} if first.suite_trials else {}
+        content |= {"question": first.question} if first.question else {}
         with self.transaction():
-            there = self._one("SELECT name FROM suite")
-            if there is not None and there["name"] != first.suite:
-                raise CoarticError(
-                    f"{self.folder} holds results of suite {there['name']!r}: name another folder "
-                    f"for suite {first.suite!r}"
-                )
+            for (name,) in self._rows("SELECT name FROM suite"):
+                if name != first.suite:
+                    raise CoarticError(
+                        f"{self.folder} holds results of suite {name!r}: name another folder for "
+                        f"suite {first.suite!r}"
+                    )
             self._db.execute("DELETE FROM suite")
-            self._db.execute("DELETE FROM plan")
-            self._insert("suite", suite | {"environment": self._environment(environment)})
+            self._db.execute("UPDATE cells SET position = NULL, runs = NULL")
+            self._insert("suite", name=first.suite, seed=first.seed, content=json.dumps(content))
             for position, job in enumerate(plan):
-                row, (cell, _) = _cell_row(job.cell), self._cell(job.cell)
-                # A cell of an earlier command may have had other defaults.
-                latest = (_as_text(row["defaults"]), row["setting"], row["origin"], cell)
-                query = "UPDATE cells SET defaults = ?, setting = ?, origin = ? WHERE id = ?"
-                self._db.execute(query, latest)
-                asked = {"position": position, "cell": cell, "runs": job.numbers[-1] + 1}
-                self._insert("plan", asked)
-            self._db.execute("UPDATE suite SET plan_hash = ?", (self._plan_hash(),))
+                row = _cell_row(job.cell) | {"position": position, "runs": job.numbers[-1] + 1}
+                self._insert("cells", **row)
 
     def plan(self) -> list[Job]:
-        """Return the plan of the folder, a list of the jobs of the last suite, without
-        ``question``; ``where`` of their methods is empty. Raises CoarticError if no plan is stored
-        yet, or if it is not as written."""
+        """Return the plan of the folder, a list of the jobs of the last suite.
+
+        The jobs have no ``question``, and ``where`` of their methods is empty. Raises CoarticError
+        if no plan is stored yet.
+        """
+        made_with = self.made_with()
+        limits = made_with.get("time_limit_s"), made_with.get("suite_trials")
+        query = """SELECT cells.id, cells.content, seed, runs, name FROM suite
+            JOIN cells ON runs IS NOT NULL ORDER BY position"""
+        plan = list[Job]()
         with explain_errors(self.folder):
-            suite = self._suite()
-            if suite["plan_hash"] != self._plan_hash():
-                raise ValueError("the plan is not as it was written")
-            check_limits("the seed", suite["seed"], 0, MOST_SEED)
-            if suite["time_limit_s"] is not None:
-                check_limits("the time limit", suite["time_limit_s"], 0.0, MOST_SECONDS)
-            content = json.loads(suite["content"])
-            trials = content.get("suite_trials") if isinstance(content, dict) else None
-            if trials is not None:
-                check_limits("the suite's number of trials", trials, 1, MOST_TRIALS)
-            name, limit_s, plan = suite["name"], suite["time_limit_s"], list[Job]()
-            for row in self._db.execute(_PLANNED[1]):
-                check_limits("the number of runs", row["runs"], 1, MOST_RUNS)
-                cell, numbers = self._read_cell(row), range(row["runs"])
-                plan.append(Job(cell, suite["seed"], numbers, limit_s, name, trials))
-            if not plan:
-                raise ValueError("the plan is empty")
-            return plan
+            for cell_id, content, seed, runs, suite in self._rows(query):
+                cell = _cell_from(cell_id, content)
+                plan.append(Job(cell, seed, range(runs), limits[0], suite, limits[1]))
+        if not plan:
+            raise CoarticError(f"the plan of {self.folder} is empty: {_RESUME}")
+        return plan
 
     def made_with(self) -> dict[str, Any]:
-        """Return versions, platform, commit, ``command`` and ``date`` of the last ``coartic run``,
-        by name. Raises CoarticError if no plan is stored yet."""
+        """Return versions, platform, commit, ``command`` and ``date`` of the last ``coartic run``.
+        Raises CoarticError if no plan is stored yet."""
+        if not (rows := self._rows("SELECT content FROM suite")):
+            raise CoarticError(f"{self.folder} is not finished: {_RESUME}")
         with explain_errors(self.folder):
-            row = self._suite()
-            how = {"command": json.loads(row["command"]), "date": row["date"]}
-            content = dict(json.loads(row["content"])) | how
-            _Surroundings.model_validate(content, strict=True)
-            return content
+            return dict(json.loads(rows[0][0]))
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
@@ -267,7 +181,7 @@ class Store:
             self._wait_for("BEGIN IMMEDIATE")
             yield
             self._wait_for("COMMIT")
-        except sqlite3.DatabaseError as error:
+        except sqlite3.Error as error:
             raise CoarticError(_explain(self.folder / RUNS_FILE, error)) from None
         finally:
             if self._db.in_transaction:
@@ -283,355 +197,306 @@ class Store:
     def stale(self) -> Counter[tuple[str, str, str]]:
         """Return the number of runs of the plan that the folder has from another version or code of
         their method, by a triple: id of the method, other version, and version in the plan."""
-        query = """SELECT now.method, old.code, now.code, count(*)
-            FROM suite JOIN plan JOIN cells AS now ON now.id = plan.cell
-            JOIN cells AS old ON old.digest = now.digest AND old.code != now.code
-            JOIN results ON results.cell = old.id AND suite_seed = suite.seed AND run < plan.runs
-            WHERE old.id NOT IN (SELECT cell FROM plan) GROUP BY 1, 2, 3"""
-        found = Counter[tuple[str, str, str]]()
-        for name, old, now, count in self._rows(query):
-            found[name, version_of(old), version_of(now)] += count
-        return found
+        query = """SELECT now.method, old.code, now.code, count(*) FROM suite
+            JOIN cells AS now ON now.runs IS NOT NULL
+            JOIN cells AS old ON old.digest = now.digest AND old.runs IS NULL
+            JOIN results ON results.cell = old.id AND suite_seed = suite.seed AND run < now.runs
+            GROUP BY 1, 2, 3"""
+        return Counter({(name, old, now): count for name, old, now, count in self._rows(query)})
 
     def marks(self) -> dict[str, list[str]]:
-        """Return, by id of a method, warnings about its runs of the plan, in sentences
-        (:func:`.mark_of`): that files were loaded too late, or results depend on earlier runs."""
+        """Return, by id of a method, warnings about its runs of the plan, in sentences: that a run
+        gave another result when it was made again, and that packages which its file imports had
+        other versions."""
         found = defaultdict[str, list[str]](list)
-        for kind in (LATE, EARLIER):
-            query = f"""SELECT DISTINCT method, value FROM asked, json_each(details, '$.{kind}')
-                WHERE json_type(details, '$.{kind}') = 'array' ORDER BY method, value"""
-            for method, rows in groupby(self._rows(query), itemgetter(0)):
-                found[method].append(mark_of(method, kind, [str(value) for _, value in rows]))
+        query = f"""SELECT DISTINCT method, task FROM asked
+            WHERE json_extract(details, '$.{UNREPEATED}') IS NOT NULL ORDER BY method, task"""
+        for method, rows in groupby(self._rows(query), itemgetter(0)):
+            tasks = ", ".join(task for _, task in rows)
+            found[method].append(f"{method}: another result when a run was made again ({tasks})")
+        for method, made, last in self._packages():
+            older = ", ".join(f"{name} {made[name]}" for name in made if made[name] != last[name])
+            if older:
+                newer = ", ".join(
+                    f"{name} {last[name]}" for name in made if made[name] != last[name]
+                )
+                found[method].append(f"{method}: runs were made with {older}; now it has {newer}")
         return dict(found)
 
     def imports(self) -> dict[str, list[str]]:
         """Return, by id of a method from a file, the packages that its file imports, over all runs
         of the plan, each as a name with a version."""
-        query = """SELECT DISTINCT method, value FROM asked
-            JOIN environments ON environments.id = environment, json_each(content, '$.imports')
-            WHERE json_type(content, '$.imports') = 'array' ORDER BY method, value"""
-        rows = groupby(self._rows(query), itemgetter(0))
-        return {method: [plain(str(value), 100) for _, value in of] for method, of in rows}
+        found = defaultdict[str, dict[str, None]](dict)
+        for method, made, _ in self._packages():
+            found[method] |= dict.fromkeys(f"{name} {version}" for name, version in made.items())
+        return {method: sorted(packages) for method, packages in found.items()}
 
-    def others(self) -> Counter[int]:
-        """Return the number of runs in the folder that the plan does not ask for, by the seed of
-        their suite, with the runs of another version or code of their method (:meth:`stale`)."""
-        query = """SELECT suite_seed, count(*) FROM results WHERE id NOT IN (SELECT id FROM asked)
-            GROUP BY suite_seed"""
-        return Counter(dict(self._rows(query)))
+    def _packages(self) -> Iterator[tuple[str, dict[str, str], dict[str, str]]]:
+        """Yield, for each method from a file and each environment of its runs, the id of the method
+        and the versions of the packages that its file imports: as the runs were made, and as the
+        last ``coartic run`` had them."""
+        query = """SELECT DISTINCT asked.method, json_extract(environments.content, '$.imports'),
+            json_extract(cells.content, '$.method.packages') FROM asked
+            JOIN cells ON cells.id = asked.cell JOIN environments ON environments.id = environment
+            WHERE json_extract(environments.content, '$.imports') IS NOT NULL ORDER BY 1, 2"""
+        for method, made, last in self._rows(query):
+            with explain_errors(self.folder):
+                versions = json.loads(made), json.loads(last)
+            yield method, *versions
+
+    def others(self) -> int:
+        """Return the number of runs in the folder that the plan does not ask for, with the runs of
+        another version or code of their method (:meth:`stale`)."""
+        query = "SELECT (SELECT count(*) FROM results) - (SELECT count(*) FROM asked)"
+        return int(self._rows(query)[0][0])
 
     def ids(self, prefix: str = "") -> list[str]:
         """Return the ids that begin with ``prefix``, of all runs, also of earlier plans."""
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
-    def results(self) -> list[tuple[str, str]]:
-        """Return the id of each run of the plan that the folder has, in the order of the plan, with
-        the hash of its outcome."""
-        return self._rows("SELECT run_id, result FROM asked ORDER BY position, run")
+    def results(self) -> dict[str, str]:
+        """Return the hash of the outcome of each run that the folder has, by the run's id."""
+        return dict(self._rows("SELECT run_id, result FROM results"))
 
     # Writing and reading runs.
 
     def write(self, runs: Iterable[Run]) -> None:
         """Write finished runs, all of them or none, in place of earlier runs of the same cells,
-        seeds and numbers. Raises CoarticError if the disk is full or a run does not fit the
-        tables."""
+        seeds and numbers. Raises CoarticError if they cannot be stored, such as on a full disk."""
         with self.transaction():
             for run in runs:
-                try:
-                    self._write_run(run)
-                except (sqlite3.IntegrityError, sqlite3.DataError, OverflowError) as error:
-                    raise CoarticError(
-                        f"run {run.id} of {run.cell.method.name} cannot be stored: {error}"
-                    ) from None
+                environment = run.outcome.environment or {}
+                row = _environment_row(environment)
+                self._insert("environments", **row)
+                packed = None
+                if rewards := run.outcome.rewards:
+                    packer = zlib.compressobj(9, strategy=zlib.Z_FILTERED)
+                    packed = packer.compress(reward_bytes(rewards)) + packer.flush()
+                movements = {part: run.movement_data(part) for part in run.scores}
+                self._insert(
+                    "results",
+                    **run.to_row(),
+                    cell=run.cell.id,
+                    environment=row["id"],
+                    movements=json.dumps(movements, separators=(",", ":")),
+                    rewards=packed,
+                )
+
+    def include(self, other: Store) -> None:
+        """Copy the runs that the plan asks for and this folder lacks from another folder. Runs that
+        both have stay as they are here."""
+        file = f"{(other.folder / RUNS_FILE).absolute().as_uri()}?mode=ro"
+        with explain_errors(other.folder):
+            self._db.execute("ATTACH ? AS other", (":memory:" if other._content else file,))
+            if other._content:
+                self._db.deserialize(other._content, name="other")
+        try:
+            with self.transaction():
+                for table, condition in (
+                    ("environments", "TRUE"),
+                    ("results", "cell IN (SELECT id FROM main.cells WHERE runs IS NOT NULL)"),
+                ):
+                    self._db.execute(
+                        f"""INSERT OR IGNORE INTO main.{table}
+                        SELECT * FROM other.{table} WHERE {condition}"""
+                    )
+        finally:
+            self._db.execute("DETACH DATABASE other")
 
     def run(self, run_id: str) -> Run:
         """Return a run by its id; ``suite`` of its job and ``where`` of its method are empty.
-        Raises CoarticError if the folder has no such run, or its rows do not fit its id."""
+        Raises CoarticError if the folder has no such run, or its row does not fit its id."""
+        query = """SELECT results.*, cells.content AS cell_content, environments.content AS made
+            FROM results JOIN cells ON cells.id = cell
+            JOIN environments ON environments.id = environment WHERE run_id = ?"""
         with explain_errors(self.folder):
-            row = self._one("SELECT * FROM results WHERE run_id = ?", run_id)
+            row = self._db.execute(query, (run_id,)).fetchone()
             if row is None:
-                raise CoarticError(f"it has no run {run_id}")
-            stored_cell = self._one("SELECT * FROM cells WHERE id = ?", row["cell"])
-            if stored_cell not in self._cells:
-                self._cells[stored_cell] = self._read_cell(stored_cell)
-            cell = self._cells[stored_cell]
-            environment = self._one("SELECT * FROM environments WHERE id = ?", row["environment"])
-            blob = self._one("SELECT rewards FROM learning WHERE result_id = ?", row["id"])
-            rewards = _unpack(blob[0], row["trials"]) if blob else np.empty(0)
-            meter = {name: row[name] for name in vars(Meter())}
-            self._check_lengths("WHERE result_id = ?", row["id"])
-            parts: dict[str, list[Movement]] = {part: [] for part in PREFIXES}
-            query = """SELECT part, goal, hand, kind, ticks, path FROM movements
-                WHERE result_id = ? ORDER BY "order\""""
-            for part, *data in self._db.execute(query, (row["id"],)):
-                parts[part].append(movement_from(data))
+                raise CoarticError(f"{self.folder} has no run {run_id}")
+            rewards = _unpack(row["rewards"]).tolist()
             outcome = Outcome(
                 row["status"],
                 row["reason"],
                 details=dict(json.loads(row["details"])),
                 used=tuple(filter(None, row["used"].split(", "))),
-                meter=None if row["trials"] is None else Meter(**meter),
-                rewards=[None if np.isnan(reward) else int(reward) for reward in rewards.tolist()],
-                times=Times(**{name: row[name] for name in vars(Times())}),
-                environment=dict(json.loads(environment["content"])),
+                meter=_from_row(Meter, row) if row["trials"] is not None else None,
+                rewards=[None if np.isnan(reward) else int(reward) for reward in rewards],
+                times=_from_row(Times, row),
+                environment=dict(json.loads(row["made"])),
             )
-            scores = {
-                part: Score(row[f"{prefix}reward"], row[f"{prefix}hands"], tuple(parts[part]))
-                for part, prefix in PREFIXES.items()
-                if parts[part]
-            }
+            scores = {}
+            for part, movements in json.loads(row["movements"]).items():
+                hits = row[f"{PREFIXES[part]}reward"], row[f"{PREFIXES[part]}hands"]
+                scores[part] = Score(*hits, tuple(map(movement_from, movements)))
             if "solution" in scores:
                 scores["solution"] = scores["solution"]._replace(
                     corrections=row["solution_corrections"],
                     other_arm_travel=row["other_arm_travel"],
                 )
+            cell = _cell_from(row["cell"], row["cell_content"])
             job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])
             run = Run(job, outcome, scores, row["date"])
-            if (run.id, run.seed) != (run_id, row["seed"]):
+            if run.id != run_id:
                 raise ValueError(f"run {run_id} is not the run that its id says")
             return run
 
     def runs(self) -> pd.DataFrame:
         """Return view ``runs``, a row for each run of the plan that the folder has, in order, as a
         data frame with the columns :data:`.COLUMNS` (nullable types)."""
-        return self._frame(_RUNS)
+        return self._frame("SELECT * FROM runs")
 
     def solutions(self) -> pd.DataFrame:
         """Return view ``solutions``, a row for each movement of the plan's solutions, as a data
         frame (nullable types). Columns: ``run_id``, ``order`` (from 0), ``goal`` (from 1),
         ``hand``, ``kind``, ``ticks`` and ``path`` (configurations as JSON)."""
-        self._check_lengths()
         return self._frame(_SOLUTIONS)
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
         """Return, by run id, the movements of a part (``solution``, ``initial`` or ``replay``) of
         the first ``most`` ok runs of each cell of the plan; runs without the part are left out."""
-        query = """SELECT run_id, goal, hand, kind, ticks, path FROM
-            (SELECT *, row_number() OVER (PARTITION BY position ORDER BY run) AS place
-            FROM asked WHERE status = 'ok') AS solved
-            JOIN movements ON result_id = solved.id AND part = ? WHERE place <= ?
-            ORDER BY position, run, "order\""""
-        self._check_lengths()
+        query = """SELECT run_id, json_extract(movements, ?) FROM
+            (SELECT run_id, movements, position, run,
+            row_number() OVER (PARTITION BY position ORDER BY run) AS place
+            FROM asked WHERE status = 'ok') WHERE place <= ? ORDER BY position, run"""
         with explain_errors(self.folder):
-            rows = self._execute(query, (part, most))
             return {
-                run_id: tuple(movement_from(row[1:]) for row in of_run)
-                for run_id, of_run in groupby(map(tuple, rows), itemgetter(0))
+                run_id: tuple(map(movement_from, json.loads(text)))
+                for run_id, text in self._db.execute(query, (f"$.{part}", most))
+                if text is not None
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
         """Yield, for each run of the plan with rewards of trials, its id and its k rewards, shape
         ``(k,)``; NaN stands for a trial that failed or whose reward is not kept."""
-        query = """SELECT run_id, rewards, trials FROM asked
-            JOIN learning ON result_id = asked.id ORDER BY position, run"""
+        query = """SELECT run_id, rewards FROM asked WHERE rewards IS NOT NULL
+            ORDER BY position, run"""
         with explain_errors(self.folder):
-            for run_id, blob, trials in self._execute(query):
-                yield run_id, _unpack(blob, trials)
+            for run_id, blob in self._db.execute(query):
+                yield run_id, _unpack(blob)
 
     # Rows.
 
-    def _suite(self) -> Any:
-        """Return the row of table ``suite`` on the last ``coartic run``, with the columns of its
-        environment. Raises CoarticError if no suite is stored."""
-        row = self._one("SELECT * FROM suite LEFT JOIN environments ON id = environment")
-        if row is None:
-            raise CoarticError("it is not finished; repeat the `coartic run` command")
-        return row
-
-    def _write_run(self, run: Run) -> None:
-        """Write a run into the tables, in place of an earlier run of its cell, seed and number."""
-        cell, code = self._cell(run.cell)
-        key = cell, run.job.seed, run.number
-        query = "SELECT id FROM results WHERE cell = ? AND suite_seed = ? AND run = ?"
-        if earlier := self._one(query, *key):
-            for table in ("movements", "learning"):
-                self._db.execute(f"DELETE FROM {table} WHERE result_id = ?", (earlier["id"],))
-            self._db.execute("DELETE FROM results WHERE id = ?", (earlier["id"],))
-        row = run.to_row() | {"cell": cell, "run_id": run.job.run_id(run.number, code)}
-        row["environment"] = self._environment(run.outcome.environment or {})
-        result = self._insert("results", row)
-
-        names = "goal", "hand", "kind", "ticks", "path"
-        for part, score in run.scores.items():
-            for order, movement in enumerate(score.movements):
-                place = {"result_id": result, "part": part, "order": order}
-                data = dict(zip(names, movement_data(movement), strict=True))
-                self._insert("movements", place | data)
-        if rewards := run.outcome.rewards:
-            packer = zlib.compressobj(9, strategy=zlib.Z_FILTERED)
-            blob = packer.compress(reward_bytes(rewards)) + packer.flush()
-            self._insert("learning", {"result_id": result, "rewards": blob})
-
-    def _read_cell(self, row: Mapping[str, Any]) -> Cell:
-        """Return a cell from its row of table ``cells``; ``where`` of its method is empty. Raises
-        an error, such as ValueError or TaskError, if the row makes no cell, or a cell with another
-        digest, setting or name of its task."""
-        method = {name: row[name] for name in _OF_METHOD} | {
-            "name": row["method"],
-            "defaults": json.loads(row["defaults"]),
-            "information": tuple(filter(None, row["information"].split(", "))),
-        }
-        if len(row["definition"]) > LONGEST_TASK:
-            raise ValueError(f"the task of {len(row['definition'])} characters is too long")
-        content = {
-            "task": parse_task(json.loads(row["definition"]), str(self.folder / RUNS_FILE)),
-            "method": method,
-            "parameters": json.loads(row["parameters"]),
-            "trial_budget": row["trial_budget"],
-        }
-        cell: Cell = _CELL.validate_python(content)
-        named = cell.digest, cell.setting, cell.task.name
-        if named != (row["digest"], row["setting"], row["task"]):
-            raise ValueError(f"{cell.label} on {cell.task.name} is not the cell that was run")
-        return cell
-
-    def _check_lengths(self, condition: str = "", *values: object) -> None:
-        """Raise CoarticError if the paths of a part of a run have more than 10,000,000 characters
-        together, in all rows of table ``movements``, or in rows that satisfy an SQL ``condition``,
-        with ``values`` for its question marks."""
-        query = f"""SELECT max(length) FROM (SELECT sum(length(path)) AS length FROM movements
-            {condition} GROUP BY result_id, part)"""
-        with explain_errors(self.folder):
-            if ((self._one(query, *values)[0]) or 0) > LONGEST_SOLUTION:
-                raise ValueError("a solution is too long")
-
-    def _plan_hash(self) -> str:
-        """Return the hash, 64 hex digits, of the stored plan: settings of the suite, command, date,
-        environment and cells."""
-        return hash_of([[*row] for query in _PLANNED for row in self._db.execute(query)])
-
-    def _environment(self, content: dict[str, Any]) -> int:
-        """Return the id of the row of an environment, the versions, platform and commit of a
-        process by name; insert the row if it is missing."""
-        commit = content.get("commit")
-        row = {
-            "content": json.dumps(content, ensure_ascii=False, sort_keys=True),
-            "commit_id": commit and commit["id"] + "+" * commit["dirty"],
-            "packages": hash_of([content.get("python"), content.get("packages")])[:8],
-        }
-        stored = self._one("SELECT id FROM environments WHERE content = ?", row["content"])
-        return self._insert("environments", row) if stored is None else int(stored["id"])
-
-    def _cell(self, cell: Cell) -> tuple[int, str]:
-        """Return the id and the code of the row of a cell; insert the row if it is missing. A row
-        that 4.0.0 wrote keeps its code, a hash, and counts as a row of the version for which this
-        code stands."""
-        for number, code in self._rows("SELECT id, code FROM cells WHERE digest = ?", cell.digest):
-            if version_of(code) == cell.method.version:
-                return number, code
-        return self._insert("cells", _cell_row(cell)), cell.method.code
-
-    def _insert(self, table: str, row: Mapping[str, Any]) -> int:
-        """Insert a row, values by column, into a table; return the id of the row, if the table
-        has ids. Lists, tuples and dictionaries become JSON."""
-        names = ", ".join(f'"{name}"' for name in row)
-        marks = ", ".join("?" for _ in row)
+    def _insert(self, table: str, **row: Any) -> None:
+        """Insert a row, values by column, into a table. A row with the same id is replaced in
+        place, because other rows may refer to it."""
+        key = {"cells": "id", "environments": "id", "results": "run_id"}.get(table)
+        names, marks = ", ".join(f'"{name}"' for name in row), ", ".join("?" * len(row))
+        # A key that is set, though to itself, has SQLite look through all rows that refer to it.
+        news = ", ".join(f'"{name}" = excluded."{name}"' for name in row if name != key)
         text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
-        return int(self._db.execute(text, [*map(_as_text, row.values())]).lastrowid or 0)
-
-    def _execute(self, query: str, values: Sequence[object] = ()) -> sqlite3.Cursor:
-        """Execute a query with ``values``, in which ``asked`` is a table of the runs of the
-        plan."""
-        return self._db.execute(f"WITH asked AS ({_ASKED}) {query}", values)
+        text += f" ON CONFLICT ({key}) DO UPDATE SET {news}" if key else ""
+        self._db.execute(text, [*row.values()])
 
     def _rows(self, query: str, *values: object) -> list[Any]:
-        """Return a list of the rows of a query (:meth:`_execute`). Raises CoarticError if the file
-        cannot be read."""
+        """Return a list of the rows of a query. Raises CoarticError if the file cannot be read."""
         with explain_errors(self.folder):
-            return self._execute(query, values).fetchall()
-
-    def _one(self, query: str, *values: object) -> Any:
-        """Return the first row of a query (:meth:`_rows`); None if it has no row."""
-        return next(iter(self._rows(query, *values)), None)
+            return [tuple(row) for row in self._db.execute(query, values)]
 
     def _frame(self, query: str) -> pd.DataFrame:
         """Return the rows of a query as a data frame, with nullable types."""
         import pandas as pd
 
-        # astype refuses numbers that are too large
-        with explain_errors(self.folder), np.errstate(invalid="ignore"):
-            rows, parts, once = self._execute(query), list[pd.DataFrame](), dict[str, str]()
+        with explain_errors(self.folder):
+            rows, parts, once = self._db.execute(query), list[pd.DataFrame](), dict[Any, Any]()
             names = [column[0] for column in rows.description]
             while (some := rows.fetchmany(_ROWS_AT_ONCE)) or not parts:
-                frame = pd.DataFrame(list(map(tuple, some)), columns=names, dtype=object)
-                for name in names:
-                    if _DTYPES[name] == "string" and name not in _UNIQUE:
-                        frame[name] = [once.setdefault(text, text) for text in frame[name]]
-                # Texts that stay among objects that go would keep the memory of all of them.
-                unique = {n: pickle.dumps(frame.pop(n).tolist()) for n in names if n in _UNIQUE}
-                frame = frame.astype({name: _DTYPES[name] for name in names if name not in unique})
-                del some
-                for name, texts in unique.items():
-                    frame[name] = pd.array(pickle.loads(texts), dtype=_DTYPES[name])
-                parts.append(frame[names])
+                columns = dict(zip(names, zip(*some, strict=True), strict=True)) if some else {}
+                parts.append(
+                    pd.DataFrame(
+                        {
+                            # Equal texts of a column are one object.
+                            name: pd.array(
+                                [once.setdefault(value, value) for value in columns.get(name, ())]
+                                if _DTYPES[name] == "string"
+                                else list(columns.get(name, ())),
+                                dtype=_DTYPES[name],
+                            )
+                            for name in names
+                        }
+                    )
+                )
             return pd.concat(parts, ignore_index=True)
 
     def _wait_for(self, statement: str) -> None:
-        """Execute a statement; while another program locks the file, try again, with a warning
-        before the third time."""
-        for tries in itertools.count():
-            if tries == 2:
-                warnings.warn(
-                    f"another program has {self.folder / RUNS_FILE} open: waiting for it",
-                    stacklevel=2,
-                )
+        """Execute a statement; while another program locks the file, warn once and try again."""
+        for attempt in itertools.count():
             try:
                 self._db.execute(statement)
                 return
             except sqlite3.OperationalError as error:
-                if not error.sqlite_errorname.startswith(_LOCKED):
+                if error.sqlite_errorname not in ("SQLITE_BUSY", "SQLITE_LOCKED"):
                     raise
+            if not attempt:
+                warnings.warn(
+                    f"another program has {self.folder / RUNS_FILE} open: waiting for it",
+                    stacklevel=2,
+                )
 
 
-def _as_text(value: Any) -> Any:
-    """Return a list, a tuple or a dictionary as JSON, and any other value unchanged."""
-    is_table = isinstance(value, dict | list | tuple)
-    return json.dumps(value, ensure_ascii=False) if is_table else value
+_RESUME = "repeat the `coartic run` command"
 
 
 def _cell_row(cell: Cell) -> dict[str, Any]:
-    """Return the row of a cell in table ``cells``, values by column, without its id."""
-    method = vars(cell.method)
-    return {name: method[name] for name in _OF_METHOD} | {
+    """Return the row of a cell in table ``cells``, values by column, except its place in a plan."""
+    return {
+        "id": cell.id,
         "digest": cell.digest,
+        "code": cell.method.code,
         "task": cell.task.name,
-        "definition": cell.definition,
         "method": cell.method.name,
-        "information": ", ".join(cell.method.information),
-        "parameters": cell.parameters,
         "setting": cell.setting,
-        "model": PAPER.for_radius(cell.task.radius)._asdict(),
-        "trial_budget": cell.trial_budget,
+        "information": ", ".join(cell.method.information),
+        "parameters": json.dumps(cell.parameters, ensure_ascii=False),
+        "content": json.dumps(cell.content, ensure_ascii=False),
     }
+
+
+def _cell_from(cell_id: str, content: str) -> Cell:
+    """Return a cell from its ``content``, JSON; ``where`` of its method is empty. Raises ValueError
+    if the content makes no cell, or another cell than ``cell_id`` says."""
+    cell: Cell = _CELL.validate_python(json.loads(content))
+    if cell.id != cell_id:
+        raise ValueError(f"{cell.label} on {cell.task.name} is not the cell that was run")
+    return cell
+
+
+def _environment_row(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the row of an environment: the versions, platform and commit of a process."""
+    commit = content.get("commit")
+    return {
+        "id": hash_of(content)[:16],
+        "content": json.dumps(content, ensure_ascii=False, sort_keys=True),
+        "commit": commit and commit["id"] + "+" * commit["dirty"],
+        "packages": hash_of([content.get("python"), content.get("packages")])[:8],
+    }
+
+
+def _from_row(kind: Any, row: sqlite3.Row) -> Any:
+    """Return an object of a dataclass, whose fields are columns of a row."""
+    return kind(**{name: row[name] for name in vars(kind())})
 
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
     """Open a results folder for reading in the block of this context. Raises CoarticError if the
-    folder has no results, or results in another format, and while a ``coartic run`` writes into it
-    (:func:`lock`)."""
+    folder has no results, or results in another format."""
     path = folder / RUNS_FILE
     with explain_errors(folder):
-        try:
-            path.lstat()
-        except (FileNotFoundError, NotADirectoryError):
+        if not path.is_file():
             near = [*folder.parent.glob(RUNS_FILE), *sorted(folder.glob(f"*/{RUNS_FILE}"))][:3]
             meant = " or ".join(str(each.parent) for each in near)
             hint = f"; did you mean {meant}?" if near else ""
             what = f"{folder} is not a results folder: it has no {RUNS_FILE}"
             what = what if os.path.lexists(folder) else f"there is no folder {folder}"
-            raise CoarticError(f"{what}{hint}") from None
-        _check_files(folder)
-        opened = _connect(f"{path.absolute().as_uri()}?mode=rw", 5 * WAIT_S)
+            raise CoarticError(f"{what}{hint}")
+        opened = _connect(f"{path.absolute().as_uri()}?mode=rw")
     with closing(opened) as connection:
         with explain_errors(folder):
             connection.execute("PRAGMA query_only = ON")
             connection.execute("BEGIN")  # all reads of this block see one state
-            if not _has_tables(connection):
-                raise CoarticError("it is not finished; repeat the `coartic run` command")
-            with lock(folder, shared=True):  # refused while a process writes
-                pass
+            if not _has_tables(connection, path):
+                raise CoarticError(f"{folder} is not finished: {_RESUME}")
         yield Store(folder, connection)
 
 
@@ -639,9 +504,9 @@ def open_store(folder: Path) -> Iterator[Store]:
 def open_content(content: bytes, name: str) -> Iterator[Store]:
     """Open the content of a ``runs.sqlite`` in memory for reading; ``name`` stands for its folder
     in messages."""
-    with closing(_connect(":memory:", WAIT_S)) as connection:
+    with closing(_connect(":memory:")) as connection:
         connection.deserialize(content)
-        yield Store(Path(name), connection)
+        yield Store(Path(name), connection, content)
 
 
 @contextmanager
@@ -649,135 +514,90 @@ def writing(folder: Path) -> Iterator[Store]:
     """Open a results folder for writing in the block of this context, by this process alone
     (:func:`lock`), and make a missing folder. Raises CoarticError if the folder holds something
     else or cannot be written, and while another process writes into it."""
+    path = folder / RUNS_FILE
     with explain_errors(folder):
-        visible = (entry for entry in folder.glob("*") if not entry.name.startswith("."))
-        if not (folder / RUNS_FILE).exists() and any(visible):
+        if folder.is_dir() and not path.exists() and any(folder.glob("[!.]*")):
             raise CoarticError(
                 f"{folder} is not empty and holds no results of coartic. Choose another folder."
             )
         make_folder(folder)
     with lock(folder):
         with explain_errors(folder):
-            _check_files(folder)
-            opened = _connect((folder / RUNS_FILE).absolute().as_uri(), WAIT_S)
+            opened = _connect(path.absolute().as_uri())
         with closing(opened) as connection:
             with explain_errors(folder):
-                is_there = _has_tables(connection)  # raises before anything is written
+                is_there = _has_tables(connection, path)  # raises before anything is written
                 # No write-ahead log, which is unsafe on network disks and adds a file.
                 connection.execute("PRAGMA journal_mode = DELETE")
+                connection.execute("PRAGMA foreign_keys = ON")
                 if not is_there:
-                    marks = (
-                        f"PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = {FORMAT}"
-                    )
-                    connection.executescript(";\n".join(["BEGIN", *_SCHEMA, marks, "COMMIT"]))
+                    connection.executescript(_SCHEMA)
             yield Store(folder, connection)
 
 
 @contextmanager
-def lock(folder: Path, *, shared: bool = False, command: str = "coartic run") -> Iterator[None]:
-    """Lock a folder for this process in the block of this context, or, with ``shared``, share the
-    lock with other readers; do nothing where the folder cannot be opened, or the disk has no such
-    locks. Raises CoarticError, which names ``command``, if the lock is held elsewhere,
-    and without ``shared`` stays so for 1 s."""
+def lock(folder: Path, *, command: str = "coartic run") -> Iterator[None]:
+    """Lock a folder for this process in the block of this context; do nothing where the disk has no
+    such locks. Raises CoarticError, which names ``command``, if the lock is held elsewhere."""
+    opened = os.open(folder, os.O_RDONLY)
     try:
-        opened = os.open(folder, os.O_RDONLY)
-    except OSError:
-        yield
-        return
-    end = time.monotonic() + (0 if shared else WAIT_S)  # a reader holds the lock for a moment
-    try:
-        while True:
-            try:
-                fcntl.flock(opened, fcntl.LOCK_NB | (fcntl.LOCK_SH if shared else fcntl.LOCK_EX))
-                break
-            except BlockingIOError:
-                if time.monotonic() > end:
-                    raise CoarticError(
-                        f"another `{command}` is at work in {folder}; wait for it, or choose "
-                        "another folder"
-                    ) from None
-                time.sleep(WAIT_S / 20)
-            except OSError:
-                break
+        try:
+            fcntl.flock(opened, fcntl.LOCK_NB | fcntl.LOCK_EX)
+        except BlockingIOError:
+            raise CoarticError(
+                f"another `{command}` is at work in {folder}; wait for it, or choose another folder"
+            ) from None
+        except OSError:  # as on some network disks
+            pass
         yield
     finally:
         os.close(opened)
 
 
-def _connect(where: str, timeout_s: float) -> sqlite3.Connection:
-    """Return a connection to a ``file:`` address or ``:memory:`` that waits ``timeout_s``, seconds,
-    for a lock."""
-    connection = sqlite3.connect(where, timeout=timeout_s, isolation_level=None, uri=True)
+def _connect(where: str) -> sqlite3.Connection:
+    """Return a connection to a ``file:`` address or ``:memory:``."""
+    connection = sqlite3.connect(where, timeout=WAIT_S, isolation_level=None, uri=True)
     connection.row_factory = sqlite3.Row
     connection.execute("PRAGMA trusted_schema = OFF")
-    connection.execute("PRAGMA cell_size_check = ON")
-    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
     return connection
 
 
-def _check_files(folder: Path) -> None:
-    """Raise CoarticError if ``runs.sqlite``, or a file that SQLite keeps next to it, is a symbolic
-    link or no regular file; missing files pass."""
-    for ending in ("", "-journal", "-wal", "-shm"):
-        path = folder / f"{RUNS_FILE}{ending}"
-        if path.is_symlink():
-            holder = plain(str(Path(os.path.realpath(path)).parent))
-            raise CoarticError(f"{path} is a link: name the folder that holds the file, {holder}")
-        if path.exists() and not path.is_file():
-            kind = "a folder" if path.is_dir() else "a pipe or a device"
-            raise CoarticError(
-                f"{path} is {kind}, not a file: move it away, or name another folder"
-            )
-
-
-def _has_tables(connection: sqlite3.Connection) -> bool:
-    """Return True if the file is marked as coartic's in this format, and False if the file has
-    neither this mark nor tables. Additions of other programs pass, except triggers. Raises
-    CoarticError for any other file, and ValueError for a row that names a missing row."""
+def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
+    """Return True if the file ``path`` is marked as coartic's in this format, and False if it is
+    empty. Raises CoarticError for any other file."""
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
-    there = {kind for (kind,) in connection.execute("SELECT type FROM sqlite_master")}
     if application != _APPLICATION:
-        if there:
+        if connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
             raise CoarticError(
-                "it is not a file of coartic, or was restored from a dump: move it away, or copy "
-                "the file itself"
+                f"{path} is not a file of coartic, or was restored from a dump: move it away, or "
+                "copy the file itself"
             )
         return False
     if version > FORMAT:
-        raise CoarticError("it was written by a later version of coartic: update coartic")
+        raise CoarticError(f"{path} was written by a later version of coartic: update coartic")
     if version < FORMAT:
+        writer = "an earlier version of coartic"
+        with suppress(sqlite3.Error, TypeError):
+            query = "SELECT max(json_extract(content, '$.coartic')) FROM environments"
+            writer = f"coartic {connection.execute(query).fetchone()[0]}"
         raise CoarticError(
-            "it was written by coartic 3.0.0 or earlier: version 3.0.0 reads it, or says which "
-            "version does; or run the suite again with another --out"
+            f"{path} was written by {writer}, in a format that this version does not read: "
+            "`coartic run` with another --out makes the runs again"
         )
-    if "trigger" in there:
-        raise CoarticError(
-            "it has a trigger, which changes what is written: restore a copy, or run the suite "
-            "again with another --out"
-        )
-    for table, row, missing, _ in connection.execute("PRAGMA foreign_key_check"):
-        raise ValueError(f"row {row} of {table} names a row of {missing} that is not there")
     return True
-
-
-_UNREADABLE = (
-    *(OSError, sqlite3.DatabaseError, zlib.error),
-    *(ValueError, LookupError, TypeError, OverflowError, RecursionError),
-)
-"""Errors that a file raises that cannot be used, or whose content coartic did not write."""
 
 
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
-    """Turn an error of the block of this context into a CoarticError that names the file: of the
-    system (the file that it names, else ``runs.sqlite`` in ``folder``), of SQLite, a CoarticError
-    (kept, as one line, if it names the file or the folder), and any ValueError, LookupError,
-    TypeError, OverflowError, RecursionError or error of zlib, which are taken for content that
-    coartic does not write. Other errors pass."""
+    """Turn an error of the block of this context into a CoarticError that names the file.
+
+    Errors of the system and of SQLite are explained. A ValueError, LookupError, TypeError or error
+    of zlib stands for content that coartic did not write. Other errors pass.
+    """
     try:
         yield
-    except (CoarticError, *_UNREADABLE) as error:
+    except (OSError, sqlite3.Error, zlib.error, ValueError, LookupError, TypeError) as error:
         raise CoarticError(_explain(folder / RUNS_FILE, error)) from None
 
 
@@ -793,9 +613,9 @@ _SENTENCES = {
     "there, copy the whole folder, and use the copy",
     "SQLITE_READONLY_DBMOVED": "it was removed, renamed or replaced while the suite ran: put it "
     "back, or repeat the command to start again",
+    "SQLITE_CANTOPEN": "it cannot be opened: look at the rights of the file and of its folder",
     "SQLITE_CORRUPT": _DAMAGED,
     "SQLITE_NOTADB": _DAMAGED,
-    "SQLITE_TOOBIG": f"a value has more than {LONGEST_VALUE} bytes, which coartic does not write",
     "SQLITE_IOERR": "the system cannot read or write it, as where a disk, a quota or the limit of "
     "file size (`ulimit -f`) is full: make room, and repeat the command",
     "SQLITE_FULL": "the disk is full: make room, and repeat the command",
@@ -806,18 +626,11 @@ _SENTENCES = {
 def _explain(path: Path, error: Exception) -> str:
     """Return the sentence of :func:`explain_errors` on an error of the file ``path``."""
     said = plain(str(error), 200) or type(error).__name__
-    if isinstance(error, CoarticError):
-        said = one_line(str(error))
-        named = "|".join(re.escape(str(each)) for each in (path, path.parent))
-        if re.search(rf"(?<!\S)({named})(?!\w)", said):  # no point in "3.0.0" is folder "."
-            return said
-    elif isinstance(error, OSError):
+    if isinstance(error, OSError):
         path, said = Path(error.filename or path), error.strerror or said
     elif isinstance(error, sqlite3.Error):
         name = getattr(error, "sqlite_errorname", "")
         said = _SENTENCES.get(name, _SENTENCES.get("_".join(name.split("_")[:2]), said))
-        if name.startswith("SQLITE_CANTOPEN"):
-            said = _why_not_opened(path) or said
         if "decode to UTF-8" in said or said.startswith("no such table"):  # cut while it is open
             said = _DAMAGED
     else:
@@ -826,31 +639,11 @@ def _explain(path: Path, error: Exception) -> str:
     return f"cannot use {plain(str(path))}: {said}"
 
 
-def _why_not_opened(path: Path) -> str:
-    """Return why SQLite cannot open a file, in words; empty if the reason is not known."""
-    try:
-        path.open("rb").close()
-    except FileNotFoundError:
-        return "" if os.access(path.parent, os.W_OK) else "its folder may not be written"
-    except OSError as error:
-        return error.strerror or str(error)
-    if len(str(path.absolute())) >= _LONGEST_PATH:
-        return f"SQLite takes no path of {_LONGEST_PATH} letters: name a folder higher up"
-    return ""
-
-
-def _unpack(blob: bytes, trials: int | None) -> Array:
-    """Return the rewards that a ``blob`` of table ``learning`` holds (:func:`reward_bytes`), shape
-    ``(k,)`` with k up to ``trials``; NaN for a trial that failed or whose reward is not kept.
-    Raises ValueError for a blob that cannot be unpacked or has more rewards than trials."""
-    size = 4 * (1 + min(trials or 0, MOST_TRIALS))
-    try:
-        packed = zlib.decompressobj()
-        content = packed.decompress(blob, size + 1)
-        if len(content) > size or not packed.eof:
-            raise ValueError
-        numbers = np.frombuffer(content, np.uint8).reshape(4, -1).T.copy().view("<u4").ravel()
-        best = numbers[:1].view("<i4")
-        return np.where(numbers[1:] == 0, np.nan, best + 1.0 - numbers[1:])
-    except (zlib.error, ValueError, TypeError):
-        raise ValueError(f"the rewards of {trials} trials are damaged") from None
+def _unpack(blob: bytes | None) -> Array:
+    """Return the rewards in a ``blob`` (:func:`reward_bytes`), shape ``(k,)``; NaN for a trial that
+    failed or whose reward is not kept. Raises zlib.error or ValueError for a damaged blob."""
+    if blob is None:
+        return np.empty(0)
+    numbers = np.frombuffer(zlib.decompress(blob), np.uint8).reshape(4, -1).T.copy().view("<u4")
+    best, worse = numbers[:1].view("<i4").ravel(), numbers[1:].ravel()
+    return np.where(worse == 0, np.nan, best + 1.0 - worse)

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from coartic.analysis import interval, load
-from coartic.analysis.sections import TABLES
+from coartic.analysis import TABLES, interval, load
 
 README = Path(__file__).parents[2] / "README.md"
 

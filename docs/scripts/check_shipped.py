@@ -16,7 +16,6 @@ import pandas as pd
 
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import perform_runs_again
-from coartic.runs.method_info import version_of
 from coartic.runs.record import PARTS, Run
 from coartic.runs.shipped import open_shipped, shipped_hashes
 
@@ -24,8 +23,8 @@ CELL = ["suite", "task", "method", "setting"]
 
 
 def shipped_runs() -> pd.DataFrame:
-    """Return all shipped runs that have a solution, the cheapest first, with their ``suite``,
-    ``version`` and ``family`` (of a task of the paper: its name)."""
+    """Return all shipped runs that have a solution, the cheapest first, with their ``suite`` and
+    ``family`` (of a task of the paper: its name)."""
     frames = []
     for suite in shipped_hashes():
         with open_shipped(suite) as store:
@@ -33,10 +32,8 @@ def shipped_runs() -> pd.DataFrame:
     runs = pd.concat(frames)
     runs = runs[runs.status == "ok"].sort_values(["cpu_s", "run_id"])
     here = {name: info.code for name, info in built_in().items()}
-    version = runs.code.map(version_of)
     return runs.assign(
-        version=version,
-        is_current=version == runs.method.map(here),
+        is_current=runs.code == runs.method.map(here),
         family=runs.task.str.partition("/")[0],
     )
 
@@ -90,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"{rows.is_current.sum()} shipped runs performed again: {len(found) or 'none'} differ.")
     print(*(f"- {sentence}" for sentence in found), sep="\n", end="\n" * bool(found))
     print(f"To be made again, as of earlier versions: {len(old) or 'no'} of {len(runs)} runs.")
-    for (suite, method, version), of in old.groupby(["suite", "method", "version"]):
+    for (suite, method, version), of in old.groupby(["suite", "method", "code"]):
         print(f"- {suite}: {len(of)} of {method} {version}; here {built_in()[method].code}")
     return int(bool(found) or (asked.release and len(old) > 0))
 

@@ -33,9 +33,9 @@ def changed_runs(folder: Path) -> Iterator[str]:
         plan = made.plan()
         for method in (job.cell.method for job in plan):
             here = built_in()[method.name].code if method.name in built_in() else "missing"
-            if here != method.version:
+            if here != method.code:
                 raise CoarticError(
-                    f"{folder} has {method.name} {method.version}, and here it is {here}: run the "
+                    f"{folder} has {method.name} {method.code}, and here it is {here}: run the "
                     "suite again"
                 )
         if (suite := plan[0].suite) not in shipped.shipped_hashes():

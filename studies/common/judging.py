@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from coartic import CoarticError
 from coartic.analysis import interval, mean
-from coartic.analysis.statistics.hypotheses import bootstrap_test, holm
+from coartic.analysis.statistics import bootstrap_test, holm
 from coartic.analysis.words import p_value
 from coartic.estimates import FEWEST, LEVEL, Estimate
 

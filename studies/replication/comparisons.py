@@ -8,7 +8,7 @@ import pandas as pd
 from published import Summary
 
 from coartic.analysis import interval, mean, number
-from coartic.analysis.statistics.hypotheses import bootstrap_test, exchange_test
+from coartic.analysis.statistics import bootstrap_test, exchange_test
 from coartic.estimates import difference_of_means
 from common.judging import Finding
 

@@ -11,7 +11,7 @@ from comparisons import written
 from published import published_cell
 from reader import EC2, EC3, EC4, MARGINS, TASK_1, TASK_2, MissingError
 
-from coartic.analysis.statistics.hypotheses import share_test
+from coartic.analysis.statistics import share_test
 from coartic.estimates import Estimate, difference_of_means
 from common.judging import Finding, all_of
 

@@ -12,7 +12,7 @@ from comparisons import Higher, Measurement, all_higher, all_positive
 from reader import CELLS_OF_ONE_ARM, CELLS_OF_TWO_ARMS, EC1, EC3, EC4, MARGINS, ONE_ARMED, TWO_ARMED
 
 from coartic.analysis import number
-from coartic.analysis.signatures.two_contexts import movable
+from coartic.analysis.signatures import movable
 from coartic.estimates import SEED, Estimate
 from common.judging import Finding
 

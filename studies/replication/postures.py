@@ -23,7 +23,7 @@ from reader import (
 )
 
 from coartic.analysis import TwoContexts, contexts_of_control, number
-from coartic.analysis.signatures.context_tests import posture_difference_below
+from coartic.analysis.signatures import posture_difference_below
 from coartic.estimates import SEED, Estimate
 from common.judging import Finding
 

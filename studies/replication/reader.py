@@ -139,7 +139,8 @@ class Reader:
     def signature(self, name, task, label, *, replay=False):
         """Return a signature of coarticulation of the runs that have this signature."""
         self.runs(task, label)
-        values = self.study.signature_of(name, task, label, replay=replay)
+        values = self.study.signature(name, task, label, replay=replay).to_numpy(np.float64)
+        values = values[np.isfinite(values)]
         return self.shown(name, task, label, values, "in noiseless replays, " * replay)
 
     def beyond_random_search(self, name, task, label):

@@ -98,5 +98,9 @@ def test_the_page_on_studies_has_a_whole_study(tmp_path):
         for file in made:
             file.unlink()
     assert written[0] == written[1]
-    assert b"gap is 0.0 %" in written[0][0]
-    assert read(folder / "claims.csv").evidence["goals-ahead-gain"].startswith("The gap falls by 9")
+    assert b"gap is 2.2 [0.2, 8.0] %" in written[0][0]
+    assert (
+        read(folder / "claims.csv")
+        .evidence["goals-ahead-gain"]
+        .startswith("The gap falls by 2.92 ")
+    )

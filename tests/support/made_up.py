@@ -140,7 +140,17 @@ def study_of_solutions(cells, rows=None, replays=(), **parts):
         rows = [run for cell in cells for run in runs_of(
             cell.task.name, cell.label, [-300] * len(cell.runs) or [None],
             hands=[getattr(run, "hands", "LRLR") for run in cell.runs] or "")]  # fmt: skip
-    executed = {(cell.task.name, cell.label): cell for cell in cells}
-    executed |= {(*key, True): replace(cell, runs=()) for key, cell in executed.items()}
-    executed |= {(cell.task.name, cell.label, True): cell for cell in replays}
+    ids = dict[tuple[str, str], list[str]]()
+    for run in rows:
+        if run["status"] == "ok":
+            label = f"{run['method']} {run['setting']}".strip()
+            ids.setdefault((run["task"], label), []).append(run["run_id"])
+
+    def identified(cell):
+        key = cell.task.name, cell.label
+        return key, replace(cell, run_ids=tuple(ids.get(key, ())[: len(cell.runs)]))
+
+    executed = dict(map(identified, cells))
+    executed |= {(*key, True): replace(cell, runs=(), run_ids=()) for key, cell in executed.items()}
+    executed |= {(*key, True): cell for key, cell in map(identified, replays)}
     return study_of(rows, [cell.task for cell in cells], executed=made(executed), **parts)

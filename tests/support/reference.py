@@ -43,8 +43,8 @@ def move(robot, q, target, hand, goal, radius, *, stop_on_arrival=True, model=PA
     )
     kind = "path" if len(waypoints) else "learned" if stop_on_arrival else "corrective"
     corners = np.atleast_2d(waypoints if len(waypoints) else target)
-    movement = verify.MoveRow(0, 1, hand, kind, verify.MOST_TICKS, corners)
-    end, ticks, hit = verify.make(rules, np.array(q, dtype=np.float64), movement)
+    start = np.array(q, dtype=np.float64)
+    end, ticks, hit = verify.make(rules, start, 1, hand, kind, corners)
     return MoveResult(end, ticks, hit, ticks + 1)
 
 

@@ -1,6 +1,7 @@
 """Suites run into folders, in this process where processes are not what is tested."""
 
 import fcntl
+import json
 import lzma
 import os
 import sqlite3
@@ -9,7 +10,6 @@ from contextlib import closing
 import pandas as pd
 
 from coartic import load_task
-from coartic.analysis import verify
 from coartic.analysis.study import load
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
@@ -112,18 +112,17 @@ def edit(folder, statement, *values):
         database.commit()
 
 
-def moved(joint, by):
-    """SQL of the path of straight movements with a joint moved; joints are ``$[0]``, ``$[1]``..."""
-    new = f"json_set(path, '{joint}', json_extract(path, '{joint}') + {by})"
-    return f"CASE kind WHEN 'path' THEN path ELSE {new} END"
-
-
-def edit_plan(folder, statement, *values):
-    """A change of a plan by hand, as if coartic had written it so."""
-    edit(folder, statement, *values)
+def edit_movement(folder, run, change, part="solution", order=0):
+    """A change of a stored movement by hand: of run number ``run`` in the order in which they were
+    written, from 1. ``change`` gets goal, hand, kind, ticks and path, a list of numbers."""
     with closing(sqlite3.connect(folder / RUNS_FILE)) as database:
-        rows = [[*row] for query in verify.PLANNED for row in database.execute(query)]
-    edit(folder, "UPDATE suite SET plan_hash = ?", verify.hash_of(rows))
+        query = "SELECT movements FROM results WHERE rowid = ?"
+        parts = json.loads(database.execute(query, [run]).fetchone()[0])
+        movement = parts[part][order]
+        movement[4] = json.loads(movement[4])
+        change(movement)
+        movement[4] = json.dumps(movement[4], separators=(",", ":"))
+    edit(folder, "UPDATE results SET movements = ? WHERE rowid = ?", json.dumps(parts), run)
 
 
 def same_results(a, b):

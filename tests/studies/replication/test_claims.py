@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from coartic import corrective_trial, load_task
-from coartic.analysis.solutions import Solutions
-from coartic.analysis.statistics.hypotheses import exchange_test
+from coartic.analysis.signatures import Solutions
+from coartic.analysis.statistics import exchange_test
 from common.judging import Finding, judge
 from tests.support.made_up import found, row, runs_of, study_of, study_of_solutions
 from tests.support.processes import program

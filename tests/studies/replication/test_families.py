@@ -4,13 +4,14 @@ import importlib
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from coartic.analysis.methods import EC2, EC4, RANDOM_SEARCH
 from common import judging
 from tests.support.made_up import MadeUp
 from tests.support.processes import programs
-from tests.test_random_tasks import ALONE, ONE, RISING, TWO, hands_of, rewarded
+from tests.test_random_tasks import ALONE, ONE, RISING, TWO, rewarded
 
 (STUDY,) = programs("replication", "study")
 claims, reader = map(importlib.import_module, ("claims", "reader"))
@@ -25,7 +26,7 @@ def with_signatures(study, of_random_search=0.5):
     """A study whose runs are not executed: their signatures are made up, those of random search as
     a share of the learner's, more by a little."""
 
-    def signature_of(name, task, label, *, replay=False):
+    def signature(name, task, label, *, replay=False):
         number = int(task[-3:])
         values = {
             "arm": [2.0, 3.0 + 0.1 * number],
@@ -37,15 +38,17 @@ def with_signatures(study, of_random_search=0.5):
             values["other arm"] = [0.3 + 0.01 * number]
         shown = np.array(values.get(name, ()))
         if label == RANDOM_SEARCH:
-            return of_random_search * shown + 0.001 * (number - 2)
-        return shown
+            shown = of_random_search * shown + 0.001 * (number - 2)
+        return of_runs(study, task, label, shown)
 
-    def by_hands(name, task, label):
-        values = signature_of(name, task, label)
-        return {"" if name == "hand" else hands_of(task): values} if len(values) else {}
+    return MadeUp(study, **vars(study), signature=signature)
 
-    parts = {"signature_of": signature_of, "signature_by_hands": by_hands}
-    return MadeUp(study, **vars(study), **parts)
+
+def of_runs(study, task, label, values):
+    """Values of the first runs of a method on a task; the others have none."""
+    return pd.Series(values, study.cells[task, label].index[: len(values)], dtype=float).reindex(
+        study.cells[task, label].index
+    )
 
 
 @pytest.fixture(scope="module")
@@ -77,12 +80,12 @@ def test_a_claim_that_one_family_does_not_judge_says_what_the_others_show(rising
     """Random search improves on the corrective process on two tasks of a family alone."""
     study = with_signatures(rising)
 
-    def by_hands(name, task, label):
+    def signature(name, task, label, *, replay=False):
         if label == RANDOM_SEARCH and task.startswith("long/") and int(task[-1]) > 1:
-            return {}
-        return study.signature_by_hands(name, task, label)
+            return of_runs(study, task, label, [])
+        return study.signature(name, task, label)
 
-    seen = MadeUp(study, **vars(study) | {"signature_by_hands": by_hands})
+    seen = MadeUp(study, **vars(study) | {"signature": signature})
     entry = claims.judge_claims(seen, ["arm-coarticulation-in-general"]).iloc[0]
     assert entry.more_than_one_selection == "undecided"
     assert "long/v1: 2.68 [" in entry.evidence  # the mean of 2, and 3 + n / 10, over n = 0 to 7
@@ -97,12 +100,13 @@ def test_hands_are_learned_where_they_differ_from_the_closest(rising):
     study = with_signatures(rising, of_random_search=0.1)
 
     def verdict(more):
-        def signature_of(name, task, label, *, replay=False):
+        def signature(name, task, label, *, replay=False):
             if label not in (EC2, EC4):
-                return study.signature_of(name, task, label)
-            return np.array([0.4, 0.6]) + (more + 0.01 * int(task[-1])) * (label == EC4)
+                return study.signature(name, task, label)
+            values = np.array([0.4, 0.6]) + (more + 0.01 * int(task[-1])) * (label == EC4)
+            return of_runs(study, task, label, values)
 
-        seen = MadeUp(study, **vars(study) | {"signature_of": signature_of})
+        seen = MadeUp(study, **vars(study) | {"signature": signature})
         return claims.judge_claims(seen, ["hand-coarticulation-in-general"]).replicates.iloc[0]
 
     verdicts = [verdict(more) for more in (0.1, -0.2, -0.02)]

@@ -1,4 +1,4 @@
-"""Tests of means and shares, and Holm's correction for several tests.
+"""Tests of hypotheses on runs, and means over tasks with their intervals.
 
 Two means have tests by exchange, a mean against a number the bootstrap, shares exact binomial
 tests. Samples and seeds are as in :mod:`coartic.estimates`.
@@ -6,34 +6,46 @@ tests. Samples and seeds are as in :mod:`coartic.estimates`.
 Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 16;
 A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, chapter 4
 (p-values that count the observed sample); S. Holm (1979), Scandinavian Journal of Statistics 6.
+
+For other runs on the same tasks, all tasks have the same weight, whatever their number of runs, and
+the bootstrap resamples runs within tasks.
+
+For other tasks, the sample has runs within instances within families. The bootstrap is hierarchical
+(A. C. Davison & D. V. Hinkley 1997, Bootstrap Methods and their Application, section 3.8): it
+resamples instances within families, then runs within instances. Families are fixed and have the
+same weight. A mixed model does not fit: gaps to an optimum are skewed and bounded by 0, and their
+spread over runs differs between methods and tasks.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import combinations, islice
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from coartic.estimates import (
+    FEWER_RESAMPLES,
     FEWEST,
     IN_CACHE,
     NEGLIGIBLE,
     RESAMPLES,
     SEED,
+    TAILS,
     Estimate,
     Resamples,
     centred,
+    mean_of_means,
     slices,
     vector,
 )
-from coartic.internal.arguments import Numbers, checked_arguments
+from coartic.internal.arguments import Numbers
 from coartic.internal.limits import MOST_RUNS
 from coartic.robot import Array
 
@@ -43,7 +55,6 @@ _Count = Annotated[int, Field(ge=0, le=MOST_RUNS)]
 _Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-@checked_arguments
 def bootstrap_test(
     values: Numbers,
     bound: float,
@@ -81,7 +92,6 @@ def bootstrap_test(
     return Estimate(difference, p=p, n=(n,), resamples=resamples, least_p=least)
 
 
-@checked_arguments
 def exchange_test(
     first: Numbers,
     second: Numbers,
@@ -261,7 +271,6 @@ def _kept_places(
     return [*places(runs, chosen, resamples, exact, np.random.default_rng(SEED))]
 
 
-@checked_arguments
 def share_test(count: _Count, total: _Count, share: _Share, alternative: Alternative) -> Estimate:
     """Test ``count`` of ``total`` runs against a share (0 to 1) by the exact binomial test.
 
@@ -273,7 +282,6 @@ def share_test(count: _Count, total: _Count, share: _Share, alternative: Alterna
     return Estimate(count / total - share, p=p, n=(total,))
 
 
-@checked_arguments
 def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
 
@@ -292,3 +300,81 @@ def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     adjusted = np.empty_like(p)
     adjusted[order] = np.minimum(1.0, steps)
     return list(map(float, adjusted))
+
+
+Scores = Mapping[str, Sequence[Numbers]]
+"""Scores of the runs on each instance, shape ``(n,)``, by family."""
+
+
+def task_mean(values: Iterable[ArrayLike]) -> Estimate:
+    """Return the mean over tasks of the mean over runs, with the interval of
+    :func:`.mean_of_means`, for ``values`` of shape ``(runs,)`` on each task. Raises ValueError
+    without tasks, and for a task without runs."""
+    strata = [*map(vector, values)]
+    return mean_of_means(strata, [1 / len(strata) for _ in strata])
+
+
+def other_tasks(scores: Scores) -> Estimate:
+    """Return the mean over families, instances and runs, with its interval for other tasks.
+
+    Parameters
+    ----------
+    scores : mapping of str to sequence of arrays, shape (runs,)
+        For each family, the scores of the runs on each instance.
+
+    Returns
+    -------
+    Estimate
+        ``value``, ``low`` and ``high`` in the unit of the scores; ``n`` instances of each family.
+
+    Raises
+    ------
+    ValueError
+        There is no family, a family has no instance, or an instance no run.
+
+    Examples
+    --------
+    >>> gaps = [np.array([0.1, 0.2]), np.array([0.3]), np.array([0.2, 0.4])]
+    >>> gap = other_tasks({"field": gaps})
+    >>> round(gap.value, 3), gap.n
+    (0.25, (3,))
+
+    Notes
+    -----
+    A percentile interval, widened by √(k / (k − 1)) for the k instances of a family, because the
+    bootstrap underestimates the spread of a mean by this factor. The interval is a little too wide
+    for few runs with much noise, which the means of instances contain already, and does not exceed
+    the means over families of the least and of the greatest score of a run. No interval (NaN) if a
+    family has fewer than three instances.
+    """
+    if not scores or not all(scores.values()):
+        raise ValueError("a mean over instances needs one instance of each family")
+    samples = {family: [*map(vector, instances)] for family, instances in scores.items()}
+    values = {
+        family: np.array([runs.mean() for runs in instances])
+        for family, instances in samples.items()
+    }
+    mean = float(np.mean([instances.mean() for instances in values.values()]))
+    n = tuple(map(len, values.values()))
+    if min(n) < FEWEST:
+        return Estimate(mean, n=n)
+    deviations = np.zeros(FEWER_RESAMPLES)
+    for place, (family, instances) in enumerate(samples.items()):
+        rng = np.random.default_rng([SEED, place])
+        count = len(instances)
+        which = rng.integers(count, size=(FEWER_RESAMPLES, count))
+        drawn = values[family][which]
+        for number, runs in enumerate(instances):
+            chosen = which == number
+            if np.ptp(runs):
+                places = rng.integers(len(runs), size=(int(chosen.sum()), len(runs)))
+                drawn[chosen] += runs[places].mean(axis=1) - runs.mean()
+        wider = math.sqrt(count / (count - 1))
+        deviations += (drawn.mean(axis=1) - values[family].mean()) * wider
+    if np.abs(deviations).max() <= NEGLIGIBLE * abs(mean):
+        return Estimate(mean, mean, mean, n=n)
+    low, high = mean + np.quantile(deviations / len(values), TAILS)
+    families = samples.values()
+    least = np.mean([min(runs.min() for runs in family) for family in families])
+    most = np.mean([max(runs.max() for runs in family) for family in families])
+    return Estimate(mean, max(float(low), float(least)), min(float(high), float(most)), n=n)

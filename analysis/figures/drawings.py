@@ -1,0 +1,682 @@
+"""Figures of the report: functions of a study, by id in :data:`FIGURES`."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import textwrap
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+
+from coartic import Task
+from coartic.analysis.control import contexts_of_control, shared_goal
+from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import (
+    DrawsFigure,
+    Parts,
+    Plot,
+    figure,
+    looks_in,
+    name_in_figure,
+    spoken,
+)
+from coartic.analysis.methods import (
+    BY_TRIAL,
+    EC1,
+    GROUPS,
+    KNOWN_METHODS,
+    LEARNERS,
+    RANDOM_SEARCH,
+    WITHOUT_REWARD,
+    headline_methods,
+    title_of,
+    without_settings,
+)
+from coartic.analysis.running_times import (
+    TARGETS,
+    best_after,
+    improvements,
+    interval_by_budget,
+    runs_with_targets,
+    runtimes,
+    target_ranges,
+    times_on_tasks,
+)
+from coartic.analysis.signatures import TwoContexts
+from coartic.analysis.standings import ranked_tasks, reference, runs_on, standings
+from coartic.analysis.statistics import other_tasks
+from coartic.analysis.study import Study, solved
+from coartic.analysis.tables import by_family, list_runtimes, list_saved, on_instances
+from coartic.analysis.words import capital, id_of, interval, listed, marked, number, titled_apart
+from coartic.estimates import Estimate
+from coartic.internal.text import counted
+from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
+from coartic.tasks.task import shipped_tasks
+
+
+def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
+    """Draw the gap against the values of the only parameter that is varied (:attr:`.Study.varied`),
+    or else, also with fewer than two gaps of values, gaps of ranked methods; None without a gap.
+    ``how``: see :data:`.DrawsFigure`."""
+    plot = _draw_varied(study, **how) or _draw_gaps(study, **how)
+    return plot and replace(plot, id="ranking")
+
+
+@figure(
+    "Gap by value of a parameter",
+    "Gap from the mean reward to the {reference}, as a share of it, with its "
+    f"{style.COVERAGE} bootstrap interval over runs, by the value of the only parameter that is "
+    "varied. n = {n} runs of a value.",
+)
+def _draw_varied(study: Study) -> Parts | None:
+    """Draw gaps against the values of the only parameter that is varied; None with fewer than two
+    values that have a gap."""
+    name, values = study.varied
+    rows = standings(study).query("why == ''")
+    rows = rows.loc[[label for label in values if label in rows.index]]
+    if len(rows) < 2:
+        return None
+    rows = rows.assign(value=[values[label] for label in rows.index]).reset_index(names="method")
+    is_number = all(type(value) in (int, float) for value in rows.value)
+    places = rows.value.to_numpy(np.float64) if is_number else np.arange(len(rows), dtype=float)
+    drawing, (axes,) = style.panels((1, 1), (style.TWO, 2.6))
+    if is_number and places[0] > 0 and places[-1] >= 5 * places[0]:
+        axes.set_xscale("log")
+    texts = [f"{value:g}" if is_number else str(value) for value in rows.value]
+    papers = rows.is_learner & (rows.setting == "")
+    axes.set_xticks(places, [text + "\n(the paper's)" * paper
+                             for text, paper in zip(texts, papers, strict=True)])  # fmt: skip
+    axes.set_xticks([], minor=True)
+    mean: Any = {"color": style.BLUE, "marker": "o", "markersize": 5, "linewidth": 1.6}
+    shown = rows.assign(place=places)
+    tasks = ranked_tasks(study)
+    on = [runs_on(study, method, tasks).groupby("task").gap.mean() for method in rows.method]
+    each_task = tasks if 1 < len(tasks) <= 8 else ()
+    for task in each_task:
+        gaps = [100 * each[task] for each in on]
+        axes.plot(places, gaps, color=style.GREY, linewidth=0.8)
+        at: Any = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
+        axes.annotate(marked(study.tasks[task]), (places[-1], gaps[-1]), color=style.GREY, **at)
+        shown[f"on {task}"] = gaps
+    style.means(axes, shown, x="place", y="gap", scale=100, bars=1.6, **mean)
+    axes.set_ylim(bottom=min(0, 100 * shown.gap_low.min()))
+    axes.set_xlabel(name)
+    axes.set_ylabel(f"gap to the {reference(study, tasks)} (%)")
+    words = (f"{row['value']}: {interval(row, 'gap', scale=100, unit=' %')}"
+             for row in rows.to_dict("records"))  # fmt: skip
+    alt = f"Gap to the {reference(study, tasks)} by {name}: {'; '.join(words)}."
+    thin = "; thin: the gap on each" * bool(each_task)
+    return drawing, shown, alt, f" Means over all tasks{thin}." * (len(tasks) > 1)
+
+
+@figure(
+    "Gap to the best reward",
+    "Gap from the mean reward to the {reference}, as a share of it, with its "
+    f"{style.COVERAGE} bootstrap interval over runs. The axis is logarithmic from 0.1 % on.",
+)
+def _draw_gaps(study: Study) -> Parts | None:
+    """Draw the gap of each ranked method, a mean over tasks, with interval and name, without
+    settings whose method is there; None if no method is ranked."""
+    rows, tasks = standings(study).query("why == ''"), ranked_tasks(study)
+    rows = without_settings(rows).reset_index(names="method")
+    if not len(rows):
+        return None
+    shown = rows.assign(**{name: 100 * rows[name] for name in ("gap", "gap_low", "gap_high")})
+    looks, by_group = looks_in(study, rows.method), shown.groupby("information")
+    lines: list[Any] = []  # headings of groups, and rows
+    for group in [group for group in GROUPS if group in by_group.groups]:
+        lines += [capital(group), *by_group.get_group(group).to_dict("records")]
+    narrow = style.is_narrow()
+    names = [line if isinstance(line, str) else name_in_figure(study, line["method"])
+             for line in lines]  # fmt: skip
+    deep = max(name.count("\n") for name in names)
+    height = (0.145 if narrow else 0.165) + 0.1 * deep  # inches of a line
+    drawing, (axes,) = style.panels((1, 1), (style.TWO, 0.6 + height * len(lines)))
+    gaps = shown[["gap", "gap_low", "gap_high"]]
+    nearest, farthest = gaps.min().min(), max(gaps.max().max(), 0.5)
+    left = min(nearest, 0) if nearest < 0.15 else nearest / 1.3
+    axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
+    steps = (1, 2, 5) if farthest < 100 and not narrow else (1,)
+    ticks = [0, *(n * 10.0**k for k in range(-1, 5) for n in steps)]
+    ticks = [tick for tick in ticks if left <= tick <= 1.1 * farthest]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.set_xticks([], minor=True)
+    axes.set_xlim(left, 1.1 * farthest)
+    axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
+    axes.axvline(0, **style.OPTIMUM)
+    # In a narrow figure headings, which are longer than names, stand on the right.
+    style.name_rows(axes, [name * (isinstance(line, dict) or not narrow)
+                           for name, line in zip(names, lines, strict=True)])  # fmt: skip
+    places: Any = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
+    places |= {"va": "center_baseline"}
+
+    def write_right(y: int, gap: str, n: str, color: str) -> None:
+        axes.annotate(gap, (1, y), (8, 0), color=color, **places)
+        axes.annotate(n, (1, y), (96, 0), color=color, ha="right", **places)
+
+    if not narrow:
+        write_right(1, f"gap (%) [{style.COVERAGE}]", "runs", style.GREY)
+    for place, (row, label) in enumerate(zip(lines, axes.get_yticklabels(), strict=True)):
+        if isinstance(row, str):
+            label.set_color(style.GREY)
+            if narrow:
+                axes.annotate(row, (0, -place), (2, 0), color=style.GREY, **places)
+            continue
+        learner, y = row["is_learner"], -place
+        size = looks[row["method"]]["markersize"] + learner  # a diamond of equal width is smaller
+        look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
+        axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
+        mark = looks[row["method"]]["marker"]
+        (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
+        name = row["title"]
+        style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
+        label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
+        if not narrow:
+            write_right(y, interval(row, "gap"), number(row["runs"]), style.INK)
+    axes.spines["left"].set_visible(False)
+    to = reference(study, tasks)
+    where = "" if len(tasks) > 1 else marked(study.tasks[tasks[0]]) + (":\n" if narrow else ": ")
+    axes.set_xlabel(f"{where}gap to the {to} (%)")
+    alt = f"Gap to the {to} by method: {spoken(study, shown, '{title} {gap:.1f} %')}."
+    bold = ["the paper's learner (diamonds)"] * any(rows.is_learner)
+    bold += ["methods from files (larger marks)"] * (not all(rows.built_in))
+    more = " Means over all tasks." * (len(tasks) > 1)
+    more += " Methods that are run once have no interval." * (not all(rows.stochastic))
+    return drawing, rows, alt, more + (f" Bold: {listed(bold)}." if bold else "")
+
+
+ALONE = KNOWN_METHODS["corrective-alone/given"].algorithm
+
+
+@figure(
+    "Ticks saved, goal by goal",
+    "Ticks that a movement takes more (up) or less (down) than that of the corrective process "
+    "alone with the same hands: what is paid at one goal is saved at later ones. Means over runs. "
+    "Shown are the methods nearest to the {reference}, and those to compare them with. "
+    "n = {n} runs.",
+)
+def draw_saved(study: Study) -> Parts | None:
+    """Draw for each task a row for each of some methods (the learner that explores most, random
+    search, the best of each kind that uses the reward, methods from files), the smallest mean gap
+    first. A row has a bar for each goal: mean ticks of the runs less the ticks of the corrective
+    process alone with the same hands. None if there is nothing to draw."""
+    rows, methods = list_saved(study), study.methods
+    single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
+    drawn, parts = {*headline_methods(single)}, []
+    for _, part in rows[rows.method.isin(drawn)].groupby("task", sort=False):
+        gaps = [
+            solved(study.cells[cell]).gap.mean()
+            for cell in zip(part.task, part.method, strict=True)
+        ]
+        part = part.assign(gap=gaps, use=[methods.information[each] for each in part.method])
+        part = part.sort_values("gap")
+        best = part.drop_duplicates("use").method[part.use != WITHOUT_REWARD]
+        learners = [each for each in LEARNERS if each in {*part.method}]
+        kept = {*best, RANDOM_SEARCH, *learners[-1:], *single.index[~single.built_in.astype(bool)]}
+        part = part[part.method.isin(kept)]
+        if len(part):
+            parts.append(part)
+    if not parts:
+        return None
+    shape, most = style.grid(len(parts)), max(map(len, parts))
+    line, size = (0.17, 6) if style.is_narrow() else (0.3, 7)  # inches, points
+    height = shape[0] * (0.3 + line * most)
+    drawing, panels = style.panels(shape, (style.TWO, height), len(parts))
+    paper: Any = {"facecolor": style.BACKGROUND, "linewidth": 0, "pad": 0.6}
+    for axes, part in zip(panels, parts, strict=True):
+        task = study.tasks[part.task.iloc[0]]
+        goals = np.arange(1, len(task.goals) + 1)
+        ticks = part[[f"by_goal_{goal}" for goal in goals]].to_numpy(np.float64)
+        scale = 0.42 / max(np.abs(ticks).max(), 1.0)
+        for place, of_goals in enumerate(ticks):
+            axes.axhline(-place, color=style.GREY, linewidth=0.5)
+            colors = np.where(of_goals > 0, style.VERMILLION, style.BLUE)
+            axes.bar(goals, scale * of_goals, 0.5, -place, color=colors, linewidth=0)
+            for goal, value in zip(goals, of_goals.round(), strict=True):
+                text = f"{value:+.0f}".replace("-", "−") if value else "0"
+                axes.text(goal + 0.29, -place, text, va="center", fontsize=size, bbox=paper)
+        style.name_rows(axes, [name_in_figure(study, label) for label in part.method])
+        axes.set_xticks(goals, [f"goal {goal}" for goal in goals])
+        axes.set_xlim(0.6, len(goals) + 0.75)
+        axes.tick_params(axis="x", length=0, pad=1)
+        axes.spines[["left", "bottom"]].set_visible(False)
+        axes.set_title(marked(task))
+    style.letters(panels)
+    data = pd.concat(parts, ignore_index=True).drop(columns=["run_ids", "gap", "use"])
+    words = spoken(study, data, "{task}, {title}: {by_goal_1:+.0f}")
+    alt = f"Ticks more or less than by the corrective process, at goal 1: {words}."
+    return drawing, data, alt, ""
+
+
+@figure(
+    "One goal, two postures",
+    "Postures of one method's runs when they hit a goal that two tasks share. Thick: mean posture; "
+    "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
+)
+def draw_postures(study: Study) -> Parts | None:
+    """Draw the postures of the method of :func:`shared_goal` at this goal on both tasks, and the
+    postures of random search, its control, if it has one; None without a shared goal."""
+    shared = shared_goal(study)
+    if shared is None:
+        return None
+    chance = contexts_of_control(study, shared)
+    contexts = [shared, chance] if chance else [shared]
+    size = (style.ONE, style.TWO)[len(contexts) - 1], 2.0
+    drawing, panels = style.panels((1, len(contexts)), size, sharex=True, sharey=True)
+    parts, differences = [], []
+    for axes, each in zip(panels, contexts, strict=True):
+        title = study.methods.title[each.method]
+        difference = number(each.posture_difference, 2)
+        axes.set_title(f"{name_in_figure(study, each.method)}: difference {difference}")
+        parts += _draw_contexts(axes, each)
+        differences.append(f"{title} {each.posture_difference:.2f}")
+    hands = [shared.tasks[0].robot.forward_kinematics(runs.mean(axis=0), shared.hand)
+             for runs in shared.configurations]  # fmt: skip
+    first, second = (task.label for task in shared.tasks)
+    alt = (
+        f"Two postures of one arm at goal {shared.goal}, which {first} and {second} share. "
+        f"Posture difference: {'; '.join(differences)}. The distance of the hands is "
+        f"{np.linalg.norm(hands[0] - hands[1]):.2f}."
+    )
+    compared = " Compared with all runs of random search with as many trials." * (
+        chance is not None
+    )
+    return drawing, pd.concat(parts, ignore_index=True), alt, compared
+
+
+def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
+    """Draw the postures of runs at a shared goal, runs thin and their mean on each task thick;
+    return two frames, one for each task, with a row for each run: ``task``, ``method``, ``goal``,
+    ``hand`` and the posture, a column for each of its entries."""
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+    robot, radius = shared.tasks[0].robot, shared.tasks[0].radius
+    means = [runs.mean(axis=0) for runs in shared.configurations]
+    goals = np.array([task.goals[shared.goal] for task in shared.tasks])
+    joints = [robot.joint_positions(q, shared.hand) for q in means]
+    outlines = [robot.base_outline(q) for q in means]
+    drawn = np.vstack([*outlines, goals, *joints])
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
+    axes.set_xlim(low[0] - 0.2, high[0] + 1.2)
+    axes.set_ylim(low[1] - 0.7, high[1] + 0.35)
+    at = shared.tasks[0].goals[shared.goal - 1]
+    words: Any = {"textcoords": "offset points"}
+    parts = []
+    for place, (task, runs) in enumerate(zip(shared.tasks, shared.configurations, strict=True)):
+        color, following = (style.BLUE, style.VERMILLION)[place], goals[place].tolist()
+        faint: Any = {"linewidths": 0.5, "alpha": float(np.clip(4 / len(runs), 0.06, 0.3))}
+        arms = [robot.joint_positions(q, shared.hand) for q in runs]
+        axes.add_collection(LineCollection(arms, colors=color, **faint, zorder=1), autolim=False)
+        base: Any = {"facecolor": color, "alpha": 0.12, "edgecolor": color, "linewidth": 0.8}
+        axes.fill(*outlines[place].T, **base)
+        around = [withStroke(linewidth=3.2, foreground=style.BACKGROUND)]
+        thick: Any = {"linewidth": 1.6, "zorder": 3, "path_effects": around, **MARKERS[shared.hand]}
+        axes.plot(*joints[place].T, color=color, **thick)
+        arrow = {"arrowstyle": "->", "color": color, "shrinkA": 5, "shrinkB": 4, "linewidth": 0.8}
+        axes.annotate("", following, at, zorder=2, arrowprops={**arrow, "linestyle": (0, (3, 2))})
+        axes.add_artist(Circle(following, radius, fill=False, edgecolor=color))
+        then = f"then goal {shared.goal + 1}\n({marked(task)})"
+        axes.annotate(then, following, (5, 0), va="center", ha="left", **words)
+        # The base's name stands on the side of the next goal.
+        x, y = outlines[place].T
+        end, off, side = (y.max(), 3, "bottom") if following[1] >= at[1] else (y.min(), -3, "top")
+        name = f"base,\n{marked(task)}"
+        axes.annotate(name, (x.mean(), end), (0, off), ha="center", va=side, **words)
+        angles = dict(zip(robot.joint_names, runs.T, strict=True))
+        named = {"task": task.name, "method": shared.method, "goal": shared.goal}
+        parts.append(pd.DataFrame({**named, "hand": shared.hand, **angles}))
+    axes.add_artist(Circle(at, radius, fill=False, edgecolor=style.INK, linewidth=1.1))
+    x, y = low - 0.2
+    axes.plot([x, x + 1], [y, y], color=style.INK, linewidth=1.5)
+    axes.annotate("1 length unit", (x, y), (0, -2), va="top", **words)
+    here = f"goal {shared.goal},\nthe same"
+    axes.annotate(here, at, (7, 0), va="center", weight="bold", **words)
+    return parts
+
+
+PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
+"""Costs with a panel in the figure, and the labels of their axes."""
+
+
+@figure(
+    "What it costs to come near",
+    f"Share of {len(TARGETS)} reward targets reached within a budget. Targets are evenly spaced "
+    "from the corrective process alone, with its best hands, to the {reference}; a run counts for "
+    "each target that it reached. Forward-kinematics evaluations are spread evenly over a run's "
+    f"trials. Bands: {style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
+)
+def draw_runtimes(study: Study) -> Parts | None:
+    """Draw the share of targets that methods reach within a number of trials, and of
+    forward-kinematics evaluations, a panel each, or only one if the other has no curve; None
+    without a curve.
+
+    Among :func:`.headline_methods`, without the corrective process alone, curves are for methods
+    that use the reward of each trial, for methods from files, and for the method that reaches most
+    targets without using the reward of each trial.
+    """
+    if not len(tabled := list_runtimes(study)):
+        return None
+    rows = study.methods.loc[[*tabled.index]]
+    rows = rows.loc[headline_methods(rows)]
+    rows = rows[rows.algorithm != "corrective process alone"]
+    plans = rows.index[rows.information != BY_TRIAL]
+    best = tabled.reached[plans].idxmax() if len(plans) else None
+    curves = rows.index[(rows.information == BY_TRIAL) | ~rows.built_in | (rows.index == best)]
+    data = runtimes(study)
+    shown = data.method.isin(curves) & (data.budget > 0) & (data.budget < math.inf)
+    data = data[shown & data.spend.isin(PANELS)]
+    if data.empty:
+        return None
+    steps = []
+    for (label, spend), curve in data.groupby(["method", "spend"], sort=False):
+        # No more than are seen.
+        curve = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 100).round()).astype(int)]
+        runs = runs_with_targets(study)[str(label)]
+        times = times_on_tasks(study, runs, str(spend))
+        low, high = interval_by_budget(times, curve.budget.to_numpy())
+        steps.append(curve.assign(share_low=low, share_high=high, runs=len(runs)))
+    data = pd.concat(steps, ignore_index=True)
+    looks = looks_in(study, data.method.unique())
+    spends = [spend for spend in PANELS if (data.spend == spend).any()]
+    drawing, panels = style.panels(
+        (1, len(spends)), (style.TWO, 1.9 if style.is_narrow() else 2.6), sharey=True
+    )
+    for axes, spend in zip(panels, spends, strict=True):
+        style.log_axis(axes)
+        of_spend = data[data.spend == spend]
+        edge, most = of_spend.budget.min() / 1.5, of_spend.budget.max()
+        most = max(most, 10 ** round(math.log10(most)))  # with the number at the end
+        axes.axhline(50, color=style.GREY, linewidth=0.5)
+        for label, rows in of_spend.groupby("method", sort=False):
+            x = np.append(rows.budget, most)
+            y, low, high = (
+                100 * np.append(rows[name], rows[name].iloc[-1])
+                for name in ("share", "share_low", "share_high")
+            )
+            look = looks[str(label)]
+            axes.fill_between(
+                x, low, high, step="post", color=look["color"], alpha=0.22, linewidth=0
+            )
+            (drawn,) = axes.step(x, y, where="post", **look)
+            name = study.methods.title[str(label)]
+            style.tip(drawn, f"{name}: {y[-1]:.0f} % of the targets in the end")
+        axes.set_xlim(edge, most)
+        axes.set_ylim(-2, 102)
+        axes.set_title(f"By {PANELS[spend]}")
+        axes.set_xlabel(PANELS[spend])
+    panels[0].set_ylabel("targets reached (%)")
+    at, grey = panels[0].get_yaxis_transform(), style.GREY
+    panels[0].text(0.01, 51, "half of the targets", color=grey, va="bottom", transform=at)
+    style.letters(panels)
+    ends = data.groupby("method", sort=False).tail(1)
+    ends = ends.assign(share=100 * ends.share).sort_values("share")
+    height = -math.inf
+    for end in ends.to_dict("records"):
+        height = max(end["share"], height + (9 if style.is_narrow() else 6.5))
+        at, look = panels[-1].get_yaxis_transform(), looks[end["method"]]
+        mark: Any = {"color": look["color"], "markersize": 4, "markeredgewidth": 0}
+        panels[-1].plot(1.03, height, look["marker"], transform=at, clip_on=False, **mark)
+        panels[-1].annotate(
+            name_in_figure(study, end["method"]), (1.03, height), (5, 0), va="center",
+            xycoords=at, textcoords="offset points", annotation_clip=False,
+            weight="normal" if study.methods.built_in[end["method"]] else "bold",
+        )  # fmt: skip
+    shares = spoken(study, ends, "{title} {share:.0f} %")
+    alt = f"Share of reward targets reached against what was spent. At the end: {shares}."
+    return drawing, data, alt, " Means over all tasks." * (len(target_ranges(study)) > 1)
+
+
+CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
+"""Built-in methods with learning curves; all methods from files with trials have them, too."""
+
+
+@figure(
+    "Learning curves",
+    "Best reward so far (mean over runs; band: quartiles). n = {n} runs of a method on a task.",
+)
+def draw_learning_curves(study: Study) -> Parts | None:
+    """Draw :func:`learning_curves`, the best reward so far against the trial, a panel for each
+    task; None without a curve."""
+    data = learning_curves(study)
+    if not len(data):
+        return None
+    tasks = [study.tasks[name] for name in data.task.unique()]
+    labels = [label for label in study.methods.index if label in {*data.method}]
+    rows, columns = style.grid(len(tasks))
+    size = style.TWO, min(2.2 * rows + 0.5, style.TALLEST)
+    if style.is_narrow():
+        size = style.ONE, 1.4 * rows + 0.4
+    drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
+    looks = looks_in(study, labels)
+    for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
+        of_task = data[data.task == task.name]
+        for label, curve in of_task.groupby("method", sort=False):
+            look = looks[str(label)]
+            band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
+            axes.fill_between(curve.trial, curve.best_low, curve.best_high, **band)
+            axes.plot(curve.trial, curve.best, **look)
+        floor, top = of_task.best.min(), of_task.best_high.max()
+        zero, optimum = study.corrective_best[task.name], study.optima.get(task.name)
+        if not math.isnan(zero):
+            axes.axhline(zero, **style.INITIAL)
+            floor, top = min(floor, zero), max(top, zero)
+        if optimum is not None:
+            axes.axhline(optimum.reward, **style.OPTIMUM)
+            top = max(top, optimum.reward)
+        reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
+        axes.set_ylim(floor - 0.04 * reach, top + 0.06 * reach)
+        style.log_axis(axes)
+        axes.set_xlim(1, max(2, of_task.trial.max()))
+        axes.set_title(marked(task))
+        axes.set_ylabel("" if place % columns and style.is_narrow() else "reward (ticks)")
+        axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
+    style.letters(panels)
+    handles = [
+        style.legend_line(name_in_figure(study, label), **look) for label, look in looks.items()
+    ]
+    if any(study.corrective_best[task.name] == study.corrective_best[task.name] for task in tasks):
+        name = title_of("corrective-alone/best-hands", short=style.is_narrow())
+        handles.append(style.legend_line(name, **style.INITIAL))
+    if known := [task.name for task in tasks if task.name in study.optima]:
+        handles.append(style.legend_line(reference(study, known), **style.OPTIMUM))
+    style.legend(drawing, handles, min(len(handles), 4))
+    ends = data.groupby(["task", "method"], sort=False).tail(1)
+    words = spoken(study, ends, "{task}, {title}: {best:.0f}")
+    alt = f"Reward against trial. Mean best reward at the end: {words}."
+    return drawing, data, alt, ""
+
+
+def learning_curves(study: Study) -> pd.DataFrame:
+    """Return the best reward so far, negative ticks, by task, method and number of trials.
+
+    Runs count that are solved and have rewards of trials, on individual tasks. Methods
+    are the :func:`.headline_methods` among :data:`CURVES` and methods from files of users; EC1 has
+    a curve only on tasks without such runs of EC2 to EC4. Columns: ``task``, ``method`` (label),
+    ``runs`` (number of runs), ``trial`` (at most 120 numbers, from 1 to the trials of the shortest
+    run), ``best`` (mean over runs, NaN until all have a solution), quartiles ``best_low`` and
+    ``best_high``. Without any curve the frame is empty and has no columns.
+    """
+    learned, curves = improvements(study), [pd.DataFrame()]
+    cells = {
+        (task, label): runs
+        for (task, label), every in study.cells.items()
+        if task in study.individual_tasks and len(runs := solved(every[every.run_id.isin(learned)]))
+    }
+    rows = study.methods[study.methods.index.isin([label for _, label in cells])]
+    drawn = headline_methods(rows[rows.base.isin(CURVES) | ~rows.built_in])
+    for task, label in itertools.product(study.individual_tasks, drawn):
+        two_armed = any((task, learner) in cells for learner in LEARNERS[1:])
+        if (task, label) not in cells or (two_armed and label == EC1):
+            continue
+        runs = cells[task, label]
+        at = np.unique(np.round(np.geomspace(1, int(runs.trials.min()), 120)).astype(np.int64))
+        # Until every run has a solution (NaN before) there is no mean of them.
+        best = np.array([best_after(learned[run_id], at) for run_id in runs.run_id])
+        if np.isnan(best).any(axis=0).all():
+            continue
+        low, high = np.quantile(best, [0.25, 0.75], axis=0)
+        curve = {"trial": at, "best": best.mean(axis=0), "best_low": low, "best_high": high}
+        named = {"task": task, "method": label, "runs": len(runs)}
+        curves.append(pd.DataFrame(named | curve))
+    return pd.concat(curves[1:] or curves, ignore_index=True)
+
+
+@figure(
+    "Gap by family",
+    "Dots: instances (mean over runs), on an axis that is linear up to 2 % and logarithmic beyond. "
+    "Diamonds: mean over instances with its "
+    f"{style.COVERAGE} interval about other tasks of the family (bootstrap over instances and "
+    "runs), for methods that solved every run.",
+)
+def draw_gaps_by_family(study: Study) -> Parts | None:
+    """Draw the gap to the best known reward, mean over runs, of each instance that a method solved
+    in every run, a panel for each family and a row for each method, without settings whose method
+    is there; None without such runs."""
+    runs, rows = on_instances(study), study.methods
+    methods = without_settings(rows[rows.index.isin(runs.method)])
+    runs = runs[runs.method.isin(methods.index)]
+    if not len(runs):
+        return None
+    parts = []
+    for (method, family), part in runs.groupby(["method", "family"], sort=False):
+        scores = by_family(study, part)
+        mean = (other_tasks(scores) if scores else Estimate(math.nan)).columns("mean")
+        dots = part.groupby("task", sort=False).gap.mean().reset_index()
+        dots = dots.assign(method=str(method), family=str(family), **mean, instances=len(dots))
+        parts.append(dots)
+    data = pd.concat(parts, ignore_index=True).astype({"gap": float})
+    order = data.groupby("method").gap.mean().sort_values().index.tolist()
+    looks = looks_in(study, order)
+    families = list(dict.fromkeys(data.family))
+    size = style.TWO, 0.9 + 0.19 * len(order)
+    drawing, panels = style.panels((1, len(families)), size, sharey=True)
+    for axes, family in zip(panels, families, strict=True):
+        for label, rows in data[data.family == family].groupby("method"):
+            place = order.index(label)
+            heights = -place + 0.11 * (np.arange(len(rows)) % 3 - 1)
+            size = looks[label]["markersize"]
+            dot: Any = {"color": looks[label]["color"], "markersize": size / 2, "alpha": 0.5}
+            gaps = rows.gap.clip(upper=1.0)
+            axes.plot(gaps, heights, "o", linestyle="", markeredgewidth=0, **dot)
+            mean = rows.iloc[0]
+            ends = [mean.mean_low, mean.mean_high]
+            axes.plot(ends, [-place, -place], color=style.INK, linewidth=1)
+            diamond: Any = {"markersize": size, "markerfacecolor": style.BACKGROUND, "zorder": 4}
+            axes.plot(mean["mean"], -place, "D", color=style.INK, **diamond)
+        axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
+        axes.set_xlim(-0.004, 1.15)
+        axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"])
+        axes.minorticks_off()
+        axes.set_title(family.partition("/")[0])
+    style.name_rows(panels[0], [name_in_figure(study, label) for label in order])
+    for label, method in zip(panels[0].get_yticklabels(), order, strict=True):
+        label.set_fontweight("normal" if methods.built_in[method] else "bold")
+    panels[len(panels) // 2].set_xlabel(f"gap to the {reference(study, study.optima)} (%)")
+    style.letters(panels)
+    first = data.drop_duplicates(["method", "family"]).dropna(subset="mean")
+    means = spoken(study, first, "{title}, {family}: {mean:.1%}")
+    words = f" {means}." if means else ""
+    alt = f"Gaps of instances by method and family.{words}"
+    return drawing, data, alt, " Gaps above 100 % stand at the right end." * any(data.gap > 1)
+
+
+@figure(
+    "Tasks",
+    "Start configuration and goals of each task. Open circles are the goals, drawn to scale and "
+    "hit in the order of their numbers.",
+)
+def draw_tasks(study: Study) -> Parts | None:
+    """Draw start configuration and goals of the individual tasks, a panel each; None
+    without such tasks."""
+    shown = list(study.individual_tasks.values())
+    if not shown:
+        return None
+    rows: list[dict[str, object]] = []
+    for task in shown:
+        start = dict(zip(task.robot.joint_names, task.q0.tolist(), strict=True))
+        rows.append({"task": task.name, "goal": 0, **start})
+        rows += [
+            {"task": task.name, "goal": index, "x": x, "y": y, "radius": task.radius}
+            for index, (x, y) in enumerate(task.goals, 1)
+        ]
+    names = ", ".join(task.name for task in shown)
+    alt = f"The robot in its start configuration with the goals of the tasks {names}."
+    are_papers = {task.name for task in shown} <= shipped_tasks().keys()
+    source = " After Figure 4 of Shah, Barto & Fagg (2013)." * are_papers
+    return picture_of_tasks(shown), pd.DataFrame(rows), alt, source
+
+
+@style.styled
+def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
+    """Return a figure with start configuration and goals of some tasks, a panel for each."""
+    tasks = titled_apart(tasks)
+    boxes = [box(task, [task.q0]) for task in tasks]
+    width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
+    rows, columns = style.grid(len(tasks))
+    above, around = 0.75, 0.55  # inches of a panel for title and axes
+    scale = min(
+        (style.TWO / columns - around) / width,
+        (style.TALLEST - 0.3 - rows * above) / rows / height,
+        0.42,
+    )
+    size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
+    size = style.ONE if size[0] <= style.ONE else style.TWO, size[1]  # one column, or two
+    if style.is_narrow():
+        size = style.ONE, size[1] * style.ONE / size[0] + 0.45 * rows
+    drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
+    drawing.set_layout_engine("compressed")  # else a title can stand beyond the edge
+    for place, (axes, task, corners) in enumerate(zip(panels, tasks, boxes, strict=True)):
+        draw_robot(axes, task, task.q0)
+        if len(task.hands) > 1:  # what shows of an arm under the other one
+            left = task.robot.joint_positions(task.q0, "left").T
+            axes.plot(*left, color=style.GREY, alpha=0.5, linewidth=3.2, zorder=1.7)
+        circle_goals(axes, task)
+        number_goals(axes, task)
+        remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
+        remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
+        fits = int(14 * drawing.get_figwidth() / columns)  # letters
+        title = [*textwrap.wrap(task.label, fits), *textwrap.wrap("; ".join(remarks), fits)]
+        axes.set_title("\n".join(title))
+        x, y = (corners[0] + corners[1]) / 2
+        axes.set_xlim(x - width / 2, x + width / 2)
+        axes.set_ylim(y - height / 2, y + height / 2)
+        axes.set_aspect("equal")
+        if not style.is_narrow() or place + columns >= len(tasks):
+            axes.set_xlabel("x (length unit)")
+        axes.set_ylabel("y (length unit)")
+    room = 12 if style.is_narrow() else None  # numbers of goals stand in between
+    style.letters(panels if len(tasks) > 1 else (), pad=room)
+    hands = {hand for task in tasks for hand in task.hands}
+    arms = [
+        style.legend_line(f"{hand} arm", color=style.INK, linewidth=0.9, **look)
+        for hand, look in MARKERS.items()
+        if hand in hands
+    ]
+    circle: Any = {"marker": "o", "markersize": 4, "markerfacecolor": "none"}
+    goal = style.legend_line("goal", linestyle="", color=style.INK, **circle)
+    style.legend(drawing, [*arms, goal], 3)
+    return drawing
+
+
+FIGURES: dict[str, DrawsFigure] = {
+    id_of(draw): draw
+    for draw in (
+        draw_ranking,
+        draw_postures,
+        draw_saved,
+        draw_runtimes,
+        draw_learning_curves,
+        draw_gaps_by_family,
+        draw_tasks,
+    )
+}
+"""Figures by id."""

@@ -1,0 +1,370 @@
+"""Sections of the page with their tables, figures and sentences, and limits of conclusions."""
+
+from __future__ import annotations
+
+import math
+import traceback
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import chain
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pandas as pd
+from jinja2 import Environment, StrictUndefined
+
+from coartic.analysis.figures.drawings import (
+    draw_gaps_by_family,
+    draw_learning_curves,
+    draw_postures,
+    draw_ranking,
+    draw_runtimes,
+    draw_saved,
+    draw_tasks,
+)
+from coartic.analysis.figures.plot import DrawsFigure
+from coartic.analysis.methods import EC1, EC4, GROUPS, RANDOM_SEARCH, joined_label, title_of
+from coartic.analysis.standings import ranked_tasks, reference, standings
+from coartic.analysis.study import Study
+from coartic.analysis.tables import (
+    Table,
+    is_setting,
+    list_contexts,
+    list_differences,
+    list_failed,
+    list_family_gaps,
+    list_learning,
+    list_methods,
+    list_not_ranked,
+    list_ranking,
+    list_runtimes,
+    list_signatures,
+    list_tasks,
+)
+from coartic.analysis.words import (
+    NO_BREAK,
+    commonest,
+    interval,
+    listed,
+    marked,
+    number,
+    p_value,
+)
+from coartic.errors import CoarticError
+from coartic.estimates import LEVEL
+from coartic.internal.text import error_line, one_line
+from coartic.learner.learning import TRIALS
+
+Made = TypeVar("Made")
+RUNS = 20
+"""Number of runs of every experiment of the paper."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the page, left out if the folder has neither its tables nor its figures."""
+
+    id: str
+    title: str
+    tables: tuple[Table, ...]
+    """Tables of the section, functions of a study."""
+    figures: tuple[DrawsFigure, ...] = ()
+    """Functions that draw the figures, or return None if the folder has no runs for one. The page
+    folds all figures except the first."""
+    sentence: str = ""
+    """Jinja template of the finding in words, or empty. Its names are ``every``, the first table;
+    ``rows``, this table with the ``title`` of each method, without settings and ablations;
+    ``others``, the other tables with titles, without settings and ablations (further names:
+    :func:`.finding`)."""
+    note: str = ""
+    """Explanation of figures and tables."""
+    single: bool = True
+    """True for sections about single tasks, left out for many random tasks."""
+    folded: bool = False
+    """True if the page folds the tables."""
+
+
+SECTIONS = (
+    Section(
+        "ranking",
+        "Ranking",
+        (list_ranking, list_not_ranked, list_differences),
+        (draw_ranking,),
+        sentence="""\
+{% if varied %}
+{% for best in leading(rows)[:1] %}
+{{ best.title }} comes nearest to the {{ reference }}: its gap is \
+{{ interval(best, "gap", scale=100, unit=" %") }}.
+{%- for next in others[1].to_dict("records")[:1] %}
+ Next is {{ next.title }}, {{ interval(next, "difference", scale=100) }} percentage points behind\
+{{ ": %s chance (%s)" % ("beyond" if next.p_holm < LEVEL else "not beyond", p_value(next.p_holm)) \
+if next.p_holm >= 0 else ", too few runs to test" }}.
+{%- endfor %}
+{%- for row in rows[rows.method.isin(papers)].to_dict("records") if row.method != best.method %}
+ {{ row.title }} leaves {{ interval(row, "gap", scale=100, unit=" %") }}.
+{%- endfor %}
+
+{% endfor %}
+{% else %}
+{% for use in uses %}
+{% set of_use = rows[rows.information == use] %}
+{% for row in leading(of_use) %}
+{% set place = (of_use.gap < row.gap).sum() + 1 %}
+{% set tied = (of_use.gap == row.gap).sum() > 1 %}
+{% if loop.first %}
+{{ use | capitalize }}, {{ row.title }} leaves \
+{{ "a" if loop.last or tied else "the smallest" }} gap to the {{ reference }}\
+{{ " of" if loop.last or tied else "," }} \
+{% else %}
+{{ row.title }} leaves {% endif %}
+{{ interval(row, "gap", scale=100, unit=" %") }}\
+{{ " (place %d of %d)" % (place, of_use | length) if place > loop.index }}\
+{{ "." if loop.last else "; " }}
+{%- endfor %}
+
+{% endfor %}
+{% endif %}
+{% for against, group in others[1].groupby("against", sort=False) if not varied %}
+{{ titles[against] }} against {{ rivals }} methods, percentage points by which its gap is \
+smaller on the tasks that it solved: \
+{% for row in leading(group) %}
+{{ row.title }} {{ interval(row, "difference", scale=100) }}\
+{{ " (%s)" % p_value(row.p_holm) if row.p_holm >= 0 }}{{ "." if loop.last else "; " }}
+{%- endfor %}
+
+{% endfor %}""",
+        note="Methods are grouped by their use of the reward: its value after each trial, its "
+        "formula, or nothing. The gap is from the mean reward to the {reference}, as a "
+        "share of it. Share of the gain: 0 % is the corrective process alone with its "
+        "best hands (with the task's initial hands where there are over 4096 hand sequences), "
+        "100 % the {reference}; tasks on which both are equal have none. Intervals describe "
+        "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
+        "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
+        "by two-tailed tests, corrected for the tasks of the method. Empty: the runs are too few, "
+        "or too alike, to tell. Ranked are the methods that solved all tasks in as many trials as "
+        "were asked for; planners count with any number. What an own method uses is as its "
+        "author declares; own methods are bold.",
+        single=False,
+    ),
+    Section(
+        "coarticulation",
+        "Coarticulation",
+        (list_contexts, list_signatures),
+        (draw_postures, draw_saved),
+        sentence="""\
+{% set of_best = rows[rows.method == first] if varied else rows[:0] %}
+{% for row in (of_best if of_best | length else rows).head(1).to_dict("records") %}
+{{ row.title }} hits {{ row.place }} {{ {
+"different postures": "in postures that depend on the next goal",
+"no more than random search": "in postures that differ no more than those of random search",
+"no significant difference": "in postures without significant difference",
+"different, negligible": "in postures with a negligible difference",
+"the same posture": "in the same posture", "too few runs": "in too few runs to tell",
+}.get(row.verdict, "in postures that differ, without random search to compare them with") }}: \
+posture difference {{ row.distance | number(2) }} (length units and rad; {{ row.runs }} runs)\
+{{ "; random search: %s" % number(row.control, 2) if row.control >= 0 }}\
+{{ " (%s)" % p_value(row.p_random_search) if row.p_random_search >= 0 }}.
+{% endfor %}
+Methods at shared goals by verdict: {{ every.verdict | commonest(none) | listed }}.""",
+        note="Postures are compared in length units and rad. Ticks are compared with those of the "
+        "corrective process with the same hands. A first movement that gets slower while the whole "
+        "task gets faster is sacrificed for it. Idle hand nearer: share of the path to its next "
+        "goal that a hand covers while idle. Random search is the learner without its memory: the "
+        "best of as many trials is selected. What exceeds it is more than one selection, but much"
+        " of that can be gain (docs/findings.md has rows at equal gain). A row has the runs with "
+        "one hand sequence (of at least a tenth of a method's runs); random search has the same "
+        "hands, and all its runs count. The choice of hands, in rows without a sequence, is "
+        "compared with random search that tries every sequence. p is one-tailed, and uncorrected "
+        "unless it says so; empty: no such random search.",
+        folded=True,
+    ),
+    Section(
+        "cost",
+        "Cost",
+        (list_runtimes, list_learning),
+        (draw_runtimes, draw_learning_curves),
+        sentence="""\
+{% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
+ascending=False)) %}
+{{ row.title }} reaches {{ (100 * row.reached) | number(0) }} %\
+{{ " of the reward targets from the corrective process alone to the " ~ \
+reference if loop.first }}, {{ "never half" if \
+row.trials_to_half == infinite else "half of them after %s trials" % \
+interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them without a trial" }}\
+{{ "." if loop.last else "; " }}
+{%- endfor %}""",
+        note="The empirical distribution (ECDF) of the costs of reaching reward targets. The "
+        "figure shows methods that learn, random search and the best planner. The number of "
+        "forward-kinematics evaluations is a cost that is the same on every machine. ∞: not "
+        "reached within the budget of trials. Gain: improvement over the corrective process alone.",
+        folded=True,
+    ),
+    Section(
+        "random-tasks",
+        "Random tasks",
+        (list_family_gaps,),
+        (draw_gaps_by_family,),
+        sentence="""\
+{% for row in leading(rows.dropna(subset="gap")) %}
+{{ ("Mean gap to the %s over families with two arms: " % reference) if loop.first }}\
+{{ row.title }} {{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
+{%- endfor %}""",
+        note="Intervals describe other tasks of the families.",
+        single=False,
+    ),
+    Section(
+        "tasks",
+        "Tasks",
+        (list_tasks,),
+        (draw_tasks,),
+        note="Initial, best hands: the corrective process alone, with the task's initial hands and "
+        "with the best of all hand sequences. Best known: the optimum where the proven bound "
+        "equals it. Proven bound: a reward that no solution can exceed.",
+    ),
+    Section(
+        "methods",
+        "All methods and runs",
+        (list_methods,),
+        note="Every method works on the same robot. Its movements are scored by one function, "
+        "which no method can reach. Times are seconds of solving.",
+        folded=True,
+    ),
+    Section(
+        "failed",
+        "Failed runs",
+        (list_failed,),
+        note="A failed run bars its method from means over tasks.",
+        single=False,
+        folded=True,
+    ),
+)
+
+
+def shown(text: str) -> str:
+    """Return text as one printable line with no-break spaces for spaces before per cent signs and
+    daggers."""
+    return one_line(text).replace(" %", f"{NO_BREAK}%").replace(" †", f"{NO_BREAK}†")
+
+
+def visible_sections(study: Study) -> list[Section]:
+    """Return the sections of the page, without sections about single tasks if the tasks are many
+    random ones (individual tasks is empty)."""
+    return [section for section in SECTIONS if study.individual_tasks or not section.single]
+
+
+def attempt(
+    failures: dict[str, str], name: str, make: Callable[..., Made], *args: Any
+) -> Made | None:
+    """Return ``make(*args)``, a part of a report, or None if it raises an exception.
+
+    The error, with file and line, is then added to ``failures`` by the ``name`` of the part, unless
+    there is one already. A CoarticError passes through.
+    """
+    try:
+        return make(*args)
+    except CoarticError:
+        raise
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(place.filename).name}, line {place.lineno}"
+        failures.setdefault(name, f"{error_line(error)} ({where})")
+        return None
+
+
+def finding(study: Study, section: Section) -> list[str]:
+    """Return the finding of a section in words, a list of lines: its template ``sentence``, filled
+    in from its tables; an empty list if it has no sentence, or its first table no rows."""
+    if not section.sentence or not len(frame := section.tables[0](study)):
+        return []
+    methods = study.methods
+    built_in = methods.index[methods.built_in.astype(bool)]
+
+    def named(table: Table) -> pd.DataFrame:
+        every = table(study)
+        rows: pd.DataFrame = every[~is_setting(study, every)]
+        return rows.assign(title=rows.method.map(methods.title), own=~rows.method.isin(built_in))
+
+    rows, *others = map(named, section.tables)
+    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"number": number, "commonest": commonest, "listed": listed}
+    environment.globals |= {
+        "interval": interval, "number": number, "p_value": p_value, "leading": leading,
+        "infinite": math.inf,
+        "uses": GROUPS, "first": next(iter(standings(study).index), ""),
+        "titles": methods.title,
+        "reference": reference(study, ranked_tasks(study)),
+        "LEVEL": LEVEL, "varied": study.varied[0] and not study.against,
+        "papers": methods.index[methods.is_learner & (methods.setting == "")],
+        "rivals": "other" if study.against else "built-in",
+    }  # fmt: skip
+    text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
+    return [shown(line.strip()) for line in text.split("\n") if line.strip()]
+
+
+def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
+    """Return rows of a table, each as a dict: the rows of the first two rows' methods, of the
+    paper's learner, of random search and of methods from files."""
+    always = [joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH]
+    is_shown = rows.method.isin([*rows.method[:2], *always]) | rows.own
+    return rows[is_shown].to_dict("records")
+
+
+@lru_cache(maxsize=4)
+def limits(study: Study) -> dict[str, Any]:
+    """Return facts that limit conclusions from a study's runs, by name: numbers of ``runs`` and of
+    ``failed`` runs, and the commonest ``reasons``; titles of the individual tasks that
+    are ``reconstructed``, and whose best reward is ``unproven``, ``unknown`` or known from this
+    folder alone (``own``); numbers of ``trials`` of the learner other than the paper's; ``few``,
+    the fewest runs of the learner on a task, if fewer than the paper's; ``seed``; ``processor`` and
+    ``cores``; True for runs ``side_by_side`` and code that is ``dirty``; ``late``, all
+    :attr:`.Study.marks`; ``imports`` by method. 0, False or empty where a limit does not apply."""
+    runs, made_with = study.runs, study.made_with
+    failed = runs[runs.status != "ok"]
+    algorithm, papers = study.methods.algorithm, study.methods.is_learner
+    trials = {int(n) for n in runs[runs.label.map(algorithm) == "learner"].trials.dropna()}
+    fewest = min((len(of) for (_, label), of in study.cells.items() if papers[label]), default=RUNS)
+    tasks, optima = list(study.individual_tasks.values()), defaultdict[str, list[str]](list)
+    for task in tasks:
+        best = study.optima.get(task.name)
+        unproven = "" if best is None or best.proven else "unproven"
+        kind = "unknown" if best is None else "own" if best.only_here else unproven
+        optima[kind].append(marked(task))
+    reasons = failed.reason.fillna("")
+    others = len(failed) - sum(reasons.value_counts()[:3])
+    return {
+        "runs": len(runs),
+        "failed": len(failed),
+        "reasons": commonest(reasons) + [f"{others} for other reasons"] * bool(others),
+        "reconstructed": [task.label for task in tasks if task.reconstructed],
+        "trials": sorted(trials - {TRIALS}),
+        "few": fewest if fewest < RUNS else 0,
+        "seed": study.plan[0].seed,
+        **{kind: optima[kind] for kind in ("unproven", "own", "unknown")},
+        "side_by_side": bool(runs.together.max() > 1),
+        "dirty": bool(runs.commit.dropna().astype(str).str.endswith("+").any()),
+        "processor": made_with["processor"],
+        "late": [*chain.from_iterable(study.marks.values())],
+        "cores": made_with["cores"],
+        "imports": {
+            title_of(study.declared[name]): listed(used) for name, used in study.imports.items()
+        },
+    }
+
+
+def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
+    """Return sentences for below a table with these columns: which best known rewards are not
+    proven (with column ``gap`` or ``optimum``), and which are known from this folder alone (with
+    ``gap``; :func:`limits`)."""
+    unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
+    notes = []
+    if unproven and columns & {"gap", "optimum"}:
+        notes.append(
+            f"The best known rewards of {listed(unproven)} are not proven to be the optimum."
+        )
+    if own and "gap" in columns:
+        notes.append(
+            f"Of {listed(own)} the best of this folder is all that is known: gaps are to it."
+        )
+    return notes

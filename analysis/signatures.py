@@ -1,0 +1,628 @@
+"""Signatures of coarticulation in the movements of solutions.
+
+A signature is a number for each run of a method on a task (:data:`SIGNATURES`). At a goal that two
+tasks share, :class:`TwoContexts` compares the postures of their runs.
+
+Notation: run i hits goal g = 1..G at configuration q(i, g) with hand h(i, g), t(i, g) ticks after
+the goal before; q(i, 0) is the start of the task. The corrective process alone, with the hands of
+run i, takes c(i, g) ticks for goal g. r(q, g, h) are the ticks of a reach by the corrective process
+from q to goal g with hand h, and R(q, g, h) is the configuration at its end. A signature has shape
+``(n,)`` for n runs, and is NaN for a run without this signature.
+
+Configurations mix length unit (base) and rad (joints), as the joint-space distance of the model
+does. Permutation tests exchange whole runs, which are exchangeable if the context has no effect;
+the tests assume no distribution.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations, takewhile
+from typing import Any
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
+
+from coartic import Execution, Hand, Task, corrective_trial, initial_hands
+from coartic.analysis.statistics import drawn_rows, places
+from coartic.errors import NotApplicableError
+from coartic.estimates import RESAMPLES, SEED, Resamples, centred, slices
+from coartic.internal.arguments import Numbers
+from coartic.motion.trial import reach_goals
+from coartic.robot import HANDS, Array
+from coartic.tasks.optima import KEPT
+from coartic.tasks.task import hands_of
+
+
+@dataclass(frozen=True)
+class Solutions:
+    """Executed solutions of n runs of one method with one setting on one task with G goals."""
+
+    task: Task
+    label: str
+    """Label: id of the method with its setting, or ``recorded``."""
+    runs: tuple[Execution, ...]
+    """Executions of the solutions, one for each run."""
+    run_ids: tuple[str, ...] = ()
+    """Ids of the runs, in the order of ``runs``; empty without ids."""
+    unfinished: int = 0
+    """Number of recorded trials, not among ``runs``, in which a goal was never reached, as counted
+    by :func:`.hits_from_markers`; 0 for others."""
+
+    @cached_property
+    def hands(self) -> NDArray[np.int64]:
+        """Hands chosen for the goals, shape ``(n, G)``: 0 for left, 1 for right, as in HANDS."""
+        hands = [[HANDS.index(hand) for hand in hands_of(run.hands)] for run in self.runs]
+        return np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals))
+
+    @cached_property
+    def configurations(self) -> Array:
+        """Configurations that hit the goals, shape ``(n, G, dof)``, length unit and rad."""
+        shape = len(self.runs), len(self.task.goals), self.task.robot.dof
+        return np.array([run.configurations for run in self.runs]).reshape(shape)
+
+    @cached_property
+    def starts(self) -> Array:
+        """Configurations at the start of each subtask, shape ``(n, G, dof)``: the hit of the goal
+        before, or the start of the task."""
+        starts = np.empty_like(self.configurations)
+        starts[:, 0], starts[:, 1:] = self.task.q0, self.configurations[:, :-1]
+        return starts
+
+    @cached_property
+    def against_same_hands(self) -> Array:
+        """Ticks of each subtask less its ticks by the corrective process alone with the hands of
+        the run, shape ``(n, G)``; NaN if this process does not complete the task."""
+        every = {run.hands for run in self.runs}
+        references = {hands: corrective_trial(self.task, hands) for hands in every}
+        changes = np.full((len(self.runs), len(self.task.goals)), np.nan)
+        for row, run in zip(changes, self.runs, strict=True):
+            if (reference := references[run.hands]).completed:
+                row[:] = np.subtract(run.ticks_by_goal(), reference.ticks_by_goal())
+        return changes
+
+
+def initial_solution(task: Task) -> Execution | None:
+    """Return the execution of the corrective process alone with the initial hands of a task.
+
+    None if the corrective process does not complete the task with these hands, or if the task does
+    not name them and no hand sequence of its policy completes it or over 4,096 would have to be
+    tried.
+    """
+    try:
+        execution = corrective_trial(task, initial_hands(task))
+    except NotApplicableError:
+        return None
+    return execution if execution.completed else None
+
+
+def _other(hand: Hand) -> Hand:
+    """Return the other hand."""
+    return "right" if hand == "left" else "left"
+
+
+def isolated_reaches(
+    task: Task, q: Array, goals: ArrayLike, hands: ArrayLike
+) -> tuple[Array, Array]:
+    """Return the ticks r(q, g, h) of reaches by the corrective process from configuration q to goal
+    g with hand h, and the configurations R(q, g, h) at their ends.
+
+    Parameters
+    ----------
+    task : Task
+    q : ndarray, shape (..., dof)
+        Configurations at the start, length unit and rad.
+    goals, hands : array_like of int, shapes that broadcast to (...)
+        Numbers of goals, from 1 (ValueError for others), and places of hands in HANDS.
+
+    Returns
+    -------
+    (ndarray, shape (...), ndarray, shape (..., dof))
+        Ticks, 0 if the hand is within the goal at the start, NaN if the reach ends without a hit;
+        and configurations at the end.
+    """
+    q, numbers = np.asarray(q), 1 + np.arange(len(task.goals))
+    shape = q.shape[:-1]
+    try:
+        fit = np.broadcast_shapes(np.shape(goals), np.shape(hands), shape) == shape
+    except ValueError:
+        fit = False
+    if not fit or not np.isin(goals, numbers).all():
+        raise ValueError(f"needed are goals from 1 to {len(numbers)} and hands for q of {q.shape}")
+    reached = reach_goals(
+        task.robot,
+        q.reshape(-1, q.shape[-1]),
+        np.broadcast_to(hands, shape).ravel(),
+        task.goal_array[np.broadcast_to(goals, shape).ravel() - 1],
+        task.radius,
+        locked_base=task.locked_base,
+    )
+    ticks = np.where(reached.hit, reached.ticks, np.nan)
+    return ticks.reshape(shape), reached.q.reshape(q.shape)
+
+
+def gain_at_next(runs: Solutions) -> Array:
+    """Return the ticks that the posture at each goal saves on the way to the next goal, shape
+    ``(n, G − 1)``: positive where the movement to the next goal is shorter.
+
+    r(q', g + 1, h(i, g + 1)) − r(q'', g + 1, h(i, g + 1)),
+
+    where q' = R(q(i, g − 1), g, h(i, g)) is the posture in which the corrective process would have
+    hit goal g, and q'' is q(i, g) with the joints of the idle arm as in q', so that movements of
+    the idle arm do not count. NaN if a reach ends without a hit.
+    """
+    task, hands = runs.task, runs.hands
+    goals = 1 + np.arange(len(task.goals))
+    now, following = np.s_[:, :-1], np.s_[:, 1:]
+    alone, there = isolated_reaches(task, runs.starts[now], goals[:-1], hands[now])
+    idle = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
+    for number, hand in enumerate(HANDS):
+        idle[number, task.robot.joints(_other(hand))] = True
+    hit = np.where(idle[hands[now]], there, runs.configurations[now])
+    after, nearer = (
+        isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (there, hit)
+    )
+    return np.where(np.isnan(alone), np.nan, after - nearer)
+
+
+def ticks_slower(runs: Solutions) -> Array:
+    """Return the ticks by which each chosen hand is slower for its goal alone, shape ``(n, G)`` for
+    n runs and G goals.
+
+    r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h): the ticks of the
+    corrective process with the hand h(i, g) from the configuration at the hit before, less the
+    ticks with the fastest hand; more than 0 for a hand that is not the fastest for this goal alone.
+    Infinite if the reach with the chosen hand ends without a hit.
+    """
+    goals = 1 + np.arange(len(runs.task.goals))
+    alone = np.full((len(HANDS), *runs.hands.shape), np.inf)
+    for hand in map(HANDS.index, runs.task.hands):
+        reached, _ = isolated_reaches(runs.task, runs.starts, goals, np.array(hand))
+        alone[hand] = np.where(np.isnan(reached), np.inf, reached)
+    chosen = np.take_along_axis(alone, runs.hands[None], axis=0)[0]
+    slower: Array = np.full_like(chosen, np.inf)
+    np.subtract(chosen, alone.min(axis=0), out=slower, where=chosen < np.inf)
+    return slower
+
+
+def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
+    """Return the share of the way to its next goal that the idle hand covers, shape ``(G,)``, for a
+    completed ``run``.
+
+    (d_held(g) − d(g)) / d_initial(g),
+
+    where d(g) is the distance of the idle hand to the next goal of this hand at the hit of goal g;
+    d_held(g) is this distance if the idle arm had kept its joints since its own last hit (or the
+    start); and d_initial(g) is the distance of the same hand to the same goal at the hit of goal g
+    in ``initial``, a completed run of the corrective process alone with the task's initial hands.
+    NaN if the idle hand hits no later goal (always under exploration condition 1), or d_initial(g)
+    is 0; else 0 if the idle arm keeps still, whatever the base does (always under condition 3).
+    """
+    now, hands = run.configurations, hands_of(run.hands)
+    held = np.array(now)
+    own_last = dict.fromkeys(HANDS, task.q0)
+    for row, hand in zip(held, hands, strict=True):
+        own_last[hand] = row.copy()
+        joints = task.robot.joints(_other(hand))
+        row[joints] = own_last[_other(hand)][joints]
+    nearer = np.full(len(task.goals), np.nan)
+    for k, idle in enumerate(map(_other, hands)):
+        if idle in hands[k:]:
+            goal = task.goals[hands.index(idle, k)]
+            reached, kept, initially = (
+                np.linalg.norm(task.robot.forward_kinematics(q[k], idle) - goal)
+                for q in (now, held, initial.configurations)
+            )
+            if initially > 0:
+                nearer[k] = (1 - reached / initially) - (1 - kept / initially)
+    return nearer
+
+
+@dataclass(frozen=True)
+class Signature:
+    """A signature of coarticulation."""
+
+    each: Callable[[Solutions], Array]
+    """Function that returns the signature of each run, shape ``(n,)``, NaN for runs without it."""
+    words: str
+    """The quantity that the signature measures, in words with its unit."""
+
+
+def hand(runs: Solutions) -> Array:
+    """Return for each run, shape ``(n,)``, the share of goals before the last whose hand is not the
+    fastest for that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`. NaN on
+    a task for one hand or with one goal."""
+    alike = as_in_isolation(runs)[:, :-1]
+    return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
+
+
+def as_in_isolation(runs: Solutions) -> Array:
+    """Return a(i, g) for run i and goal g, shape ``(n, G)``: 1 if the chosen hand is the fastest
+    for goal g alone, or else 0; NaN on a task for one hand.
+
+    a(i, g) = [r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h)].
+    """
+    if not runs.runs or len(runs.task.hands) < 2:
+        return np.full((len(runs.runs), len(runs.task.goals)), np.nan)
+    return np.asarray(ticks_slower(runs) == 0, dtype=np.float64)
+
+
+def other_arm(runs: Solutions) -> Array:
+    """Return for each run, shape ``(n,)``, the share of the way to its next goal that the idle hand
+    covers, a mean of :func:`preshaping` over the goals where that is not NaN.
+
+    Negative if on the whole the idle hand moves away. NaN on a task for one hand, without an
+    initial solution, and for a run without such a goal.
+    """
+    initial = initial_solution(runs.task)
+    if not runs.runs or initial is None or len(runs.task.hands) < 2:
+        return np.full(len(runs.runs), np.nan)
+    values = np.array([preshaping(runs.task, run, initial) for run in runs.runs])
+    means, some = np.full(len(values), np.nan), ~np.isnan(values).all(axis=1)
+    means[some] = np.nanmean(values[some], axis=1)
+    return means
+
+
+def arm(runs: Solutions) -> Array:
+    """Return for each run, shape ``(n,)``, the ticks that the postures of base and chosen arm save
+    on the way to the next goal: the mean of :func:`gain_at_next` over goals g < G; NaN if a gain of
+    the run is NaN, and on a task with one goal."""
+    if not runs.runs or len(runs.task.goals) < 2:
+        return np.full(len(runs.runs), np.nan)
+    return np.asarray(gain_at_next(runs).mean(axis=1))
+
+
+SIGNATURES = {
+    "hand": Signature(
+        hand,
+        "share of the goals that others follow which are hit with the slower hand for them alone",
+    ),
+    "arm": Signature(
+        arm,
+        "ticks by which the posture of base and chosen arm leaves the next goal nearer, with the "
+        "idle arm where it was (mean over goals)",
+    ),
+    "other arm": Signature(
+        other_arm,
+        "share of the initial distance to its next goal by which the idle arm brings its hand "
+        "nearer (mean over goals)",
+    ),
+    "first": Signature(
+        lambda runs: runs.against_same_hands[:, 0],
+        "ticks by which the first movement is longer than the corrective process's with the same "
+        "hands",
+    ),
+    "whole": Signature(
+        lambda runs: -runs.against_same_hands.sum(axis=1),
+        "ticks by which the whole task is shorter than the corrective process's",
+    ),
+}
+"""Signatures by their names in claims: ``first`` is t(i, 1) − c(i, 1), and ``whole`` is
+Σ_g c(i, g) − t(i, g); NaN if the corrective process does not complete the task with the hands of
+the run."""
+
+
+IN_MEMORY = 500
+"""Most permutations or resamples of runs in memory at once."""
+
+
+def _groups(*groups: Numbers) -> list[Array]:
+    """Return groups of runs as arrays of float64. Raises ValueError unless all have shape ``(runs,
+    dof)``, with the same ``dof`` and a run at least."""
+    shapes = [np.shape(group) for group in groups]
+    if any(len(shape) != 2 or shape[1:] != shapes[0][1:] or 0 in shape for shape in shapes):
+        raise ValueError(f"runs have shapes {shapes}; needed is (runs, dof) of each")
+    return [np.asarray(group, np.float64) for group in groups]
+
+
+def distance_of_means(first: Array, second: Array) -> float:
+    """Return ‖mean(first) − mean(second)‖, the distance of mean configurations of two contexts.
+
+    ``first`` and ``second`` have shape ``(runs, dof)`` (ValueError for others); length unit and rad
+    mixed.
+    """
+    first, second = _groups(first, second)
+    return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
+
+
+def standardised_posture_difference(first: Array, second: Array) -> float:
+    """Return the distance of the mean configurations of two contexts, ``(runs, dof)`` each, in
+    pooled standard deviations within contexts, 0 to ∞.
+
+    d = ‖m₁ − m₂‖ / s, s² = (Σ‖x − m₁‖² + Σ‖x − m₂‖²) / (n₁ + n₂ − 2),
+
+    a multivariate form of Cohen's d (Cohen 1988). Without an effect of the context the expectation
+    of d² is about 1/n₁ + 1/n₂, not 0. NaN if no context has two runs, or if s = 0. Raises
+    ValueError for other shapes.
+    """
+    first, second = _groups(first, second)
+    freedom = len(first) + len(second) - 2
+    if freedom < 1:
+        return math.nan
+    squares = sum((centred(group) ** 2).sum() for group in (first, second))
+    spread = float(np.sqrt(squares / freedom))
+    return distance_of_means(first, second) / spread if spread else math.nan
+
+
+def posture_difference_below(
+    first: Numbers,
+    second: Numbers,
+    bound: float,
+    rng: np.random.Generator,
+    *,
+    standardised: bool = True,
+    resamples: Resamples = RESAMPLES,
+) -> float:
+    """Test that the posture difference is below a bound, by the bootstrap.
+
+    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, the share of bootstrap samples,
+    with runs drawn within each context, whose :func:`standardised_posture_difference` is at least
+    ``bound`` (in SDs; NaN counts), or if not ``standardised`` whose :func:`distance_of_means` is;
+    one such sample is added. Noise adds to distances, so that p is rather too large. NaN if a
+    context has a single run. Raises ValueError for other shapes.
+    """
+    groups = _groups(first, second)
+    if min(map(len, groups)) < 2:
+        return math.nan
+    means, squares = [], np.zeros(resamples)
+    for group in groups:
+        means.append(np.empty((resamples, group.shape[1])))
+        for rows in slices(resamples, IN_MEMORY):
+            drawn = group[rng.integers(len(group), size=(rows.stop - rows.start, len(group)))]
+            means[-1][rows] = drawn.mean(axis=1)
+            squares[rows] += ((drawn - means[-1][rows, None]) ** 2).sum(axis=(1, 2))
+    pooled = np.sqrt(squares / (sum(map(len, groups)) - 2)) if standardised else 1.0
+    reached = np.linalg.norm(means[0] - means[1], axis=1) >= bound * pooled
+    return float(1 + reached.sum()) / (resamples + 1)
+
+
+def permutation_p(
+    first: Array, second: Array, rng: np.random.Generator, *, resamples: Resamples = RESAMPLES
+) -> float:
+    """Test that the distance of the mean configurations of two contexts exceeds chance, by a
+    one-tailed permutation test of runs.
+
+    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, 0 < p ≤ 1: exact if the runs can
+    be divided in no more than ``resamples`` ways, 1 if all runs are equal, NaN if a context has a
+    single run. Raises ValueError for other shapes.
+    """
+    first, second = _groups(first, second)
+    if min(len(first), len(second)) < 2:
+        return math.nan
+    n, m, pool = len(first), len(second), centred(np.concatenate([first, second]))
+    ways = math.comb(n + m, n)
+    exact = ways <= resamples
+    every = places(n + m, n, ways if exact else resamples, exact, rng)
+    null = [_distances(*_means_of(pool, rows)) for _, rows in every]
+    (observed,) = _distances(*_means_of(pool, np.arange(n)[None]))
+    reached = int((np.concatenate(null) >= observed * (1 - 1e-9)).sum())
+    # Where divisions are drawn, the observed one counts as one more (Davison & Hinkley 1997).
+    return reached / ways if exact else (1 + reached) / (1 + resamples)
+
+
+def beyond_p(
+    method: Sequence[Numbers],
+    other: Sequence[Numbers],
+    rng: np.random.Generator,
+    *,
+    resamples: Resamples = RESAMPLES,
+) -> float:
+    """Test that a method's posture difference between contexts exceeds another method's, by
+    permutation.
+
+    The posture difference is the distance of the mean configurations in the two contexts. The
+    statistic is the difference of the two methods' posture differences. Permutations exchange the
+    runs of both methods within each context. Raises ValueError for other numbers of contexts than
+    two, and for other shapes.
+
+    Parameters
+    ----------
+    method, other : sequence of arrays, shape (runs, dof)
+        Configurations in each of the two contexts, length unit and rad.
+    rng : numpy.random.Generator
+        Generator of the permutations.
+    resamples : int
+        Number of permutations.
+
+    Returns
+    -------
+    float
+        p, 0 < p ≤ 1: twice the upper tail, 1 at most. NaN if a method has a single run in a
+        context.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> still = [rng.normal(size=(20, 10)), rng.normal(size=(20, 10))]
+    >>> moved = [rng.normal(size=(20, 10)), rng.normal(size=(20, 10)) + 2]
+    >>> beyond_p(moved, still, rng) < 0.001 < beyond_p(still, still, rng)
+    True
+    """
+    if len(method) != 2 or len(other) != 2:
+        raise ValueError("needed are the runs of each method in two contexts")
+    groups = _groups(*method, *other)
+    if min(map(len, groups)) < 2:
+        return math.nan
+    pools = [np.concatenate(runs) for runs in zip(groups[:2], groups[2:], strict=True)]
+    sizes = [*map(len, groups[:2])]
+
+    def excess(rows: Sequence[NDArray[np.int32]]) -> Array:
+        of_method, of_other = zip(*map(_means_of, pools, rows), strict=True)
+        return _distances(*of_method) - _distances(*of_other)
+
+    null = np.empty(resamples)
+    for part in slices(resamples, IN_MEMORY):
+        count = part.stop - part.start
+        null[part] = excess([drawn_rows(len(pool), size, count, rng)
+                             for pool, size in zip(pools, sizes, strict=True)])  # fmt: skip
+    (observed,) = excess([np.arange(size, dtype=np.int32)[None] for size in sizes])
+    return min(1.0, 2 * float(1 + (null >= observed - 1e-12).sum()) / (1 + resamples))
+
+
+def _means_of(pool: Array, rows: NDArray[Any]) -> tuple[Array, Array]:
+    """Return, for each of ``rows`` of indices in ``pool``, the mean of the configurations that the
+    row names, and the mean of the others, shapes ``(rows, dof)``."""
+    total, chosen = pool[rows].sum(axis=1), rows.shape[1]
+    return total / chosen, (pool.sum(axis=0) - total) / (len(pool) - chosen)
+
+
+def _distances(first: Array, second: Array) -> Array:
+    """Return the distances of mean configurations, shape ``(rows,)``."""
+    return np.asarray(np.linalg.norm(first - second, axis=1))
+
+
+SAME = 0.01
+"""Posture difference, length unit and rad mixed, below which postures are the same: the robot's
+step."""
+
+
+def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
+    """Return ``(name, name, n)`` for each pair of tasks that differ only after their first goals: n
+    is the number of shared first goals that a further goal follows in both tasks. Pairs with n = 0,
+    with equal goals, and with different robots, starts, radii, hands or locked bases are left out.
+    """
+    pairs = []
+    for (a, first), (b, second) in combinations(tasks.items(), 2):
+        others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
+        if not others_differ and first.goals != second.goals:
+            same = (one == other for one, other in zip(first.goals, second.goals, strict=False))
+            shared = len(list(takewhile(bool, same)))
+            pairs.append((a, b, min(shared, len(first.goals) - 1, len(second.goals) - 1)))
+    return [pair for pair in pairs if pair[2]]
+
+
+def movable(task: Task, hand: Hand) -> Array:
+    """Return the indices of the entries of a configuration that move a hand, shape ``(k,)``: base
+    coordinates that are not locked, and joints of its arm."""
+    base = [k for k, name in enumerate("xy") if name not in task.locked_base]
+    return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
+
+
+def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
+    """Return the motor-equivalent part and the other part of a difference of configurations Δq.
+
+    ‖Nᵀ Δq‖ / √dim N and ‖Rᵀ Δq‖ / √dim R, for orthonormal bases N of the null space of the Jacobian
+    J and R of the row space. ``difference`` Δq has shape ``(k,)``, length unit and rad mixed,
+    ``jacobian`` J shape ``(2, k)``, for the k joints that can move. In a random direction the
+    squares of the parts have equal expectations. A difference between contexts is motor-equivalent
+    if the first part exceeds the second: another posture with the same position of the hand.
+    Caveat: for small differences the radius of the goal bounds the second part; nothing bounds
+    the first. NaN for a
+    space of dimension 0. Raises ValueError for other shapes.
+    Source: Mattos, Latash and colleagues, Experimental Brain Research
+    (doi:10.1007/s00221-015-4327-4, 10.1007/s00221-018-5215-5).
+    """
+    if np.ndim(difference) != 1 or np.shape(jacobian) != (2, len(difference)):
+        raise ValueError(
+            f"difference has shape {np.shape(difference)} and jacobian {np.shape(jacobian)}; "
+            "needed are (k,) and (2, k)"
+        )
+    equivalent, other = (
+        float(np.linalg.norm(basis.T @ difference)) / math.sqrt(basis.shape[1] or math.nan)
+        for basis in (scipy.linalg.null_space(jacobian), scipy.linalg.orth(np.transpose(jacobian)))
+    )
+    return equivalent, other
+
+
+@dataclass(frozen=True)
+class TwoContexts:
+    """Runs of a method that hit the same goal with the same hand, on tasks with different later
+    goals.
+
+    Parameters
+    ----------
+    first, second : Solutions
+        Runs on two tasks that share the goal, as ``study.executed(task, method)`` returns them.
+    goal : int
+        Number of the goal, from 1.
+    hand : {"left", "right"}
+        Hand that hits the goal; runs with the other hand do not count.
+    """
+
+    first: Solutions
+    second: Solutions
+    goal: int
+    hand: Hand
+
+    @property
+    def tasks(self) -> tuple[Task, Task]:
+        """Tasks of the two contexts."""
+        return self.first.task, self.second.task
+
+    @property
+    def method(self) -> str:
+        """Label of the method."""
+        return self.first.label
+
+    @cached_property
+    def configurations(self) -> tuple[Array, Array]:
+        """Configurations of the runs with this hand at the goal in each context, ``(runs, dof)``,
+        length unit and rad."""
+        goal, hand = self.goal - 1, HANDS.index(self.hand)
+        first, second = (
+            runs.configurations[runs.hands[:, goal] == hand, goal]
+            for runs in (self.first, self.second)
+        )
+        return first, second
+
+    @property
+    def in_both(self) -> bool:
+        """True if each context has a run that hits ``goal`` with ``hand``; if False, posture
+        differences and p raise ValueError."""
+        return all(map(len, self.configurations))
+
+    @property
+    def n(self) -> int:
+        """Number of runs with this hand in the two contexts together."""
+        return sum(map(len, self.configurations))
+
+    @property
+    def posture_difference(self) -> float:
+        """Distance between the mean postures of the two contexts, length unit and rad mixed."""
+        return distance_of_means(*self.configurations)
+
+    @property
+    def standardised_posture_difference(self) -> float:
+        """Posture difference in pooled SDs within contexts; NaN if runs within contexts do not
+        differ, and if each context has a single run."""
+        return standardised_posture_difference(*self.configurations)
+
+    @cached_property
+    def parts(self) -> tuple[float, float]:
+        """Motor-equivalent part of the posture difference, which leaves the hand where it is, and
+        the other part, each per dimension (:func:`motor_equivalence`)."""
+        task, joints = self.first.task, movable(self.first.task, self.hand)
+        posture = np.concatenate(self.configurations).mean(axis=0)
+        first, second = (configurations.mean(axis=0) for configurations in self.configurations)
+        jacobian = task.robot.jacobian(posture, self.hand)[:, joints]
+        return motor_equivalence((first - second)[joints], jacobian)
+
+    @cached_property
+    def p(self) -> float:
+        """P-value of the one-tailed permutation test that the posture difference exceeds chance
+        (:func:`.permutation_p`); NaN if a context has a single run."""
+        return permutation_p(*self.configurations, self._rng("context dependence"))
+
+    @cached_property
+    def p_same(self) -> float:
+        """P-value of the bootstrap test that the posture difference is below :data:`SAME`
+        (:func:`.posture_difference_below`); NaN if a context has a single run."""
+        rng = self._rng("sameness")
+        return posture_difference_below(*self.configurations, SAME, rng, standardised=False)
+
+    def p_beyond(self, other: TwoContexts) -> float:
+        """Return the p-value of the permutation test that the posture difference exceeds the
+        posture difference of ``other``, another method at the same goal: twice the upper tail
+        (:func:`.beyond_p`); NaN if a context has a single run."""
+        return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
+
+    def _rng(self, test: str) -> np.random.Generator:
+        """Return a new random generator for a test, seeded by the test, the goal, the hand and the
+        second task: the same in every folder and for every method."""
+        where = f"goal {self.goal}, {self.hand} hand, against {self.second.task.name}"
+        return np.random.default_rng([SEED, zlib.crc32(f"{test} {where}".encode())])

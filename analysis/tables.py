@@ -1,0 +1,1028 @@
+"""Tables of the report: functions of a study that return frames, by id in :data:`TABLES`.
+
+A table is made by the decorator :func:`table`, which has its columns, a line for each: the column's
+name, its heading, its format, and whether LaTeX has it. Rows come from a function that yields
+pairs of a row's name and its values by column. Each column needs a value (perhaps NaN) in some row,
+and each value a column.
+"""
+
+from __future__ import annotations
+
+import html
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from pandas.io.formats.style import Styler
+
+from coartic.analysis.control import (
+    contexts_of_control,
+    control_of,
+    explores_idle_arm,
+    selects,
+    shared_goals,
+    with_control,
+)
+from coartic.analysis.methods import (
+    BY_FORMULA,
+    BY_TRIAL,
+    EC1,
+    EC4,
+    WITHOUT_REWARD,
+)
+from coartic.analysis.optima import gap_share
+from coartic.analysis.running_times import (
+    SPENDS,
+    best_after,
+    budget_for,
+    improvements,
+    runs_with_targets,
+    share_reached,
+    solve_times,
+    times_of,
+    times_on_tasks,
+)
+from coartic.analysis.signatures import SAME, SIGNATURES, TwoContexts
+from coartic.analysis.standings import (
+    cells_of,
+    compared_runs,
+    ranked_tasks,
+    ranking_budget,
+    reference,
+    runs_by_method,
+    runs_on,
+    solved_tasks,
+    standings,
+)
+from coartic.analysis.statistics import (
+    Scores,
+    bootstrap_test,
+    exchange_test,
+    holm,
+    other_tasks,
+    smallest_p,
+    stratified_test,
+)
+from coartic.analysis.study import Study, check_study, solved, typical_run
+from coartic.analysis.words import (
+    NARROW_SPACE,
+    NONE,
+    RECONSTRUCTED,
+    commonest,
+    id_of,
+    in_brackets,
+    latex,
+    marked,
+    number,
+    tally,
+)
+from coartic.estimates import (
+    FEWER_RESAMPLES,
+    LEVEL,
+    Estimate,
+    difference_of_means,
+    mean,
+    mean_of_means,
+    standard_deviation,
+)
+from coartic.internal.text import counted, one_line
+from coartic.motion.solution import initial_reward
+from coartic.robot import Array
+
+Row = dict[str, Any]
+Rows = Iterator[tuple[str, Row]]
+"""Names of the rows of a table, each with its row: values by name of the column."""
+SHORT_ID = 8
+"""Characters of a run's id that people see: commands take its beginning."""
+_FORMULA = ("=", "+", "-", "@")
+"""Beginnings of text that spreadsheets take for formulas."""
+_USES = {BY_TRIAL: "trial", BY_FORMULA: "formula", WITHOUT_REWARD: "none"}
+
+
+class Column(NamedTuple):
+    """A column of a table, with heading and format."""
+
+    name: str
+    """Name in the CSV file; the beginning of names if ``ending`` has ``*``."""
+    ending: str = ""
+    """``[]``: the column has an interval (``gap_low``, ``gap_high``); ``±``: the column has a
+    standard deviation (``ours_sd``); ``*``: all columns that begin with the name; ``[*]``: all such
+    columns, each with an interval; empty: the column alone."""
+    heading: str = ""
+    """Heading; ``{}`` is the rest of a name after its beginning, such as a task. Shares are in per
+    cent if the heading has ``(%)``. Empty: only the CSV file has the column."""
+    digits: str = ""
+    """Decimals; ``p`` for a p-value; empty: as :func:`.number` chooses."""
+    in_latex: bool = False
+    """True if LaTeX has the column, too."""
+
+
+def _column_of(line: str) -> Column:
+    """Return a column from its line, ``name | heading | decimals | tex``, whose last parts can be
+    left out. The name ends with an ending of :class:`Column`: ``gap[] | gap (%) | 1 | tex``."""
+    name, heading, digits, tex = (*map(str.strip, line.split("|")), "", "", "")[:4]
+    ending = next((each for each in ("[]", "±", "[*]", "*") if name.endswith(each)), "")
+    return Column(name.removesuffix(ending), ending, heading, digits, tex == "tex")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the report: a function of a study."""
+
+    id: str
+    caption: str
+    """Caption; ``{tasks}`` is the number of ranked tasks, ``{reference}`` the name of the rewards
+    to which gaps are taken."""
+    columns: tuple[Column, ...]
+    """Columns of the CSV file in their order; ``run_ids``, of the runs behind each row, is last."""
+    rows: Callable[[Study], Rows]
+    """Function of a study that yields pairs of a row's name and its values by column."""
+    with_settings: bool = False
+    """True if page and LaTeX show settings and ablations of methods that are there, too."""
+
+    def __call__(self, study: Study) -> pd.DataFrame:
+        """Return the table of a study, a row for each name, intervals and deviations written out as
+        ``_low``, ``_high`` and ``_sd``. It is cached: do not change it."""
+        check_study(study)
+        return _frame_of(self, study)
+
+
+def table(
+    caption: str, columns: str, *, with_settings: bool = False
+) -> Callable[[Callable[[Study], Rows]], Table]:
+    """Return a decorator that turns a function of a study that yields rows into a table.
+
+    The id of the table is the name of the function without ``list_``, with dashes. ``columns`` has
+    a line for each column (:func:`_column_of`).
+    """
+    parts = [_column_of(line) for line in columns.splitlines() if line.strip()]
+
+    def as_table(rows: Callable[[Study], Rows]) -> Table:
+        every = *parts, Column("run_ids")
+        return Table(id_of(rows), caption, every, rows, with_settings)
+
+    return as_table
+
+
+@lru_cache(maxsize=64)  # of two or three studies
+def _frame_of(table: Table, study: Study) -> pd.DataFrame:
+    """Return a table of a study. Raises KeyError for a value without a column, and for a column
+    without a value in any row."""
+    named = list(table.rows(study))
+    rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
+    endings = {"[]": ("", "_low", "_high"), "±": ("", "_sd"), "": ("",)}
+    names: list[str] = []
+    for name, ending, *_ in table.columns:
+        if ending in ("*", "[*]"):
+            names += [each for each in rows.columns if each.startswith(name)]
+        else:
+            names += [name + each for each in endings[ending]]
+    if wrong := {*names} ^ {*rows.columns} if named else ():
+        raise KeyError(f"table {table.id}: only a row or only a column is called {sorted(wrong)}")
+    return rows.reindex(columns=names).rename_axis("row")
+
+
+def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
+    """Return for each row of a table True if its method is a setting or an ablation of a method
+    that is there, too (column ``under`` of :attr:`.Study.methods`). Methods are in column
+    ``against``, or else ``method``: "there" is in the same column."""
+    if "method" not in frame:
+        return pd.Series(False, frame.index)
+    label = frame["against" if "against" in frame else "method"]
+    return label.map(study.methods.under).isin([*label])
+
+
+def caption_of(table: Table, study: Study) -> str:
+    """Return the caption of a table of a study, filled in."""
+    caption = table.caption.replace("{tasks}", counted(len(ranked_tasks(study)), "task"))
+    return caption.replace("{reference}", reference(study, study.optima))
+
+
+def csv_of(frame: pd.DataFrame) -> str:
+    """Return a table as CSV, with an apostrophe before text that a spreadsheet would take for a
+    formula."""
+
+    def guarded(value: Any) -> Any:
+        return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+
+    return frame.map(guarded).rename(index=guarded).to_csv(lineterminator="\n")
+
+
+class ShownColumn(NamedTuple):
+    """A column of a table as people see it."""
+
+    heading: str
+    texts: list[str]
+    """Values as text, with their SDs and intervals, row by row."""
+    is_number: bool
+    """True if the column has numbers, True and False alone, or no value at all."""
+
+
+def shown_columns(
+    table: Table, study: Study, frame: pd.DataFrame, *, in_latex: bool = False
+) -> dict[str, ShownColumn]:
+    """Return the columns that people see, by name: columns with a heading and a value in some row,
+    with SDs and intervals in the column of their number; ``in_latex``: only those that LaTeX has.
+
+    Methods, tasks and uses of the reward go by their titles, tasks with † where reconstructed.
+    """
+    titles = {
+        **{str(task.family): str(task.family).split("/")[0] for task in study.tasks.values()},
+        **{name: marked(task) for name, task in study.tasks.items()},
+        **study.methods.title,
+        **_USES,
+    }
+    to, shown = reference(study, study.optima), dict[str, ShownColumn]()
+    for column in table.columns:
+        if not column.heading or (in_latex and not column.in_latex):
+            continue
+        names = [column.name]
+        if "*" in column.ending:
+            names = [name for name in map(str, frame) if name.startswith(column.name)]
+        ends = [f"{name}{end}" for name in names for end in ("_low", "_high", "_sd")]
+        for name in names:
+            values = frame[name]
+            is_end = column.ending == "[*]" and name in ends
+            if is_end or not (values.notna() & (values != "")).any():
+                continue
+            what = name.removeprefix(column.name)
+            heading = column.heading.replace("{}", titles.get(what, what))
+            if to != "optimum":
+                heading = f"gap to the {to} (%)" if heading == "gap (%)" else heading
+            if to == "best of this folder" and heading == "best known":
+                heading = to
+            if not pd.api.types.is_numeric_dtype(values.infer_objects()):
+                words = {each: titles.get(each) or one_line(str(each)) for each in values.unique()}
+                texts = [NONE if pd.isna(each) else words[each] or NONE for each in values]
+                shown[name] = ShownColumn(heading, texts, is_number=False)
+                continue
+            of_number = [name, f"{name}_low", f"{name}_high"] if "[" in column.ending else [name]
+            of_number += [f"{name}_sd"] * (column.ending == "±")
+            rows = frame[of_number].astype(float).to_numpy() * (100.0 if "(%)" in heading else 1.0)
+            if column.ending == "±":
+                heading += " ± SD"
+            elif len(of_number) > 1 and not np.isnan(rows[:, 1]).all() and "[" not in heading:
+                heading += f" [95{NARROW_SPACE}%]"
+            texts = [_number_text(column, *row) for row in rows.tolist()]
+            shown[name] = ShownColumn(heading, texts, is_number=True)
+    return shown
+
+
+def _number_text(column: Column, value: float, *spread: float) -> str:
+    """Return a number as text with its SD or its interval, where they are not NaN; an interval of
+    no length is left out (:func:`.in_brackets`)."""
+    decimals = int(column.digits) if column.digits.isdigit() else None
+    if column.digits == "p":
+        return "< 0.001" if value < 0.001 else number(value, 3)
+    text = number(value, decimals)
+    if len(spread) == 2:
+        return f"{text} {in_brackets(*spread, decimals)}".strip()
+    return text + "".join(f" ± {number(sd, decimals)}" for sd in spread if not math.isnan(sd))
+
+
+def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
+    """Return a table in HTML, by pandas' Styler: the cell in row 2 and column 3 has the id
+    ``T_ID_row2_col3``. Cells without a value are empty; rows of methods from files have the class
+    ``own``, unless all rows are of such, and cells with text the class ``text``."""
+    columns = shown_columns(table, study, frame)
+    built_in = {"", *study.methods.index[study.methods.built_in.astype(bool)]}
+    is_own = ~frame.get("method", pd.Series("", frame.index)).isin(built_in).to_numpy()
+    own = np.where(is_own & (not is_own.all()), "own ", "")
+    texts = {
+        name: ["" if text == NONE else text.replace(" †", "\N{NO-BREAK SPACE}†") for text in texts]
+        for name, (_, texts, _) in columns.items()
+    }
+    kinds = {name: "" if column.is_number else "text" for name, column in columns.items()}
+    cells = pd.DataFrame(texts)
+    classes = pd.DataFrame({name: own + kind for name, kind in kinds.items()})
+    styler = Styler(cells, uuid=table.id, uuid_len=len(table.id)).hide(axis="index")
+    styler.set_td_classes(classes).format(escape="html")
+    styler.set_table_styles(
+        {name: [{"selector": "th", "props": "text-align: left"}]
+         for name, kind in kinds.items() if kind}
+    )  # fmt: skip
+    headings = [html.escape(column.heading) for column in columns.values()]
+    caption = f"<span>{html.escape(caption_of(table, study))}</span>"
+    return styler.relabel_index(headings, axis="columns").set_caption(caption).to_html()
+
+
+def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[str] = ()) -> str:
+    """Return a table in LaTeX, by pandas' Styler, with booktabs and longtable: the columns that its
+    definition marks. ``notes`` are sentences below the table, with the meaning of a dagger."""
+    columns = shown_columns(table, study, frame, in_latex=True)
+    cells = pd.DataFrame({name: map(latex, column.texts) for name, column in columns.items()})
+    headings = [latex(column.heading) for column in columns.values()]
+    body = (
+        cells.style.hide(axis="index")
+        .relabel_index(headings, axis="columns")
+        .to_latex(
+            environment="longtable",
+            hrules=True,
+            column_format="".join("r" if each.is_number else "l" for each in columns.values()),
+            caption=latex(caption_of(table, study)),
+            label=f"tab:coartic-{table.id}",
+        )
+    )
+    if "†" in body or any("†" in note for note in notes):
+        notes = [*notes, RECONSTRUCTED]
+    needs = "% needs \\usepackage{booktabs,longtable} and \\usepackage[T1]{fontenc}; letters that\n"
+    needs += "% pdfLaTeX does not know need XeLaTeX or LuaLaTeX and a font that has them"
+    return "\n".join([needs, body, *map(latex, notes), ""])
+
+
+def run_ids(*parts: pd.DataFrame) -> Row:
+    """Return a row with one entry, ``run_ids``: the ids of all runs in ``parts``, frames of runs,
+    separated by spaces."""
+    return {"run_ids": " ".join(" ".join(runs.run_id.tolist()) for runs in parts)}
+
+
+def _named(study: Study, runs: pd.DataFrame) -> Row:
+    """Return entries of a row on the runs of one method on one task: title of the ``task``
+    (:func:`.marked`), label of the ``method``, the number of ``runs`` and ``run_ids``."""
+    task, label = marked(study.tasks[runs.task.iloc[0]]), runs.label.iloc[0]
+    return {"task": task, "method": label, "runs": len(runs), **run_ids(runs)}
+
+
+ROUNDING = 1e-9
+"""Largest posture difference that counts as rounding, length unit and rad mixed."""
+_EARLY = 1_000
+"""Number of trials after which the ranking has a further gap, ``gap_early``."""
+BUDGETS = (100, 1_000, 10_000)
+"""Numbers of trials after which the table of learning has rewards."""
+COSTS = (
+    ("trials_to_quarter", "trials", 0.25),
+    ("trials_to_half", "trials", 0.5),
+    ("forward_kinematics_to_half", "forward_kinematics", 0.5),
+    ("seconds_to_half", "solve_s", 0.5),
+)
+"""Columns of :func:`list_runtimes`, each with its cost and the share of the targets to reach."""
+
+
+@lru_cache(maxsize=4)
+def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
+    """Return, by label, on how many individual tasks the mean reward of a method is
+    ``better`` and ``worse`` than that of the learner that explores most (EC1, with two arms EC4).
+
+    A task counts if both solved every run and the rewards differ significantly: by the two-sided
+    exchange test, or for a deterministic method, whose reward counts as exact, by the bootstrap
+    test, corrected over the tasks of the method (Holm). Runs with the same seed are not compared as
+    pairs. A method is left out if no test could have found a difference.
+    """
+    counts = dict[str, dict[str, int]]()
+    for label, stochastic in study.methods.stochastic.items():
+        ahead, tests = list[bool](), list[Estimate]()
+        for name, task in study.individual_tasks.items():
+            runs = study.cells.get((name, str(label)))
+            learner = study.cells.get((name, EC4 if len(task.hands) > 1 else EC1))
+            if runs is None or learner is None or runs is learner:
+                continue
+            rewards, learned = (
+                solved(each).reward.to_numpy(np.float64) for each in (runs, learner)
+            )
+            if len(rewards) == len(runs) and len(learned) == len(learner):
+                ahead.append(bool(rewards.mean() > learned.mean()))
+                tests.append(
+                    exchange_test(learned, rewards, "two-sided")
+                    if stochastic
+                    else bootstrap_test(learned, float(rewards[0]), "two-sided")
+                )
+        least = [test.least_p for test in tests if not math.isnan(test.least_p)]
+        if least and len(least) * min(least) < LEVEL:
+            sure = [
+                better
+                for better, p in zip(ahead, holm([test.p for test in tests]), strict=True)
+                if p < LEVEL
+            ]
+            counts[str(label)] = {"better": sum(sure), "worse": len(sure) - sum(sure)}
+    return counts
+
+
+def _gaps_after(study: Study, trials: int) -> pd.Series:
+    """Return the mean gap over tasks of the best of the first ``trials`` trials of each ranked
+    method, by label: NaN if a run had no solution by then. Runs without rewards of trials keep
+    their gap."""
+    learned, runs = improvements(study), compared_runs(study)
+    best = [
+        float(best_after(learned[run_id], trials))
+        if not math.isnan(reward) and len(learned.get(run_id, ((),))[0])
+        else reward
+        for run_id, reward in zip(runs.run_id, runs.reward.astype(float), strict=True)
+    ]
+    gaps = pd.Series(gap_share(best, runs.best_known.astype(float)), runs.index)
+    cells = gaps.groupby([runs.ranked_as, runs.task])
+    by_task = cells.mean().where(cells.count() == cells.size())
+    methods = by_task.groupby(level=0)
+    return methods.mean().where(methods.count() == methods.size())
+
+
+def _standing_rows(study: Study, *, ranked: bool) -> Rows:
+    """Yield a row for each method of :func:`.standings` that is ``ranked``, or for the others."""
+    rows = standings(study)
+    rows = rows[(rows.why == "") == ranked]
+    single = [task for task in ranked_tasks(study) if study.tasks[task].family is None]
+    early = _gaps_after(study, _EARLY).to_dict() if ranked and len(rows) else {}
+    for label, row in rows.iterrows():
+        runs = runs_by_method(study)[str(label)]
+        gaps = runs.groupby("task").gap.mean()
+        counts = [
+            counts
+            for each in runs.label.unique()
+            if (counts := _counts_against_learner(study).get(each))
+        ]
+        entries: Row = {"method": label}
+        entries |= {name: row[name] for name in ("gap", "gap_low", "gap_high")}
+        entries |= {name: row[name] for name in ("information", "note", "runs")}
+        entries |= {
+            name: sum(of[name] for of in counts) if counts else math.nan
+            for name in ("better", "worse")
+        }
+        entries |= {f"on {task}": gaps.get(task, math.nan) for task in single}
+        if ranked:
+            names = "share", "share_low", "share_high", "without_gain"
+            entries |= {name: row[name] for name in names} | {"gap_early": early[label]}
+            entries |= {name: runs[name].mean() for name in ("forward_kinematics", "cpu_s")}
+        else:
+            entries |= {name: row[name] for name in ("why", "tasks", "failed")}
+        yield str(label), entries | run_ids(runs)
+
+
+@table(
+    "Gap and share of the possible gain, means over {tasks}, and gap on each",
+    """
+    method             | method                            |   | tex
+    gap[]              | gap (%)                           | 1 | tex
+    share[]            | share of the gain (%)             | 0 | tex
+    information        | use of the reward
+    better             | better than the learner on (tasks)
+    worse              | worse on (tasks)
+    gap_early
+    on *               | {} (%)                            | 1 | tex
+    note               | note                              |   | tex
+    without_gain
+    forward_kinematics
+    cpu_s
+    runs               | runs
+    """,
+    with_settings=True,
+)
+def list_ranking(study: Study) -> Rows:
+    """Yield a row for each ranked method (:func:`.standings`), the smallest gap first: its gap and
+    share of the gain over tasks, its gap on each task that is not random, its gap after a thousand
+    trials, and means of what a run costs."""
+    return _standing_rows(study, ranked=True)
+
+
+@table(
+    "Methods that are not ranked",
+    """
+    method      | method                             |   | tex
+    why         | why not                            |   | tex
+    gap[]       | gap (%)                            | 1
+    information | use of the reward
+    better      | better than the learner on (tasks)
+    worse       | worse on (tasks)
+    on *        | {} (%)                             | 1 | tex
+    note        | note                               |   | tex
+    tasks       | solved tasks
+    runs        | runs
+    failed      | failed runs
+    """,
+    with_settings=True,
+)
+def list_not_ranked(study: Study) -> Rows:
+    """Yield a row for each method that is not ranked (:func:`.standings`), with the reason, the gap
+    if it solved all tasks in another number of trials, and its gap on each task that is not
+    random."""
+    return _standing_rows(study, ranked=False)
+
+
+@table(
+    "Gaps of methods less the gap of the method against which they are compared, on the tasks that "
+    "this method solved (positive: this method is better)",
+    """
+    method       | method                   |   | tex
+    against      | compared with            |   | tex
+    difference[] | difference of gaps (%)   | 1 | tex
+    p_holm       | p (corrected)            | p | tex
+    tasks        | tasks                    |   | tex
+    runs         | runs
+    """,
+)
+def list_differences(study: Study) -> Rows:
+    """Yield a row for each other method: its gap less the gap of :attr:`.Study.against`, on the
+    tasks on which the latter solved every run; the smallest difference first.
+
+    If :attr:`.Study.against` is empty, the compared method is the first of the ranking where one
+    parameter is varied; otherwise each method from a file is compared with the built-in methods
+    with the same use of the reward. Methods that lack or failed a run there or were asked for
+    another number of trials, and settings and ablations of methods that ran
+    (:attr:`.Study.methods`, ``under``), are left out. Intervals are for other runs on the same
+    tasks; p is two-sided (:func:`.stratified_test`), corrected over the rows of the compared method
+    (Holm).
+    """
+    methods, rows = study.methods, standings(study)
+    solved_some = [label for label in rows.index if solved_tasks(study, str(label))]
+    chosen = [study.against] if study.against else []
+    if study.varied[0] and not study.against:
+        chosen = [*rows.index[rows.why == ""][:1]]
+    own = [label for label in solved_some if not methods.built_in[label]]
+    for against in chosen or own:
+        tasks, found = solved_tasks(study, against), list[tuple[Estimate, str]]()
+        asked = {*runs_on(study, against, tasks).budget.dropna()}
+        alike = methods.built_in & (methods.information == methods.information[against])
+        if chosen:
+            alike = methods.index != against
+        for row in methods.index[alike & (methods.under == "")].intersection(rows.index):
+            runs = runs_on(study, row, tasks) if tasks else compared_runs(study)[:0]
+            names = runs.label.unique()
+            name = names[0] if len(names) == 1 else row
+            budgets = {*runs.budget.dropna()}
+            is_fair = budgets == asked or not (budgets and asked) or ranking_budget(study) is None
+            if len(runs) and runs.reward.notna().all() and is_fair and name != against:
+                found.append((_difference_of_gaps(study, name, against, tasks), name))
+        adjusted = holm([each.p for each, _ in found]) if found else []
+        in_order = sorted(zip(found, adjusted, strict=True), key=lambda each: each[0][0].value)
+        for (difference, name), p in in_order:
+            runs = runs_on(study, name, tasks)
+            entries: Row = {"method": name, "against": against}
+            entries |= {"tasks": len(tasks), "runs": len(runs)}
+            entries |= {**difference.columns("difference"), "p_holm": p}
+            yield f"{against} {name}", entries | run_ids(runs, runs_on(study, against, tasks))
+
+
+def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[str]) -> Estimate:
+    """Return the mean gap of the ``first`` method (a label) less the mean gap of the ``second``,
+    each a mean over ``tasks``.
+
+    Gaps of deterministic methods are taken as exact. The interval is for other runs on these tasks;
+    two exact gaps have no interval and no p-value.
+    """
+    exact, weights, drawn = 0.0, list[float](), list[Array]()
+    pairs: dict[Any, list[Array | float]] = {task: [] for task in tasks}
+    for sign, method in ((1, first), (-1, second)):
+        for task, of_task in runs_on(study, method, tasks).groupby("task").gap:
+            weight, gaps = sign / len(tasks), of_task.to_numpy(np.float64)
+            if study.methods.stochastic[method]:
+                weights.append(weight)
+                drawn.append(gaps)
+                pairs[task].append(gaps)
+            else:
+                exact += weight * gaps.mean()
+                pairs[task].append(float(gaps.mean()))
+    if not drawn:
+        return Estimate(exact)
+    sampled = mean_of_means(drawn, weights, FEWER_RESAMPLES)
+    ends = sampled.value + exact, sampled.low + exact, sampled.high + exact
+    return Estimate(*ends, p=stratified_test([(one, other) for one, other in pairs.values()]))
+
+
+@table(
+    "Postures at a goal that two tasks share",
+    """
+    method                  | method                                                | | tex
+    place                   | shared goal                                           | | tex
+    verdict                 | verdict
+    runs                    | runs                                                  | | tex
+    distance                | posture difference                                    | 2 | tex
+    standardised_difference | standardised posture difference (SD of the runs)      | 1
+    p_holm                  | p (corrected)                                         | p | tex
+    control                 | random search                                         | 2 | tex
+    control_runs            | its runs
+    p_random_search         | p beyond random search                                | p | tex
+    equivalent | difference that keeps the hand in place (null space, per dimension) | 3
+    other                   | difference that moves the hand (per dimension)        | 3
+    """,
+    with_settings=True,
+)
+def list_contexts(study: Study) -> Rows:
+    """Yield a row for each method, pair of tasks, goal that both share, and hand: the posture
+    difference between the tasks, its verdict, and the posture difference of random search; p is
+    corrected over a method's rows (Holm)."""
+    for label in study.methods.index:
+        every = list(shared_goals(study, label))
+        spreads = [shared.standardised_posture_difference for shared in every]
+        tested = zip(every, np.isnan(spreads).tolist(), strict=True)
+        p = holm([math.nan if no_spread else shared.p for shared, no_spread in tested])
+        for shared, adjusted in zip(every, p, strict=True):
+            first, second = shared.tasks
+            row: Row = {
+                "method": label,
+                "place": f"goal {shared.goal} of {first.label} and {second.label}",
+                "runs": shared.n,
+                "distance": shared.posture_difference,
+                "standardised_difference": shared.standardised_posture_difference,
+                "p_holm": adjusted,
+                "equivalent": shared.parts[0],
+                "other": shared.parts[1],
+                **dict.fromkeys(("control", "control_runs", "p_random_search"), math.nan),
+                **run_ids(*(study.cells[task.name, label] for task in shared.tasks)),
+            }
+            if (control := contexts_of_control(study, shared)) is not None:
+                row["control"], row["control_runs"] = control.posture_difference, control.n
+                row["p_random_search"] = shared.p_beyond(control)
+            row["verdict"] = _verdict_of(study, shared, row)
+            yield f"{first.name} {second.name} {label} goal {shared.goal} {shared.hand}", row
+
+
+_SIGNATURE = """
+    {0}[]            | {1} | {2} | {3}
+    {0}_control      | random search | {2} | {4}
+    {0}_difference[]
+    {0}_p            | p | p | {3}
+    {0}_control_runs
+"""
+"""Columns of a signature."""
+
+
+@table(
+    "Signatures of coarticulation, means over runs, next to random search",
+    """
+    task             | task                       | | tex
+    method           | method                     | | tex
+    hands            | hands                      | | tex
+    runs             | runs                       | | tex
+    control_runs     | runs of random search
+    control_idle_arm | idle arm in random search
+    """
+    + _SIGNATURE.format("first", "first movement slower by (ticks)", 1, "tex", "tex")
+    + _SIGNATURE.format("whole", "whole task faster by (ticks)", 1, "", "")
+    + _SIGNATURE.format("arm", "next goal nearer by (ticks)", 1, "tex", "")
+    + _SIGNATURE.format("other_arm", "idle hand nearer to its next goal (share)", 2, "", "")
+    + _SIGNATURE.format("hand", "goals with the slower hand for them alone (share)", 2, "", ""),
+)
+def list_signatures(study: Study) -> Rows:
+    """Yield rows with the signatures of every method, except searches, on every individual task,
+    and of random search there for methods that select among trials.
+
+    A row for each hand sequence of :func:`.with_control`, which a tenth of the solved runs or more
+    have, and a row for the choice of hands (``hands`` empty) on a task for two with two goals or
+    more. Means over runs; p is of the one-tailed exchange test and uncorrected.
+    ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
+    """
+    labels = study.methods.index[~study.methods.is_search]
+    columns = {signature: signature.replace(" ", "_") for signature in SIGNATURES}
+    endings = "_low", "_high", "_control", "_difference", "_difference_low", "_difference_high"
+    none = {
+        f"{column}{ending}": math.nan
+        for column in columns.values()
+        for ending in ("", *endings, "_p", "_control_runs")
+    }
+    for name, label in itertools.product(study.individual_tasks, labels):
+        cell = study.cells.get((name, label))
+        if cell is None or not len(solved(cell)):
+            continue
+        rows = dict[str, Row]()
+        for signature, column in columns.items():
+            for hands, (values, control) in with_control(study, signature, name, label).items():
+                row = rows.setdefault(hands, {"runs": len(values), "control_runs": len(control)})
+                row |= mean(values).columns(column) | {f"{column}_control_runs": len(control)}
+                if len(control) and selects(study, label):
+                    row |= {
+                        f"{column}_control": control.mean(),
+                        **difference_of_means(values, control).columns(f"{column}_difference"),
+                        f"{column}_p": exchange_test(values, control).p,
+                    }
+        for hands, row in rows.items():
+            search = control_of(study, name, label, hands) if selects(study, label) else ""
+            row["control_idle_arm"] = None
+            if search and len(study.tasks[name].hands) > 1:
+                explored = explores_idle_arm(study, name, search)
+                row["control_idle_arm"] = "with noise" if explored else "still"
+            key = " ".join(filter(None, (name, label, hands)))
+            yield key, none | _named(study, cell) | row | {"hands": hands}
+
+
+def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
+    """Return a verdict on whether the posture at a shared goal depends on later goals, such as
+    ``different postures``, ``the same posture`` or ``too few runs``.
+
+    Of stochastic methods, the permutation test distinguishes postures, and the bootstrap test that
+    the difference is below :data:`.SAME` shows that postures are the same; of others the difference
+    itself does both. Different postures of methods that select their solution from trials are
+    compared with random search, too. ``row``: other columns of :func:`list_contexts`.
+    """
+    method: Any = study.methods.loc[shared.method]
+    if method.stochastic:
+        few = smallest_p(*map(len, shared.configurations)) >= LEVEL
+        if few or math.isnan(shared.p):
+            return "too few runs"
+        differs = (shared.p if math.isnan(row["p_holm"]) else row["p_holm"]) < LEVEL
+        is_same = shared.p_same < LEVEL
+    else:
+        differs = shared.posture_difference > ROUNDING
+        is_same = shared.posture_difference < SAME
+    if is_same:
+        return "different, negligible" if differs else "the same posture"
+    if not differs:
+        return "no significant difference"
+    if not selects(study, shared.method):
+        return "different postures"
+    if math.isnan(row["control"]):
+        return "undecided: no random search of as many trials"
+    if math.isnan(row["p_random_search"]):
+        return "undecided: too few runs of random search"
+    is_beyond = row["p_random_search"] < LEVEL
+    return "different postures" if is_beyond else "no more than random search"
+
+
+@table(
+    "Ticks of each movement less those of the corrective process alone with the same hands, means "
+    "over runs",
+    """
+    task         | task
+    method       | method
+    runs         | runs
+    by_goal_[*]  | goal {} | 1
+    """,
+)
+def list_saved(study: Study) -> Rows:
+    """Yield a row for each individual task and method, except searches, that solved a
+    run, with the mean difference of ticks at each goal, ``by_goal_1`` and so on: ticks of the run
+    less the ticks of the corrective process alone with the same hands. Runs with hands with which
+    this process fails are left out, and so are rows without other runs."""
+    for (task, label), runs in study.cells.items():
+        if (
+            task not in study.individual_tasks
+            or study.methods.is_search[label]
+            or not len(solved(runs))
+        ):
+            continue
+        changes = study.executed(task, label).against_same_hands
+        changes = changes[~np.isnan(changes).any(axis=1)]
+        if len(changes):
+            row: Row = {"task": task, "method": label, "runs": len(changes)}
+            for goal, ticks in enumerate(changes.T, 1):
+                row |= mean(ticks).columns(f"by_goal_{goal}")
+            yield f"{task} {label}", row | run_ids(runs)
+
+
+@table(
+    "Cost of reaching shares of the targets",
+    """
+    method         | method                                  |   | tex
+    reached        | targets reached (%)                     | 0 | tex
+    trials_to_quarter[]          | trials to a quarter of the targets
+    trials_to_half[]             | trials to half of the targets | | tex
+    forward_kinematics_to_half[] | forward-kinematics evaluations to half of the targets | | tex
+    seconds_to_half[]            | seconds to half of the targets
+    half on *
+    """,
+)
+def list_runtimes(study: Study) -> Rows:
+    """Yield a row for each method of :func:`.runtimes` with known numbers of trials: the share of
+    targets reached, and the costs of reaching a quarter and half of the targets (:data:`COSTS`).
+
+    ``half on *``, for methods that use the reward of each trial: median number of trials to the
+    target halfway to the optimum on a task, infinite if most runs do not reach this target.
+    """
+    for method, runs in runs_with_targets(study).items():
+        times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
+        if not all(map(len, times["trials"])):
+            continue
+        reached = share_reached(times["trials"])
+        row: Row = {"method": method, "reached": reached}
+        for name, spend, share in COSTS:
+            is_known = all(map(len, times[spend]))
+            cost = budget_for(times[spend], share) if is_known else Estimate(math.nan)
+            row |= cost.columns(name)
+        if study.methods.information[method] == BY_TRIAL:
+            for task, label in cells_of(runs):
+                half = times_of(study, task, label, "trials", (0.5,))
+                row[f"half on {task}"] = float(np.quantile(half, 0.5, method="inverted_cdf"))
+        yield method, row | run_ids(runs)
+
+
+@table(
+    "Best reward so far, mean over runs (ticks)",
+    """
+    task            | task                           |   | tex
+    method          | method                         |   | tex
+    runs            | runs                           |   | tex
+    corrective_best | corrective process, best hands | 1
+    after_100       | after 100 trials               | 1 | tex
+    after_1000      | after 1000 trials              | 1 | tex
+    after_10000     | after 10\u202f000 trials          | 1 | tex
+    """,
+)
+def list_learning(study: Study) -> Rows:
+    """Yield a row for each individual task and each method, except searches, if all its
+    runs there have a solution and made 100 trials or more: the best reward, negative ticks, after
+    each number of trials in :data:`BUDGETS` that all runs made, a mean over runs; NaN if a run has
+    no solution by then."""
+    learned = improvements(study)
+    for (task, label), runs in study.cells.items():
+        is_shown = task in study.individual_tasks and not study.methods.is_search[label]
+        is_solved = len(solved(runs)) == len(runs) and learned.keys() >= {*runs.run_id}
+        fewest = runs.trials.min()
+        if not (is_shown and is_solved and fewest >= BUDGETS[0]):  # a try or two, no learning
+            continue
+        row = _named(study, runs) | {"corrective_best": study.corrective_best[task]}
+        for budget in BUDGETS:
+            best = [best_after(learned[run_id], budget) for run_id in runs.run_id]
+            row[f"after_{budget}"] = np.mean(best) if budget <= fewest else math.nan
+        yield f"{task} {label}", row
+
+
+@lru_cache(maxsize=4)
+def _instances(study: Study) -> dict[str, list[str]]:
+    """Return, by family, the names of its instances (random tasks) with a best known reward."""
+    families: dict[str, list[str]] = {}
+    for name in study.optima:
+        if (family := study.tasks[name].family) is not None:
+            families.setdefault(family, []).append(name)
+    return families
+
+
+@lru_cache(maxsize=4)
+def on_instances(study: Study) -> pd.DataFrame:
+    """Return the runs of methods on those instances with a best known reward on which the method
+    solved every run, sorted by family and instance as in :func:`_instances`. Column ``method`` has
+    the label of the method's row in the ranking. Do not change the frame: it is kept."""
+    runs = compared_runs(study)
+    names = [*itertools.chain.from_iterable(_instances(study).values())]
+    failed = runs.reward.isna().groupby([runs.ranked_as, runs.task]).transform("any")
+    runs = runs[runs.task.isin(names) & ~failed]
+    place = pd.Categorical(runs.task, names)
+    runs = runs.assign(place=place, method=runs.ranked_as)
+    return runs.sort_values("place", kind="stable")
+
+
+def by_family(study: Study, runs: pd.DataFrame) -> Scores:
+    """Return, by family, the gaps of a method's runs on each instance of the family, a list of
+    arrays of shape ``(n,)``. ``runs`` are the method's rows of :func:`on_instances`; a family is
+    left out if one of its instances has no run there."""
+    return {
+        str(family): [
+            part.gap.to_numpy(np.float64) for _, part in of_family.groupby("task", sort=False)
+        ]
+        for family, of_family in runs.groupby("family", sort=False)
+        if of_family.task.nunique() == len(_instances(study)[str(family)])
+    }
+
+
+@table(
+    "Gap to the {reference}, in per cent of it: mean over instances",
+    """
+    method    | method    |   | tex
+    instances | instances
+    missing   | missing
+    gap[]     | gap (%)   | 1 | tex
+    in [*]    | {} (%)    | 1 | tex
+    """,
+)
+def list_family_gaps(study: Study) -> Rows:
+    """Yield a row for each method that ran on instances: its gap to the best known reward, over
+    families with two arms and in each family, with intervals for other tasks of the families.
+
+    A method that did not solve every run of every instance of a family has gap NaN in the family,
+    and over families with two arms if the family has two. ``instances`` is the number of instances
+    on which it solved every run, ``missing`` the number of other instances, of families with two
+    arms, or, for a method that ran on families with one arm alone, of families on which it ran.
+    """
+    every, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
+    two_armed = {each for each in families if len(study.tasks[families[each][0]].hands) > 1}
+    for method, of_method in runs_by_method(study).items():
+        runs, ran = every[every.method == method], {*of_method.family.dropna()}
+        scores, over = by_family(study, runs), two_armed if two_armed & ran else ran
+        solved = runs[runs.family.isin(over)].task.nunique()
+        missing = sum(len(families[family]) for family in over) - solved
+        row: Row = {"method": method, "instances": solved, "missing": missing}
+        gap = Estimate(math.nan)
+        if two_armed and two_armed <= scores.keys():
+            gap = other_tasks({family: scores[family] for family in scores if family in two_armed})
+        row |= gap.columns("gap")
+        for family in families:
+            has_all = family in scores
+            in_family = other_tasks({family: scores[family]}) if has_all else Estimate(math.nan)
+            row |= in_family.columns(f"in {family}")
+        if ran:
+            rows.append((method, row | run_ids(runs)))
+    yield from sorted(rows, key=lambda item: (math.isnan(item[1]["gap"]), item[1]["gap"]))
+
+
+@table(
+    "Tasks with their initial and best possible rewards (ticks)",
+    """
+    task       | task            |   | tex
+    arms       | arms            |   | tex
+    base       | base            |   | tex
+    initial    | initial         | 1 | tex
+    best_hands | best hands      | 1
+    optimum    | best known      |   | tex
+    source     | best known from
+    bound      | proven bound    |   | tex
+    """,
+)
+def list_tasks(study: Study) -> Rows:
+    """Yield a row for each individual task with its best known reward, and the rewards
+    of the corrective process alone with the initial and the best hands, negative ticks."""
+    for name, task in study.individual_tasks.items():
+        best, locked = study.optima.get(name), " and ".join(task.locked_base)
+        alone = study.sequences(name).reward.dropna()
+        row: Row = {
+            "task": marked(task),
+            "arms": len(task.hands),
+            "base": f"locked in {locked}" if locked else "free",
+            "initial": initial_reward(task),
+            "best_hands": float(alone.max()) if len(alone) else math.nan,
+            "optimum": best.reward if best else None,
+            "source": best.source if best else None,
+            "bound": best.bound if best else None,
+            "run_ids": best.run_id if best else "",
+        }
+        yield name, row
+
+
+@table(
+    "Reward, gap to the {reference}, hands and runs, and costs of a run (medians)",
+    """
+    task               | task                           |   | tex
+    method             | method                         |   | tex
+    runs               | runs                           |   | tex
+    solved
+    reward±            | reward                         | 1 | tex
+    reward_median
+    gap                | gap (%)                        | 1 | tex
+    hands              | hands                          |   | tex
+    trials             | trials                         |   | tex
+    forward_kinematics | forward-kinematics evaluations
+    solve_s            | solving time (s)
+    median_run         | median run
+    """,
+    with_settings=True,
+)
+def list_methods(study: Study) -> Rows:
+    """Yield a row for each method on each individual task: mean reward, negative ticks, with SD and
+    median, mean gap, hands and median costs.
+
+    Within a task, searches for the optimum come first, then methods from the highest mean reward
+    on. ``median_run`` is the beginning of the id of the run with the reward nearest to the median;
+    None without a solved run.
+    """
+    places, rows = {task: place for place, task in enumerate(study.individual_tasks)}, []
+    for (task, label), runs in study.cells.items():
+        if task not in places:
+            continue
+        good = solved(runs)
+        rewards = good.reward.to_numpy(np.float64)
+        row = _named(study, runs) | {
+            "solved": len(good),
+            "reward": rewards.mean() if len(good) else math.nan,
+            "reward_sd": standard_deviation(rewards),
+            "reward_median": np.median(rewards) if len(good) else math.nan,
+            "gap": good.gap.mean(),
+            "hands": tally(good.hands) if len(good) > 1 else "".join(good.hands),
+            "trials": runs.trials.astype(float).median(),
+            "forward_kinematics": runs.forward_kinematics.astype(float).median(),
+            "solve_s": solve_times(good).astype(float).median(),
+            "median_run": typical_run(good)[:SHORT_ID] if len(good) else None,
+        }
+        below = -row["reward"] if len(good) else math.inf
+        rows.append(((places[task], not study.methods.is_search[label], below), label, row))
+    for (place, *_), label, row in sorted(rows, key=lambda each: each[0]):
+        yield f"{[*places][place]} {label}", row
+
+
+@table(
+    "Runs without a solution",
+    """
+    task    | task
+    method  | method
+    failed  | failed runs
+    runs    | runs
+    reasons | reasons
+    """,
+)
+def list_failed(study: Study) -> Rows:
+    """Yield a row for each method on each task on which runs failed: their number and three
+    commonest reasons."""
+    for (task, label), runs in study.cells.items():
+        if len(failed := runs[runs.status != "ok"]):
+            reasons = "; ".join(commonest(failed.reason.fillna("")))
+            row = _named(study, runs) | {"failed": len(failed), "reasons": reasons}
+            yield f"{task} {label}", row | run_ids(failed)
+
+
+TABLES = {
+    each.id: each
+    for each in (
+        list_ranking,
+        list_not_ranked,
+        list_differences,
+        list_contexts,
+        list_signatures,
+        list_saved,
+        list_runtimes,
+        list_learning,
+        list_family_gaps,
+        list_tasks,
+        list_methods,
+        list_failed,
+    )
+}
+"""Tables by id."""

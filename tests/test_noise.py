@@ -1,0 +1,231 @@
+"""Executions with motor noise are those of a slow implementation, from the same draws."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coartic import (
+    MotionModel,
+    Movement,
+    SolutionError,
+    corrective_trial,
+    execute,
+    execute_noisy,
+    hand_sequences,
+    load_task,
+    movements_of,
+)
+from coartic.analysis.study import load
+from coartic.tasks.task import hands_of
+from tests.support import noise as reference
+from tests.support.strategies import STUCK, changed, failing_task, posture, tiny_task, uneven_task
+
+TASKS = {name: load_task(name) for name in ("ascending", "two-armed-1", "two-armed-2")}
+TASKS["uneven"] = uneven_task()
+TASKS["held"] = uneven_task(
+    locked_base=["x", "y"], goals=[[1.6, 0.9], [-0.3, 0.85]], initial_hands="RL"
+)
+SHORT = MotionModel(max_iterations=120)
+"""Corrections that take longer fail."""
+
+
+def random_solution(task, model, rng):
+    """Movements of all kinds, up to three for a goal, near what hits the goal and far from it; some
+    coordinates stay where the corrective process alone would have them before."""
+    hands = str(rng.choice(hand_sequences(task)))
+    alone = [task.q0, *corrective_trial(task, hands, model=model).configurations]
+    alone += [alone[-1]] * (len(task.goals) + 1 - len(alone))
+    locked = ["xy".index(coordinate) for coordinate in task.locked_base]
+
+    def configuration(goal):
+        q = alone[goal + 1] + rng.choice([0.0, 0.02, 0.3]) * rng.standard_normal(len(task.q0))
+        stays = rng.random(len(q)) < 0.2
+        q[stays] = alone[goal][stays]
+        q[locked] = task.q0[locked]
+        return q
+
+    def movement(goal, hand):
+        kind = str(rng.choice(["learned", "planned", "corrective", "path"]))
+        if kind == "path":
+            way = [configuration(goal) for _ in range(rng.integers(1, 4))]
+            return Movement(goal + 1, hand, kind, waypoints=np.array(way))
+        acts = kind == "corrective" and rng.random() < 0.5
+        return Movement(goal + 1, hand, kind, None if acts else configuration(goal))
+
+    return [
+        movement(goal, hand)
+        for goal, hand in enumerate(hands_of(hands))
+        for _ in range(rng.integers(1, 4))
+    ]
+
+
+@pytest.mark.parametrize("signal_dependent", [False, True])
+@pytest.mark.parametrize("name", TASKS)
+def test_executions_are_those_of_the_slow_implementation(name, signal_dependent):
+    rng, options = np.random.default_rng(7), {"signal_dependent": signal_dependent}
+    solutions = [random_solution(TASKS[name], SHORT, rng) for _ in range(12)]
+    seen = []
+    for motor_noise in (0.01, 0.1):
+        case = (TASKS[name], solutions, motor_noise, 5, 3, SHORT)
+        made = execute_noisy(*case, **options)
+        np.testing.assert_array_equal(made, reference.execute_noisy(*case, **options))
+        seen.append(made)
+    assert len({*np.ravel(seen)} - {np.nan}) > 20
+
+
+def test_many_robots_execute_as_one_after_the_other():
+    """More than fit into the compiled kernels at once."""
+    task = TASKS["two-armed-2"]
+    solution = movements_of("RLRR", corrective_trial(task, "RLRR").configurations)
+    case = task, [solution], 0.05, 150, [4]
+    made = execute_noisy(*case)
+    np.testing.assert_array_equal(made, reference.execute_noisy(*case))
+    assert made.shape == (1, 150)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.sampled_from([*TASKS]), st.integers(0, 2**31))
+def test_without_noise_nothing_changes(name, seed):
+    task = TASKS[name]
+    solution = random_solution(task, SHORT, np.random.default_rng(seed))
+    # Where no corrective movement has a target, execute corrects as often as it must, too.
+    solution = [replace(m, target=None) if m.kind == "corrective" else m for m in solution]
+    due = execute(task, solution, model=SHORT)
+    made = execute_noisy(task, [solution], 0.0, 2, seed, SHORT)
+    np.testing.assert_array_equal(made, np.full((1, 2), due.ticks if due.completed else np.nan))
+    if due.completed:  # as made, with targets of the corrective process and ticks
+        again = execute_noisy(task, [due.movements], 0.0, 2, seed, SHORT)
+        np.testing.assert_array_equal(again, made)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.sampled_from([*TASKS]),
+    st.integers(0, 2**31),
+    st.sampled_from([0.002, 0.02, 1.0]),
+    st.booleans(),
+)
+def test_ticks_of_a_solution_depend_on_its_own_seed(name, seed, motor_noise, signal_dependent):
+    """On no other solution; child k of one seed is the seed of solution k."""
+    task, rng = TASKS[name], np.random.default_rng(seed)
+    solutions = [random_solution(task, SHORT, rng) for _ in range(4)]
+    options = {"model": SHORT, "signal_dependent": signal_dependent}
+    made = execute_noisy(task, solutions, motor_noise, 3, [5, 6, 7, 8], **options)
+    for order in ([2, 0, 3, 1], [3], [1, 1]):
+        some = [solutions[k] for k in order]
+        again = execute_noisy(task, some, motor_noise, 3, [5 + k for k in order], **options)
+        np.testing.assert_array_equal(again, made[order])
+    whole = execute_noisy(task, solutions, motor_noise, 3, seed, **options)
+    np.testing.assert_array_equal(
+        execute_noisy(task, solutions[:2], motor_noise, 3, seed, **options), whole[:2]
+    )
+
+
+REACH = tiny_task(goals=[[6.004, 0.1]])
+"""The right hand starts 1.404 to the left of the goal's rim."""
+NEAR = tiny_task(goals=[[5.104, 0.1]])
+"""Likewise, 0.504."""
+
+
+def planned(*configuration, kind="planned"):
+    return [Movement(1, "right", kind, posture(*configuration))]
+
+
+def along(*places):
+    """A path on which only the base moves, in x."""
+    return [Movement(1, "right", "path", waypoints=np.array([posture(x) for x in places]))]
+
+
+def test_only_coordinates_that_move_miss():
+    """Noise along the way through the rim does not change where it is hit, noise across it does."""
+    assert execute(REACH, planned(1.6)).ticks == 142
+    for solution in (planned(1.6), along(1.0, 1.6), planned(1.6, 1e-10)):
+        assert {*execute_noisy(REACH, [solution], 0.03, 300, 1)[0]} == {142}
+    assert len({*execute_noisy(REACH, [planned(1.6, 1e-8)], 0.03, 300, 1)[0]}) > 1
+
+
+@pytest.mark.parametrize(
+    ("task", "solution", "grows", "share"),
+    [
+        # A planned movement stops up to 0.01 before its end: it hits if it ends beyond 1.41.
+        (REACH, planned(1.415), False, 0.6915),  # by half a standard deviation
+        (REACH, planned(1.415), True, 0.6915),  # which does not grow beyond a length of 1
+        (NEAR, planned(0.515), False, 0.6915),
+        (NEAR, planned(0.515), True, 0.8342),  # by 0.5 / 0.515 standard deviations
+        # Others go to their end: they hit if it is beyond 1.404.
+        (REACH, planned(1.409, kind="corrective"), False, 0.6915),
+        (REACH, along(1.0, 1.409), False, 0.6915),
+        (NEAR, along(0.3, 0.509), True, 0.8370),
+        # The first of two waypoints is missed by half: here beyond 1.407, as the way back counts.
+        (REACH, along(1.412, 0.0), False, 0.8413),
+    ],
+)
+def test_movements_miss_by_the_normal_distribution(task, solution, grows, share):
+    """From which the share of executions that hit at once follows: they take the fewest ticks."""
+    (made,) = execute_noisy(task, [solution], 0.01, 2500, 0, signal_dependent=grows)
+    assert abs(np.mean(made == execute(task, solution).ticks) - share) < 4 * 0.0092
+
+
+def test_a_correction_misses_by_its_length():
+    """A correction of length L misses by s min(1, L): short ones hit where long ones do not."""
+    corrective = [Movement(1, "right", "corrective")]
+    near = tiny_task(goals=[[4.65, 0.1]])
+    counts = [len({*execute_noisy(task, [corrective], 0.02, 300, 3)[0]}) for task in (near, REACH)]
+    assert counts[0] < 5 < counts[1]
+
+
+@pytest.mark.parametrize(("seed", "fails"), [(211, False), (236, True)])
+def test_an_execution_fails_after_fifty_corrections(seed, fails):
+    """Seeds with which the fiftieth correction hits, or the next would."""
+    task, model = uneven_task(goals=[[1.0, 2.0]], initial_hands="L"), MotionModel(gain=0.5)
+    case = task, [[Movement(1, "left", "corrective")]], 3.0, 1, [seed], model
+    (made,) = execute_noisy(*case)
+    assert np.isnan(made).tolist() == [fails]
+    np.testing.assert_array_equal([made], reference.execute_noisy(*case))
+
+
+def test_an_execution_fails_where_the_corrective_process_does():
+    tilt = np.array([0.0, 0.0, *[0.1] * 8])
+    for task, hand in ((STUCK, "right"), (failing_task(hands="L"), "left")):
+        made = execute_noisy(task, [[Movement(1, hand, "corrective")]], 0.01, 3, 0)
+        assert np.isnan(made).all()
+        # Noise moves the arm away from where the process is stuck.
+        aimed = [Movement(1, hand, "planned", task.q0 + tilt)]
+        assert np.isfinite(execute_noisy(task, [aimed], 0.01, 3, 0)).all()
+
+
+def test_shipped_runs_without_noise_have_their_rewards():
+    study, seen = load("shipped"), set()
+    for task, method in study.cells:
+        executed = study.executed(task, method).runs[:2]
+        made = execute_noisy(task, [each.movements for each in executed], 0.0, 1, 0)
+        assert made[:, 0].tolist() == [each.ticks for each in executed]
+        seen |= {movement.kind for each in executed for movement in each.movements}
+    assert seen == {"learned", "planned", "corrective", "path"}
+
+
+SOLUTION = corrective_trial("ascending", "RRR").movements
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        *(({"motor_noise": noise}, "motor_noise is") for noise in (-0.01, np.nan, np.inf, "0.01")),
+        *(({"repeats": repeats}, "repeats is") for repeats in (0, -1, 2.0)),
+        *(({"seed": seed}, "seed is") for seed in (-1, 0.5, None, [True])),
+        ({"seed": [1, 2]}, "seed has 2 entries; it needs one for each of the 1 solutions"),
+        ({"model": MotionModel(gain=0.0)}, "gain"),
+        ({"task": "two-armed-2"}, r"solutions\[0\]: task .* goals \[1, 2, 3\]"),
+        ({"task": "descending"}, r"took 319 ticks; on task 'descending'.* of another task\?"),
+        ({"task": changed("ascending", hands=["left"], initial_hands="LLL")}, "has no right hand"),
+        ({"task": uneven_task(goals=[[1.0, 2.0]] * 3, initial_hands="RRR")}, "configuration has"),
+        ({"solutions": SOLUTION}, r"solutions\[0\]: .* needed is a list of movements"),
+    ],
+)
+def test_wrong_arguments_are_refused(change, words):
+    case = {"task": "ascending", "solutions": [SOLUTION], "motor_noise": 0.01, "repeats": 2}
+    with pytest.raises((ValueError, SolutionError), match=words):
+        execute_noisy(**{**case, "seed": 0, **change})
