@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib import metadata
+from multiprocessing.util import Finalize
 from numbers import Integral
 from pathlib import Path
 
@@ -94,6 +95,8 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
     signal.signal(signal.SIGTERM, lambda *_: end_group(os.getpid()))
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
     end_with_parent(folder, lambda: end_group(os.getpid()))
+    # A worker that ends by itself, as when its parent closes the pipe first, takes its group along.
+    Finalize(None, end_group, (os.getpid(),), exitpriority=0)
 
 
 def end_with_parent(
