@@ -36,7 +36,7 @@ OPTIONS = {
     "method_file": ("--method-file", "mine.py"),
     "family_file": ("--family-file", "strips.v1.toml"),
     "seed": ("--seed", "1"),
-    "time_limit_s": ("--time-limit", "5"),
+    "time_limit": ("--time-limit", "5"),
     "trial_budget": ("--trial-budget", "7"),
     "include": ("--include", "before"),
     "jobs": ("--jobs", "97"),
