@@ -34,7 +34,7 @@ from coartic.internal.limits import (
     plain_values,
 )
 from coartic.internal.text import counted, unknown
-from coartic.internal.validation import FileData, explain_inline, sentence_error
+from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, tasks_by_name, trials_in
 from coartic.tasks.families import (
@@ -120,7 +120,7 @@ def request_for(**options: Any) -> Request:
     try:
         return Request.model_validate(options)
     except ValidationError as error:
-        raise CoarticError(explain_inline(error, [*Request.model_fields])) from None
+        raise CoarticError(explain(error, Request.model_fields)) from None
 
 
 def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:

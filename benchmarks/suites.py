@@ -16,9 +16,9 @@ from pydantic_core import PydanticCustomError
 
 from coartic import CoarticError, Task, builtin_tasks, parse_task
 from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_TRIALS, brief_value
-from coartic.internal.text import Line, unknown
+from coartic.internal.text import Line, plain, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain_file, sentence_error
+from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.robot import Finite
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.families import named_by, shipped_families
@@ -178,14 +178,13 @@ def load_suite(name: str) -> Suite:
 
 
 def _read_suite(path: Path) -> Suite:
-    """Return the suite of a file. Raises CoarticError with lines on its first 20 problems, or with
-    one line if it cannot be read."""
+    """Return the suite of a file. Raises CoarticError for a file that is no suite."""
     content = read_toml(path)
     try:
         return Suite.model_validate({"name": path.stem, **content})
     except ValidationError as error:
         keys = [*Suite.model_fields, *_Block.model_fields, *Move.model_fields]
-        raise CoarticError(explain_file(str(path), error, keys)) from None
+        raise CoarticError(f"{plain(str(path))}: {explain(error, keys)}") from None
 
 
 def tasks_of(

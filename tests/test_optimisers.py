@@ -405,7 +405,7 @@ def test_instances_of_a_family():
     )
     assert [p.task.name for p in test] == [f"one-armed/v1/i00{n}" for n in range(3)]
     assert [p.task.split for p in tuned] == ["development"] * 3
-    with pytest.raises(ValueError, match="split is 'fresh'; it should be 'test' or 'development'"):
+    with pytest.raises(ValueError, match="split is 'fresh': "):
         coartic.problems("one-armed/v1", split="fresh")
 
 
