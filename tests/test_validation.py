@@ -359,7 +359,7 @@ def test_arrays_may_be_lists(call, usual):
         (lambda: interval({"a": "x", "a_low": 0, "a_high": 1}, "a"), "a_l"),
         (lambda: mean([1e101, 0.0, 1.0]), "1e100"),
         (lambda: holm([0.1, 1.01]), "p-values"),
-        (lambda: perform([], "x"), r"plan is \[\]"),
+        (lambda: perform([], "x"), "no jobs"),
         (lambda: movements_of("RRR", np.zeros((2, 10))), "3"),
         (lambda: Robot(links=(1, 1)), "Robot: links is an unknown key; did you mean 'left_l"),
         (lambda: Trials(trials=0), "Parameters: trials is 0: "),
@@ -377,7 +377,10 @@ def test_what_a_function_refuses_is_named(call, words):
         {"hand": "middle"},
         {"kind": "reach"},
         *({"target": each} for each in ("x", np.zeros(3), TASK.q0 * np.nan, [[1], [1, 2]])),
-        *({"kind": "path", "waypoints": each} for each in (None, [], "x", [np.zeros(3)])),
+        *(
+            {"kind": "path", "waypoints": each}
+            for each in (None, [], "x", [np.zeros(3)], [TASK.q0 + 1])
+        ),
     ],
 )
 def test_a_wrong_movement_is_not_executed(wrong):

@@ -62,7 +62,7 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-        listed = listing.read_text("utf-8", "replace") if listing.exists() else ""
+        listed = listing.read_text(encoding="utf-8", errors="replace") if listing.exists() else ""
     ours = {*listed.splitlines()}
     for name in sorted({*ours, *names}):
         check_inside(folder, folder / name)
@@ -100,13 +100,14 @@ def check_ending(path: Path, endings: Collection[str]) -> None:
 def check_output(path: Path, *, replace: bool) -> None:
     """Raise CoarticError if the folder of a file is missing, or if the file exists and ``replace``
     is False."""
-    if not path.parent.is_dir():
-        raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
-    if path.exists() and not replace:
-        raise CoarticError(
-            f"{path} is there already; add --replace (in Python replace=True) to write over "
-            "it, or choose another name"
-        )
+    with errors_in_words(path):
+        if not path.parent.is_dir():
+            raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
+        if path.exists() and not replace:
+            raise CoarticError(
+                f"{path} is there already; add --replace (in Python replace=True) to write over "
+                "it, or choose another name"
+            )
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:

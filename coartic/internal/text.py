@@ -32,11 +32,7 @@ def plain(text: str, most: int = LONGEST_REASON) -> str:
 
 def error_line(error: BaseException) -> str:
     """Return an exception as one printable line (:func:`plain`), such as ``ValueError: text``."""
-    try:
-        text = str(error)
-    except Exception:
-        text = "its message cannot be shown"
-    return plain(f"{type(error).__name__}: {text}".removesuffix(": "))
+    return plain(f"{type(error).__name__}: {error}".removesuffix(": "))
 
 
 def one_line(text: str) -> str:
