@@ -69,6 +69,16 @@ def test_nothing_is_written_or_removed_by_way_of_links(tmp_path, listed):
     assert content(mine) == before
 
 
+def test_a_listing_that_leads_elsewhere_is_refused(tmp_path):
+    (tmp_path / ".coartic-9-mine").write_text("mine")
+    (tmp_path / "report").mkdir()
+    for name in (".", "..", "../.coartic-9-mine", str(tmp_path / ".coartic-9-mine")):
+        (tmp_path / "report" / LISTING).write_text(f"{name}\n")
+        with pytest.raises(CoarticError, match="leads out of"):
+            publish(tmp_path / "report", {"a.txt": b"1"})
+    assert (tmp_path / ".coartic-9-mine").read_text() == "mine"
+
+
 def test_links_in_place_of_what_is_written_beside_are_not_followed(tmp_path):
     (tmp_path / "mine").write_text("mine")
     folder = tmp_path / "report"

@@ -75,10 +75,10 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
 
 
 def check_inside(folder: Path, path: Path) -> None:
-    """Raise CoarticError if ``path``, which need not exist, is a symbolic link, or leads out of
-    ``folder``, such as by a link."""
-    inside = Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
-    if path.is_symlink() or not inside:
+    """Raise CoarticError if ``path``, which need not exist, is a symbolic link or the folder
+    itself, or leads out of ``folder``, such as by a link."""
+    home, places = os.path.realpath(folder), map(os.path.realpath, (path, path.parent))
+    if path.is_symlink() or not all(Path(place).is_relative_to(home) for place in places):
         raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
 
 
