@@ -25,7 +25,7 @@ from coartic.benchmarks.processes import CONTEXT, signal_name
 from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, error_line, plain
 from coartic.internal.threads import begin_worker
-from coartic.internal.toml_files import check_file
+from coartic.internal.toml_files import read_bytes
 from coartic.method import Information, Method
 from coartic.model import MODEL_VERSION
 from coartic.runs.method_info import (
@@ -39,7 +39,6 @@ from coartic.runs.method_info import (
 )
 
 _ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to import
-_LARGEST_DATA = 2**30  # bytes of a declared file
 
 
 def read_file(path: Path) -> list[MethodInfo]:
@@ -47,7 +46,7 @@ def read_file(path: Path) -> list[MethodInfo]:
     then answers questions about them (:data:`READERS`). Raises CoarticError for an unusable
     file."""
     shown = plain(str(path), LONGEST_LINE)
-    check_file(path)
+    read_bytes(path)
     if path.suffix != ".py":
         raise CoarticError(f"{shown}: the name of a method file ends in .py")
     reader = ProcessPool(1, initializer=begin_worker, context=CONTEXT)
@@ -148,9 +147,8 @@ def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
     parts = [f"{MODEL_VERSION}.{method.version}".encode()]
     for file in (path, *declared, *files):
         try:
-            check_file(file, most=_LARGEST_DATA)
-            parts.append(file.read_bytes())
-        except (CoarticError, OSError) as error:
+            parts.append(read_bytes(file))
+        except CoarticError as error:
             raise CoarticError(f"{path}: its file {error}") from None
     hashes = sorted(hashlib.sha256(part).digest() for part in parts)  # wherever the files are
     return hashlib.sha256(b"".join(hashes)).hexdigest()[:12]

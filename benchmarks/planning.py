@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, PlainValidator, ValidationError
+from pydantic import Field, PlainValidator, ValidationError
 
 from coartic import CoarticError, Task, builtin_tasks, load_task
 from coartic.benchmarks.registry import Registry, methods_named, registry
@@ -25,18 +25,15 @@ from coartic.benchmarks.suites import (
     tasks_of,
 )
 from coartic.internal.limits import (
-    MOST_CELLS,
     MOST_RUNS,
     MOST_SEED,
-    MOST_TRIALS,
-    brief_value,
     check_limits,
     plain_values,
 )
 from coartic.internal.text import counted, unknown
-from coartic.internal.validation import FileData, explain_inline, sentence_error
+from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, tasks_by_name, trials_in
+from coartic.runs.plan import Job, cell_of, tasks_by_name
 from coartic.tasks.families import (
     instance_of,
     is_file,
@@ -71,20 +68,6 @@ def _runs_asked(value: Any) -> int | range | None:
     return value if is_range or value is None else int(value)
 
 
-def _file(value: object) -> object:
-    """Return a text or a path as it is. Raises an error for any other value, such as a method."""
-    if isinstance(value, str | Path):
-        return value
-    raise sentence_error(
-        f"own methods and families are named by the paths of their files, not by "
-        f"{brief_value(value)}: write it into a file, such as mine.py"
-    )
-
-
-_Files = tuple[Annotated[Path, BeforeValidator(_file)], ...]
-_plain = BeforeValidator(plain_values)
-
-
 class Request(FileData):
     """The part of a suite to run, with its numbers of runs and trials, its seed and its limits."""
 
@@ -95,22 +78,22 @@ class Request(FileData):
     methods: tuple[str, ...] = ()
     """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite.
     A method that the suite does not have is run on every task of the suite that it applies to."""
-    method_files: _Files = ()
+    method_files: tuple[Path, ...] = ()
     """Files with your own methods. If neither ``methods`` nor the suite names a method of a file,
     also by a wildcard, all methods of the file run, together with the other methods."""
-    family_files: _Files = ()
+    family_files: tuple[Path, ...] = ()
     """Files with your own families."""
     runs: Annotated[Any, PlainValidator(_runs_asked)] = None
     """Number of runs of each cell; by default the number of the suite. A range such as
     ``range(50, 100)`` is a part of the runs, for a job of an array."""
-    trials: Annotated[TrialCount, _plain] | None = None
+    trials: TrialCount | None = None
     """Trials of each run, for methods that have this parameter; by default the number of the
     suite, or else of the method."""
-    seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True), _plain] = 0
+    seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)] = 0
     """Seed of the suite."""
-    time_limit_s: Annotated[Seconds, _plain] | None = None
+    time_limit_s: Seconds | None = None
     """Most CPU time of a job, s; by default the limit of the suite."""
-    trial_budget: Annotated[TrialCount, _plain] | None = None
+    trial_budget: TrialCount | None = None
     """Most physical trials of a run, whatever its method."""
 
 
@@ -118,9 +101,9 @@ def request_for(**options: Any) -> Request:
     """Return a checked request; ``options`` are fields of :class:`Request`, by name, all optional.
     Raises CoarticError for unknown options and wrong values."""
     try:
-        return Request.model_validate(options)
+        return Request.model_validate(plain_values(options))
     except ValidationError as error:
-        raise CoarticError(explain_inline(error, [*Request.model_fields])) from None
+        raise CoarticError(explain(error, Request.model_fields)) from None
 
 
 def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
@@ -159,13 +142,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
-    in_blocks = _suite_jobs(suite, registered, own, task_named, job)
-    jobs = list(itertools.islice(in_blocks, MOST_CELLS + 1))
-    if len(jobs) > MOST_CELLS:
-        raise CoarticError(
-            f"suite {suite.name!r} asks for more than {MOST_CELLS:,} combinations "
-            "(tasks x moves x methods x grid)"
-        )
+    jobs = [*_suite_jobs(suite, registered, own, task_named, job)]
     ids = dict.fromkeys(itertools.chain(*asked.values()))
     if not request.methods:
         ids = dict.fromkeys(each.cell.method.name for each in jobs) | ids
@@ -347,19 +324,13 @@ def _why_nothing_runs(
 
 
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
-    """Return the first job of each cell. Raises CoarticError for two numbers of runs of a cell, and
-    for more than 10,000,000 trials a run."""
+    """Return the first job of each cell. Raises CoarticError for two numbers of runs of a cell."""
     distinct = dict[str, Job]()
     for job in jobs:
-        cell, where = job.cell, f"{job.cell.task.name} x {job.cell.label}"
-        if trials_in(cell.parameters) > MOST_TRIALS:
+        if (first := distinct.setdefault(job.cell.digest, job)).numbers != job.numbers:
             raise CoarticError(
-                f"{where}: {trials_in(cell.parameters):,} trials a run; at most {MOST_TRIALS:,} "
-                "are kept"
-            )
-        if (first := distinct.setdefault(cell.digest, job)).numbers != job.numbers:
-            raise CoarticError(
-                f"{where}: the suite asks for {counted(len(first.numbers), 'run')} of it, and "
-                f"then for {len(job.numbers)}; give one number"
+                f"{job.cell.task.name} x {job.cell.label}: the suite asks for "
+                f"{counted(len(first.numbers), 'run')} of it, and then for {len(job.numbers)}; "
+                "give one number"
             )
     return list(distinct.values())

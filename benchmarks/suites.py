@@ -11,14 +11,14 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any
 
-from pydantic import Field, PlainValidator, ValidationError, model_validator
+from pydantic import Field, PlainValidator, ValidationError
 from pydantic_core import PydanticCustomError
 
 from coartic import CoarticError, Task, builtin_tasks, parse_task
-from coartic.internal.limits import MOST_CELLS, MOST_RUNS, MOST_SECONDS, MOST_TRIALS, brief_value
-from coartic.internal.text import Line, unknown
+from coartic.internal.limits import MOST_RUNS, MOST_SECONDS, MOST_TRIALS
+from coartic.internal.text import Line, plain, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain_file, sentence_error
+from coartic.internal.validation import FileData, explain
 from coartic.robot import Finite
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.families import named_by, shipped_families
@@ -49,7 +49,7 @@ RunCount = Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True)]
 TrialCount = Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True)]
 Seconds = Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True)]
 _Value = Annotated[_Plain, PlainValidator(_plain_value)]
-_SOME = Field(min_length=1, max_length=MOST_CELLS)
+_SOME = Field(min_length=1)
 _Names = Annotated[tuple[str, ...], _SOME]
 _Number = Annotated[int, Field(ge=1, strict=True)]
 
@@ -81,23 +81,9 @@ class _Block(FileData):
     """Runs of each method on each task; by default the number of the suite."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
     """Parameters of the methods, by name."""
-    grid: dict[str, Annotated[tuple[_Value, ...], Field(min_length=1)]] = Field(
-        default_factory=dict
-    )
-    """Values of further parameters; every combination is run."""
-
-    @model_validator(mode="after")
-    def says_everything_once(self) -> _Block:
-        """Return this block. Raises ValueError for a parameter that is in ``parameters`` and in
-        ``grid``, and for a parameter that has equal values in the grid."""
-        for name, values in self.grid.items():
-            if name in self.parameters:
-                raise sentence_error(
-                    f"{brief_value(name)} stands among the parameters and in the grid"
-                )
-            if len(set(values)) < len(values):
-                raise sentence_error(f"{brief_value(name)} has the same value twice in the grid")
-        return self
+    grid: dict[str, Annotated[tuple[_Value, ...], _SOME]] = Field(default_factory=dict)
+    """Values of further parameters, in place of those in ``parameters``; every combination is
+    run."""
 
 
 class Suite(FileData):
@@ -178,14 +164,13 @@ def load_suite(name: str) -> Suite:
 
 
 def _read_suite(path: Path) -> Suite:
-    """Return the suite of a file. Raises CoarticError with lines on its first 20 problems, or with
-    one line if it cannot be read."""
+    """Return the suite of a file. Raises CoarticError for a file that is no suite."""
     content = read_toml(path)
     try:
         return Suite.model_validate({"name": path.stem, **content})
     except ValidationError as error:
         keys = [*Suite.model_fields, *_Block.model_fields, *Move.model_fields]
-        raise CoarticError(explain_file(str(path), error, keys)) from None
+        raise CoarticError(f"{plain(str(path))}: {explain(error, keys)}") from None
 
 
 def tasks_of(
@@ -194,12 +179,10 @@ def tasks_of(
     """Yield the tasks of a block, in order: tasks with a number of goals that the block allows,
     with a freed base or a moved goal where the block asks for it. ``own`` has the names of the
     user's tasks, ``task_named`` returns a task by name. A block for all tasks (``*``) is for the
-    user's tasks as well, unless it moves a goal."""
+    user's tasks as well."""
     every = [*builtin_tasks(), *own]
     names = (every if entry == WILDCARD else named_by(entry) for entry in block.tasks)
     for name in dict.fromkeys(itertools.chain(*names)):
-        if name in own and block.move is not None and WILDCARD in block.tasks:
-            continue
         task = task_named(name)
         if block.goals is None or len(task.goals) in block.goals:
             yield from _changed_tasks(task, suite, block)

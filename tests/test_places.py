@@ -51,7 +51,6 @@ PLACES = {
     "empty": (*WRITE, "report"),
     "folder": READ,
     LONG: READ,
-    "x" * 5000: BOTH,
     "missing": (*set(BOTH) - {"run", "report to", "draw to"},),
 }
 """Places, and the commands that cannot use them."""

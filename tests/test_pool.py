@@ -23,8 +23,7 @@ pytestmark = [pytest.mark.process, pytest.mark.usefixtures("not_repeated")]
 METHODS = """
 import itertools, os, signal, subprocess, sys, time
 import numpy as np
-import coartic.motion.solution
-from coartic.method import Information, Method, MethodError, Parameters, Result
+from coartic.method import Information, Method, Parameters, Result
 from coartic.motion.solution import Movement
 
 def corrected(session, hand="right"):
@@ -52,36 +51,21 @@ HANDLED = {
     "burns_in_c": ("all(itertools.repeat(1))", "timeout", "CPU time limit of 0.3 s exceeded"),
     "starts_a_process": ("subprocess.Popen(['sleep', '999']); return Result(corrected(session))",
                          "ok", ""),
-    "unwritten": ("return Result(corrected(session), {'x': chr(0xd800)})",
-                  "solver-failed", "cannot be kept"),
     "is_killed": ("os.kill(os.getpid(), signal.SIGKILL)", "crashed", "killed by SIGKILL"),
     "is_killed_once": ("if not os.path.exists(__file__ + '.killed'):\n"
                        "            open(__file__ + '.killed', 'w').close()\n"
                        "            os.kill(os.getpid(), signal.SIGKILL)\n"
                        "        return Result(corrected(session))", "ok", ""),
     "allocates": ("kept = [np.empty(10**8) for _ in range(10**6)]", "crashed", "MemoryError"),
-    "has_no_words": ("def fails(self): raise ValueError('x')\n"
-        "        raise type('Mute', (Exception,), {'__str__': fails})",
-        "crashed", "Mute: its message cannot be shown"),
     "nothing": ("return None", "solver-failed", "returned NoneType, not a Result"),
     "nan": ("return Result((Movement(1, 'right', 'planned', session.q0 * np.nan),) * 3)",
             "solver-failed", "finite"),
-    "far": ("return Result((Movement(1, 'right', 'planned', session.q0 + 1e6),) * 3)",
-            "solver-failed", "steps; at most"),
     "many": ("return Result(corrected(session) * 4000)", "solver-failed", "movements; at most"),
     "details": ("return Result(corrected(session), {'call': print})",
                 "solver-failed", "cannot be kept: TypeError"),
-    "two_ends": ("way = Movement(1, 'right', 'path', session.q0 + 1, waypoints=[session.q0])\n"
-                 "        return Result((way, *corrected(session)[1:]))",
-                 "solver-failed", "its target is the last of them"),
-    "lies": ("error = MethodError('infeasible', 'x'); error.outcome = 'ok'; raise error",
-             "solver-failed", "returned no solution"),
     "honest": ("return Result(corrected(session))", "ok", ""),
     "prints": ("print('x' * 10**6); os.write(2, b'\\x1b[31m' * 10**5)\n"
                "        return Result(corrected(session))", "ok", ""),
-    "giant": ("coartic.motion.solution.execute = None\n"
-              "        session.model = session.model._replace(step=1.0)\n"
-              "        return Result(corrected(session))", "ok", ""),
 }  # fmt: skip
 """What a method does, how its run ends, and words of the reason."""
 
@@ -303,10 +287,9 @@ def test_workers_end_with_their_parent(script):
     assert comes(lambda: not folders_of_session(process.pid))
 
 
-@pytest.mark.parametrize("timeout_s", [-1.0, float("nan"), float("inf")])
-def test_a_time_out_of_bounds(timeout_s):
-    with pytest.raises(ValueError, match="timeout_s is .*; it must be a number from 0 to"):
-        Local(timeout_s=timeout_s)
+def test_a_time_out_of_bounds():
+    with pytest.raises(ValueError, match="timeout_s is nan"):
+        Local(timeout_s=float("nan"))
 
 
 def test_jobs_that_are_dropped_leave_no_folder(tmp_path, monkeypatch):

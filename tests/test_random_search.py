@@ -77,15 +77,7 @@ def test_every_hand_sequence_has_stages_of_its_own_share():
     assert few.details == {"sequences": 16}
 
 
-@pytest.mark.parametrize(
-    ("stages", "sentence"),
-    [
-        (0, "stages is 0; it should be at least 1"),
-        (2.5, "stages is 2.5; it should be a whole number"),
-        (101, "stages is 101; it may be at most the number of trials, 100"),
-    ],
-)
 @pytest.mark.parametrize("method", ["random-search", "random-search/hands"])
-def test_stages_that_cannot_be_are_refused(method, stages, sentence):
-    with pytest.raises(CoarticError, match=sentence):
-        KNOWN[method].complete({"trials": 100, "stages": stages})
+def test_stages_are_at_most_the_trials(method):
+    with pytest.raises(CoarticError, match="stages is 101; .* number of trials, 100"):
+        KNOWN[method].complete({"trials": 100, "stages": 101})

@@ -122,11 +122,3 @@ def test_a_suite_can_move_one_goal(tmp_path):
     far = 'tasks = ["two-armed-1"]\nmethods = ["dual-process/EC4"]\n'
     with pytest.raises(CoarticError, match="out of reach|too far"):
         suite_of(tmp_path, far + "move = { goal = 2, by = [[0, 9]] }")
-
-
-def test_a_goal_that_an_own_task_lacks_is_not_moved_in_it(tmp_path):
-    (tmp_path / "mine.toml").write_text('hands = ["right"]\n' + GOOD, encoding="utf-8")
-    assert len(suite_of(tmp_path, EVERY + "move = { goal = 3, by = [[0, 0.1]] }")) == 4
-    files = [str(tmp_path / "mine.toml")]
-    cells = cells_of(tmp_path / "own.toml", tasks=files)
-    assert [cell.task.name for cell in cells] == ["mine"]

@@ -12,7 +12,7 @@ from pydantic import ConfigDict, PlainValidator, ValidationError, validate_call
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import plain_values, real_numbers
-from coartic.internal.validation import explain_inline
+from coartic.internal.validation import explain
 
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
@@ -28,7 +28,7 @@ class ArgumentError(CoarticError, ValueError, TypeError):
 def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:
     """Return a wrapper of the function that raises ArgumentError, before the call, for an argument
     that its type hint excludes, that is missing or that the function does not have. NumPy's scalars
-    count as Python's, its times and spans of time as texts; text, True and False are no numbers."""
+    count as Python's; strings, True and False are not numbers."""
     names = [*inspect.signature(function).parameters]
 
     @cache  # hints are read at the first call: most commands make none
@@ -41,7 +41,7 @@ def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Co
         try:
             return checked()(*places, **given)
         except ValidationError as error:
-            sentences = explain_inline(error, names, given | dict(enumerate(places)))
-            raise ArgumentError(f"{function.__name__}: {sentences}") from None
+            sentence = explain(error, names, of_call=True)
+            raise ArgumentError(f"{function.__name__}: {sentence}") from None
 
     return call

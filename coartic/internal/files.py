@@ -34,17 +34,17 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
     that an earlier call wrote there are replaced, or removed if they are not among ``files``.
     Raises CoarticError as :func:`make_folder`, before a file is written, and if writing fails."""
     before = make_folder(folder, files)
-    for place in (folder, *(each for each in folder.glob("*/") if not each.is_symlink())):
-        for part in place.glob(f"{_PART}[0-9]*"):  # of a command that was killed
-            part.unlink()
 
     def list_files(names: Collection[str]) -> None:
         write_atomically(folder / LISTING, "".join(f"{name}\n" for name in sorted(names)).encode())
 
     with errors_in_words(folder):
+        for parent in {folder, *((folder / name).parent for name in {*before, *files})}:
+            parent.mkdir(parents=True, exist_ok=True)
+            for part in parent.glob(f"{_PART}[0-9]*"):  # of a command that was killed
+                part.unlink()
         list_files({*before, *files})  # whatever happens now, all of them are known
         for name, data in files.items():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_atomically(folder / name, data)
         for name in before - {*files}:
             (folder / name).unlink(missing_ok=True)
@@ -55,43 +55,30 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
     """Make a folder, if it is missing, and return the paths of files, below the folder, that
-    :data:`LISTING` there lists, except absolute paths and paths with ``..``. Raises CoarticError if
-    the folder cannot be written, if another file has a path among ``names``, or if one of these
-    paths is a link or leads out of the folder."""
-    ours, listing = set[str](), folder / LISTING
+    :data:`LISTING` there lists. Raises CoarticError if the folder cannot be written, if another
+    file has a path among ``names``, or if a listed path or one of ``names`` leads out of it."""
+    listing = folder / LISTING
     with errors_in_words(folder):
-        if os.path.lexists(folder) and not folder.is_dir():
-            raise CoarticError(f"cannot write {folder}: what is there is no folder")
-        if listing.is_file() and not listing.is_symlink():
-            # Names that lead elsewhere are not ours, and a folder is no file.
-            for name in listing.read_text(encoding="utf-8", errors="replace").splitlines():
-                leads_elsewhere = Path(name).is_absolute() or ".." in Path(name).parts
-                if not leads_elsewhere and not (folder / name).is_dir():
-                    ours.add(name)
-        for name in sorted({*ours, *names}):
-            check_inside(folder, folder / name)
-        in_the_way = [name for name in names if name not in ours and os.path.lexists(folder / name)]
-        if in_the_way:
-            raise CoarticError(
-                f"{folder} holds {plain(', '.join(in_the_way), 80)}, which coartic did not write "
-                "there. Move it away or choose another folder."
-            )
         folder.mkdir(parents=True, exist_ok=True)
-        _check_rights(folder)
+        if not os.access(folder, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        listed = listing.read_text(encoding="utf-8", errors="replace") if listing.exists() else ""
+    ours = {*listed.splitlines()}
+    for name in sorted({*ours, *names}):
+        check_inside(folder, folder / name)
+    if other := [name for name in names if name not in ours and (folder / name).exists()]:
+        raise CoarticError(
+            f"{folder} holds {plain(', '.join(other), 80)}, which coartic did not write "
+            "there. Move it away or choose another folder."
+        )
     return ours
 
 
-def _check_rights(folder: Path) -> None:
-    """Raise PermissionError if the user of this process may not make files in a folder."""
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-
-
 def check_inside(folder: Path, path: Path) -> None:
-    """Raise CoarticError if ``path``, which need not exist, is a symbolic link, or leads out of
-    ``folder``, such as by a link."""
-    inside = Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
-    if path.is_symlink() or not inside:
+    """Raise CoarticError if ``path``, which need not exist, is a symbolic link or the folder
+    itself, or leads out of ``folder``, such as by a link."""
+    home, places = os.path.realpath(folder), map(os.path.realpath, (path, path.parent))
+    if path.is_symlink() or not all(Path(place).is_relative_to(home) for place in places):
         raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
 
 
@@ -111,14 +98,11 @@ def check_ending(path: Path, endings: Collection[str]) -> None:
 
 
 def check_output(path: Path, *, replace: bool) -> None:
-    """Raise CoarticError if a file may not be written: its folder is missing or not writable, its
-    path is a link or no regular file, or the file exists and ``replace`` is False."""
+    """Raise CoarticError if the folder of a file is missing, or if the file exists and ``replace``
+    is False."""
     with errors_in_words(path):
         if not path.parent.is_dir():
             raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
-        _check_rights(path.parent)
-        if path.is_symlink() or (path.exists() and not path.is_file()):
-            raise CoarticError(f"cannot write {path}: what is there is a link or no file")
         if path.exists() and not replace:
             raise CoarticError(
                 f"{path} is there already; add --replace (in Python replace=True) to write over "
@@ -128,19 +112,10 @@ def check_output(path: Path, *, replace: bool) -> None:
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
     """Return the name of a file or folder, which need not exist, as a path. Raises CoarticError,
-    which calls the name ``what``, if the name is neither text nor path, is a blank text, or cannot
-    be a name here."""
-    if not isinstance(name, str | os.PathLike):
-        raise CoarticError(f"{what} is {plain(repr(name), 80)}: needed is a text or a path")
-    if isinstance(name, str) and not name.strip():
+    which calls the name ``what``, for a blank name, which would be the current folder."""
+    if not str(name).strip():
         raise CoarticError(f"{what} is empty; the current folder is .")
-    try:
-        with contextlib.suppress(FileNotFoundError, NotADirectoryError, PermissionError):
-            os.lstat(name)  # ValueError: a NUL in the name
-        return Path(name)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise CoarticError(f"{what} {plain(repr(name), 80)} cannot be used: {reason}") from None
+    return Path(name)
 
 
 @contextlib.contextmanager

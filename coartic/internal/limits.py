@@ -24,8 +24,6 @@ MOST_SEED = 2**63 - 1
 """Largest seed of a suite."""
 MOST_RUN_SEED = 2**128 - 1
 """Largest seed of a run."""
-MOST_BYTES = 10_000_000
-"""Most bytes of a file that users write, unless a reader sets another limit."""
 WIDTHS = (1e-9, 100.0)
 """Least and greatest half width of a box of targets, length unit (base) and rad (joints)."""
 
@@ -37,22 +35,16 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
     whole = isinstance(least, int)
     kind = numbers.Integral if whole else numbers.Real
     is_number = isinstance(value, kind) and not isinstance(value, bool)
-    if not is_number or is_time(value) or not least <= value <= most:
+    if not is_number or not least <= value <= most:
         raise ValueError(
             f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
             f"from {least:{'' if whole else 'g'}} to {most:{',' if isinstance(most, int) else 'g'}}"
         )
 
 
-def is_time(value: Any) -> bool:
-    """Return whether a value is a time or a span of time of NumPy, or an array of either."""
-    return getattr(getattr(value, "dtype", None), "kind", "") in ("M", "m")
-
-
 def plain_values(value: Any) -> Any:
     """Return a value with ``x.item()`` in place of each scalar x of NumPy, also in copies of lists,
-    tuples and dictionaries (values, not keys; subclasses stay); a text in place of a time or a span
-    of time."""
+    tuples and dictionaries (values, not keys; subclasses stay)."""
     import numpy as np
 
     if type(value) in (list, tuple):
@@ -60,7 +52,7 @@ def plain_values(value: Any) -> Any:
     if type(value) is dict:
         return {name: plain_values(each) for name, each in value.items()}
     if isinstance(value, np.generic):
-        return str(value) if is_time(value) else value.item()
+        return value.item()
     return value
 
 
@@ -88,8 +80,7 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
     except ValueError:
         raise ValueError("should be real numbers, in rows of one length") from None
     if array.dtype == object and all(
-        isinstance(each, numbers.Real) and not isinstance(each, bool) and not is_time(each)
-        for each in array.flat
+        isinstance(each, numbers.Real) and not isinstance(each, bool) for each in array.flat
     ):
         with suppress(OverflowError):  # an integer beyond 1e308
             array = array.astype(np.float64)  # a nullable column of pandas
@@ -113,9 +104,5 @@ def _refuse_entries(value: Any) -> None:
 
 
 def brief_value(value: object) -> str:
-    """Return the ``repr`` of a value as one printable line, cut to 80 characters, or, if ``repr``
-    fails, a text with its type."""
-    try:
-        return plain(repr(value), 80)
-    except Exception:  # an integer of more digits than Python writes, or an object of the user
-        return f"a value of type {type(value).__name__}"
+    """Return the ``repr`` of a value as one printable line, cut to 80 characters."""
+    return plain(repr(value), 80)

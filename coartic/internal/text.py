@@ -8,7 +8,6 @@ LaTeX and commands to paste. What a person writes in a file is refused if it is 
 from __future__ import annotations
 
 import difflib
-import re
 import unicodedata
 from collections.abc import Iterable
 from typing import Annotated
@@ -33,11 +32,7 @@ def plain(text: str, most: int = LONGEST_REASON) -> str:
 
 def error_line(error: BaseException) -> str:
     """Return an exception as one printable line (:func:`plain`), such as ``ValueError: text``."""
-    try:
-        text = str(error)
-    except Exception:
-        text = "its message cannot be shown"
-    return plain(f"{type(error).__name__}: {text}".removesuffix(": "))
+    return plain(f"{type(error).__name__}: {error}".removesuffix(": "))
 
 
 def one_line(text: str) -> str:
@@ -67,19 +62,11 @@ def counted(count: int, thing: str) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return ``; did you mean 'a'?`` with the nearest of ``names`` to ``name``; an empty text if no
-    name is near. Nearest are names that begin with ``name``, capitals and punctuation aside,
-    then names that are spelt alike, then names that end in the same word."""
-    words = {each: re.findall(r"[^\W_]+", each.lower()) for each in (name, *names)}
-    meant = words.pop(name)
-    if not meant:
-        return ""
-    begin = [each for each in words if "".join(words[each]).startswith("".join(meant))]
-    spelt = {" ".join(words[each]): each for each in reversed(words)}
-    alike = [spelt[each] for each in difflib.get_close_matches(" ".join(meant), spelt, 1)]
-    last = [each for each in words if words[each][-1:] == meant[-1:]]
-    nearest = [*sorted(begin, key=len), *alike, *last]
-    return f"; did you mean {nearest[0]!r}?" if nearest else ""
+    """Return ``; did you mean 'a'?`` with the name that is spelt most like ``name``, capitals
+    aside; an empty string if no name is alike."""
+    known = {each.lower(): each for each in names}
+    nearest = difflib.get_close_matches(name.lower(), known, 1)
+    return f"; did you mean {known[nearest[0]]!r}?" if nearest else ""
 
 
 FOREIGN = (

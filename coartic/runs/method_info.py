@@ -19,7 +19,7 @@ from pydantic import ValidationError
 
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, plain
-from coartic.internal.validation import explain_inline
+from coartic.internal.validation import explain
 from coartic.method import Method, Outline, outline_of
 from coartic.tasks.task import Task
 
@@ -136,7 +136,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         typed = method.Parameters.model_validate(parameters)
     except ValidationError as error:
         names = list(method.Parameters.model_fields)
-        wrong, listed = explain_inline(error, names), ", ".join(names) or "none"
+        wrong, listed = explain(error, names), ", ".join(names) or "none"
         text = f"method {method.name!r}: {wrong} (its parameters: {listed})"
         raise CoarticError(text) from None
     if question == "complete":

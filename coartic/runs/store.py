@@ -30,7 +30,7 @@ from pydantic import TypeAdapter, ValidationError
 from coartic.errors import CoarticError
 from coartic.internal.files import make_folder
 from coartic.internal.text import plain
-from coartic.internal.validation import explain_inline
+from coartic.internal.validation import explain
 from coartic.method import Meter
 from coartic.motion.solution import Movement
 from coartic.robot import Array
@@ -634,7 +634,7 @@ def _explain(path: Path, error: Exception) -> str:
         if "decode to UTF-8" in said or said.startswith("no such table"):  # cut while it is open
             said = _DAMAGED
     else:
-        wrong = explain_inline(error, []) if isinstance(error, ValidationError) else said
+        wrong = explain(error) if isinstance(error, ValidationError) else said
         said = f"it holds what coartic does not write ({plain(wrong, 200)})"
     return f"cannot use {plain(str(path))}: {said}"
 

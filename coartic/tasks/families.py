@@ -32,9 +32,9 @@ from pydantic_core import PydanticCustomError
 from coartic.errors import NotApplicableError, TaskError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_CELLS, check_limits
-from coartic.internal.text import Line, counted, unknown
+from coartic.internal.text import Line, counted, plain, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain_file, sentence_error
+from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.motion.movement import move
 from coartic.motion.trial import ranked_sequences, search_initial_hands
 from coartic.robot import HANDS, Hand, Robot
@@ -430,7 +430,7 @@ def read_family(path: Path) -> Family:
         family = Family.model_validate(content | {"name": name})
     except ValidationError as error:
         keys = [*Family.model_fields, *_Region.model_fields, *_Alignment.model_fields]
-        raise TaskError(explain_file(str(path), error, keys)) from None
+        raise TaskError(f"{plain(str(path))}: {explain(error, keys)}") from None
     if address_of(f"{name}/i000") is None:
         raise TaskError(f"{path}: the name of a family's file is NAME.v1.toml")
     return family

@@ -22,9 +22,9 @@ from coartic.errors import CoarticError, TaskError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import folder_named, write_output
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.text import Line, counted, did_you_mean
+from coartic.internal.text import Line, counted, did_you_mean, plain
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain_file, sentence_error
+from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.model import PAPER, PAPER_RADIUS
 from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
 
@@ -413,7 +413,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
     except ValidationError as error:
-        raise TaskError(explain_file(source, error, _all_keys())) from None
+        raise TaskError(f"{plain(source)}: {explain(error, _all_keys())}") from None
 
 
 def _all_keys() -> list[str]:
