@@ -229,7 +229,7 @@ class Store:
         found = defaultdict[str, dict[str, None]](dict)
         for method, made, _ in self._packages():
             found[method] |= dict.fromkeys(f"{name} {version}" for name, version in made.items())
-        return {method: sorted(packages) for method, packages in found.items()}
+        return {method: sorted(packages) for method, packages in found.items() if packages}
 
     def _packages(self) -> Iterator[tuple[str, dict[str, str], dict[str, str]]]:
         """Yield, for each method from a file and each environment of its runs, the id of the method
