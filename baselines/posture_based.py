@@ -311,8 +311,8 @@ def _linearise_far(
             wanted[left, 1, 0] = miss_y * share
             for k in range(tip):
                 dx, dy = joint_lever(xs, ys, k, tip)
-                jacobian[left, 0, arm.first + k] = dx
-                jacobian[left, 1, arm.first + k] = dy
+                jacobian[left, 0, arm.first_joint + k] = dx
+                jacobian[left, 1, arm.first_joint + k] = dy
             far[left] = row
             left += 1
     return left

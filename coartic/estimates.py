@@ -1,7 +1,7 @@
-"""Estimates with their intervals: means and differences.
+"""Means and differences of means with their intervals.
 
-Samples are rewards (or any score) of independent runs. Intervals are of the BCa bootstrap, except
-in the cases that :func:`mean_of_means` names. All resampling here has the same seed, :data:`SEED`.
+Samples are rewards or other scores of independent runs. Intervals come from the BCa bootstrap;
+:func:`mean_of_means` lists the exceptions. All resampling here uses the same seed, :data:`SEED`.
 
 Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
@@ -25,38 +25,38 @@ from coartic.robot import Array
 CONFIDENCE = 0.95
 """Nominal coverage of intervals."""
 TAILS = (1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2
-"""Quantiles at the ends of such intervals."""
+"""Quantiles at the two ends of an interval of coverage :data:`CONFIDENCE`."""
 LEVEL = 0.05
 """Level of a test."""
 Resamples = Annotated[int, Field(ge=1, le=10_000_000)]
 """Number of resamples."""
 RESAMPLES = 9_999
-"""Number of resamples unless stated otherwise: 0.05 and 0.01 of 9,999 + 1 are whole numbers."""
+"""Default number of resamples: 0.05 and 0.01 of 9,999 + 1 are integers."""
 SEED = 0
 """Seed of resampling."""
 FEWEST = 3
-"""Least number of values in each sample for a bootstrap interval."""
+"""Smallest size of a sample for which a bootstrap interval is computed."""
 FEWER_RESAMPLES = 1_999
-"""Number of resamples for intervals of many values and over instances, which take long."""
+"""Number of resamples where they take long: for large samples and over instances."""
 LARGE = 500
-"""Size of a sample beyond which an interval is the percentiles of at most :data:`FEWER_RESAMPLES`
-resamples: BCa corrects next to nothing there."""
+"""Largest size of a sample for which a BCa interval is computed. A larger sample has a percentile
+interval of at most :data:`FEWER_RESAMPLES` resamples, which BCa would hardly change."""
 HUGE = 50_000
-"""Size of a sample beyond which an interval is of a normal distribution."""
+"""Largest size of a sample that is resampled. A larger sample has a normal interval."""
 IN_CACHE = 1 << 18
 """Number of values that are drawn at once: few enough for the processor's cache."""
 NEGLIGIBLE = 1e-9
-"""Share of the largest value up to which a difference of values counts as rounding."""
+"""Differences of at most this share of the largest value count as rounding."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimated number with its interval and p-value, which are NaN where they are not computed."""
+    """An estimated number with its interval and p-value, which are NaN if not computed."""
 
     value: float
-    """The mean, the difference or another number that is estimated."""
+    """The estimate: a mean, a difference or another number."""
     low: float = math.nan
-    """Lower end of the interval, mostly of coverage :data:`CONFIDENCE`."""
+    """Lower end of the interval, usually of coverage :data:`CONFIDENCE`."""
     high: float = math.nan
     """Upper end of the interval."""
     p: float = math.nan
@@ -64,84 +64,146 @@ class Estimate:
     n: tuple[int, ...] = ()
     """Number of values in each sample."""
     resamples: int = 0
-    """Number of resamples in which p was counted; 0 for an exact test or none."""
+    """Number of resamples from which p was counted; 0 for an exact test or no test."""
     least_p: float = math.nan
-    """Smallest p that the test can give for so many values; of a bootstrap test mostly the smallest
-    p of the sign test, below which its own p can fall."""
+    """Smallest p that the test can give for this number of values. For a bootstrap test this is
+    usually the smallest p of the sign test, and its own p can be smaller."""
 
     def columns(self, name: str) -> dict[str, float]:
-        """Return three entries of a table's row: ``name``, the value, and ``name_low`` and
-        ``name_high``, the ends of its interval."""
+        """Return the estimate as three entries of a table's row.
+
+        The keys are ``name`` for the value, and ``name_low`` and ``name_high`` for the ends of the
+        interval.
+        """
         return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
 
 
 def vector(values: ArrayLike) -> Array:
-    """Return a sample of real numbers as a float vector ``(n,)``. Raises ValueError if it is no
-    vector or empty, or holds NaN, masked values, or numbers that are neither 0 nor from 1e-100 to
-    1e100 in size."""
+    """Return a sample of real numbers as a vector of floats, shape ``(n,)``.
+
+    Raises ValueError if ``values``
+
+    - is not a vector, or is empty;
+    - has NaN, infinite or masked entries;
+    - has an entry other than 0 whose size is not from 1e-100 to 1e100.
+    """
     sample = real_array("a sample", values)
     size = np.abs(sample)
     usable = (size <= 1e100) & ((size >= 1e-100) | (size == 0))
     if sample.ndim != 1 or sample.size == 0 or not usable.all():
-        words = "all of them finite, and 0 or from 1e-100 to 1e100 in size"
-        raise ValueError(f"a sample is a vector of at least one value, {words}")
+        raise ValueError(
+            "a sample must be a vector of at least one value; each value must be 0 or have a size "
+            "from 1e-100 to 1e100"
+        )
     return sample
 
 
-def slices(count: int, most: int) -> Iterator[slice]:
-    """Yield slices of at most ``most`` indices, which in this order cover 0 to ``count`` - 1."""
-    for start in range(0, count, most):
-        yield slice(start, min(start + most, count))
+def slices(count: int, size: int) -> Iterator[slice]:
+    """Yield slices of at most ``size`` indices that together cover 0 to ``count`` - 1."""
+    for start in range(0, count, size):
+        yield slice(start, min(start + size, count))
 
 
 def varies(values: Array) -> Array:
-    """Return whether values differ along the first axis by more than rounding (:data:`NEGLIGIBLE`),
-    a bool for each entry of the other axes; False with NaN or infinity."""
+    """Return whether values differ along the first axis by more than rounding.
+
+    The result is a bool for each entry of the other axes; False if there is NaN or infinity.
+    :data:`NEGLIGIBLE` says what counts as rounding.
+    """
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
 
 def centred(values: Array) -> Array:
-    """Return values less their mean over the first axis; 0 without spread (:func:`varies`) and with
-    NaN or infinity."""
+    """Subtract from values their mean over the first axis.
+
+    The result is 0 where values do not vary (:func:`varies`), or include NaN or infinity.
+    """
     return np.where(varies(values), values - np.mean(values, axis=0), 0.0)
 
 
 def mean(values: ArrayLike) -> Estimate:
-    """Return the mean of a sample ``(n,)`` with its 95 % interval (:func:`mean_of_means`), whose
-    ends are NaN for fewer than three values. Raises ValueError for a sample that is no vector,
-    empty or not finite, or has values, other than 0, that are not from 1e-100 to 1e100 in size."""
+    """Compute the mean of a sample with its 95 % interval.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+
+    Returns
+    -------
+    Estimate
+        The mean with the interval of :func:`mean_of_means`; its ends are NaN for fewer than three
+        values.
+
+    Raises
+    ------
+    ValueError
+        The sample cannot be used (:func:`vector`).
+    """
     return _mean_of(tuple(vector(values).tolist()))
 
 
-@lru_cache(maxsize=500)  # claims state the same means
+@lru_cache(maxsize=500)  # claims ask for the same means
 def _mean_of(values: tuple[float, ...]) -> Estimate:
     return mean_of_means([np.array(values)], [1.0])
 
 
 def difference_of_means(first: ArrayLike, second: ArrayLike) -> Estimate:
-    """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
-    and ``(m,)``, with its 95 % interval (:func:`mean_of_means`), whose ends are NaN for fewer than
-    three values in a sample. Raises ValueError for samples that :func:`mean` refuses."""
+    """Compute the difference between the means of two independent samples, with its 95 % interval.
+
+    Parameters
+    ----------
+    first : array_like, shape (n,)
+    second : array_like, shape (m,)
+        The sample whose mean is subtracted.
+
+    Returns
+    -------
+    Estimate
+        The difference with the interval of :func:`mean_of_means`; its ends are NaN if a sample has
+        fewer than three values.
+
+    Raises
+    ------
+    ValueError
+        A sample cannot be used (:func:`vector`).
+    """
     return mean_of_means([first, second], [1.0, -1.0])
 
 
 def mean_of_means(
     samples: Sequence[ArrayLike], weights: Sequence[float], resamples: Resamples = RESAMPLES
 ) -> Estimate:
-    """Return the weighted sum of the means of independent samples, with its 95 % BCa interval.
+    """Compute a weighted sum of means of independent samples, with its 95 % interval.
 
-    Samples have shapes ``(n,)``; ``weights`` has a factor for each. Each sample is resampled within
-    itself. Raises ValueError without a sample, without a weight for each, and for a sample that is
-    empty or not finite. The edge cases, in this order:
+    Parameters
+    ----------
+    samples : sequence of array_like, shapes (n,)
+        The samples; each is resampled separately.
+    weights : sequence of float
+        A factor for the mean of each sample.
+    resamples : int
+        Number of bootstrap resamples.
 
-    - a sample of fewer than :data:`FEWEST` values: no interval;
-    - no spread in any sample: the interval is that point, which says that the samples have no
-      spread, not that the populations have none;
-    - a sample of more than :data:`HUGE` values: the normal interval;
-    - a sample of more than :data:`LARGE` values, or BCa is not defined: the percentile interval.
+    Returns
+    -------
+    Estimate
+        The sum with its interval. The interval is the first of these that applies:
+
+        - none, if a sample has fewer than :data:`FEWEST` values;
+        - the value itself, if no sample varies (the populations may vary all the same);
+        - the normal interval, if a sample has more than :data:`HUGE` values;
+        - the percentile interval, if a sample has more than :data:`LARGE` values or BCa is not
+          defined;
+        - the BCa interval.
+
+    Raises
+    ------
+    ValueError
+        There is no sample, the number of weights differs from the number of samples, or a sample
+        cannot be used (:func:`vector`).
     """
     if not samples:
-        raise ValueError("needed is a sample at least")
+        raise ValueError("samples is empty; need at least one sample")
     vectors = [*map(vector, samples)]
     parts = [*zip(vectors, weights, strict=True)]
     value = float(sum(weight * sample.mean() for sample, weight in parts))
@@ -156,32 +218,33 @@ def mean_of_means(
         return Estimate(value, value - width, value + width, n=n)
     large = max(n) > LARGE
     resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
-    kept = sum(n) <= LARGE
-    batches: Iterable[list[Any]] = (_drawn_once if kept else drawn)(n, resamples)
+    batches: Iterable[list[Any]] = (_drawn_once if sum(n) <= LARGE else drawn)(n, resamples)
     resampled = np.concatenate([
-        sum(weight * sample.take(places).mean(axis=1)
-            for (sample, weight), places in zip(parts, batch, strict=True))
+        sum(weight * sample.take(indices).mean(axis=1)
+            for (sample, weight), indices in zip(parts, batch, strict=True))
         for batch in batches
     ])  # fmt: skip
     ends = np.array(TAILS)
     if not large:
-        # How much each value moves the sum: of a mean the jackknife is known.
+        # How much each value moves the sum: the jackknife of a mean has a closed form.
         moves = [weight * (sample - sample.mean()) / len(sample) for sample, weight in parts]
-        cubes, squares = (sum((each**power).sum() for each in moves) for power in (3, 2))
+        cubes, squares = (sum((move**power).sum() for move in moves) for power in (3, 2))
         acceleration = cubes / squares**1.5 / 6
         below = ((resampled < value).sum() + (resampled <= value).sum()) / 2 / resamples
         bias = scipy.special.ndtri(below)
-        away = bias + scipy.special.ndtri(ends)
-        corrected = scipy.special.ndtr(bias + away / (1 - acceleration * away))
+        shifted = bias + scipy.special.ndtri(ends)
+        corrected = scipy.special.ndtr(bias + shifted / (1 - acceleration * shifted))
         ends = corrected if np.isfinite(corrected).all() else ends
     low, high = map(float, np.quantile(resampled, ends))
     return Estimate(value, low, high, n=n)
 
 
 def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
-    """Yield batches of at most 1,000 resamples, each a list with an array for each of ``sizes``,
-    the numbers of values in the samples: the indices of the values drawn, shape ``(batch, size)``.
-    Equal arguments give equal indices."""
+    """Yield the indices of the values drawn in batches of at most 1,000 resamples.
+
+    A batch is a list with an array for each sample, shape ``(batch, size)``; ``sizes`` are the
+    numbers of values in the samples. Equal arguments give equal indices.
+    """
     rng, batch = np.random.default_rng(SEED), 1_000
     if max(sizes) > LARGE:
         batch = max(1, min(100, 1_000_000 // max(sizes)))
@@ -189,14 +252,19 @@ def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int6
         yield [rng.integers(size, size=(part.stop - part.start, size)) for size in sizes]
 
 
-@lru_cache(maxsize=8)  # most samples have as many values as another
+@lru_cache(maxsize=8)  # samples often have equal sizes
 def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.uint16]]]:
-    """Return a list of all batches of :func:`drawn`, in a quarter of the memory. The list is
-    cached: do not change it."""
-    return [[places.astype(np.uint16) for places in batch] for batch in drawn(sizes, resamples)]
+    """Return a cached list of all batches of :func:`drawn`; do not change it.
+
+    It takes a quarter of the memory of the batches themselves.
+    """
+    return [[indices.astype(np.uint16) for indices in batch] for batch in drawn(sizes, resamples)]
 
 
 def standard_deviation(values: Array) -> float:
-    """Return the SD of values ``(n,)``, with n - 1 degrees of freedom: NaN for fewer than two
-    values; 0 for two or more without spread, or with NaN or infinity among them."""
+    """Compute the standard deviation of values, shape ``(n,)``, with n - 1 degrees of freedom.
+
+    It is NaN for fewer than two values. For two or more it is 0 if they do not vary
+    (:func:`varies`) or include NaN or infinity.
+    """
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan

@@ -142,7 +142,7 @@ class TaskEnv(gymnasium.Env):
         else:
             self.tasks = [only := as_task(task)]
             locked, hands = {*only.locked_base}, only.hands
-            fewest = links = only.robot.most_links
+            fewest = links = only.robot.max_links
         self.names = [getattr(each, "name", each) for each in self.tasks]
         self._joints = [f"base_{axis}" for axis in "xy" if axis not in locked]
         self._joints += [f"{hand}_{k + 1}" for hand in hands for k in range(links)]

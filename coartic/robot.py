@@ -1,13 +1,13 @@
 """The robot and its kinematics.
 
-A planar, kinematic robot of a mobile base and two serial arms (paper, Figure 1).
-A configuration is the vector ``q = (base_x, base_y, left_1 .. left_n, right_1 ..
-right_m)``; lengths are in the model's length unit, angles in rad. Angles are
-relative: each joint is measured from the previous link, the first one from +x.
+The robot is planar and kinematic: a mobile base with two serial arms (paper, Figure 1). A
+configuration is the vector ``q = (base_x, base_y, left_1 .. left_n, right_1 .. right_m)``. Lengths
+are in the model's length unit, angles in rad. Angles are relative: each joint is measured from the
+previous link, the first joint from +x.
 
-The formulas of positions, in :func:`chain`, and of the Jacobian, in :func:`lever`, are
-written so that one source serves NumPy arrays, CasADi symbols and the compiled
-kernels. The caller of :func:`chain` passes a cosine and a sine for its type.
+:func:`chain` has the formulas of positions, :func:`lever` the formula of the Jacobian. Both are
+written so that one source serves NumPy arrays, CasADi symbols and the compiled kernels. The caller
+of :func:`chain` passes a cosine and a sine for the type of its numbers.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Points = NDArray[np.float64]
 """Points in the plane, shape ``(..., 2)``: x and y, length unit."""
 Hands = NDArray[np.int64]
 """Hands as indices in :data:`HANDS`: 0 left, 1 right."""
-LARGEST_FIGURE = 1e4  # of a task or a robot, length unit or rad
+LARGEST_FIGURE = 1e4  # largest number in a task or a robot, length unit or rad
 MOST_LINKS = 100  # of an arm
 Finite = Annotated[
     float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_FIGURE, le=LARGEST_FIGURE)
@@ -42,29 +42,40 @@ Finite = Annotated[
 Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False, le=LARGEST_FIGURE)]
 _Lengths = Annotated[tuple[Length, ...], Field(min_length=1, max_length=MOST_LINKS)]
 
-HANDS: tuple[Hand, Hand] = ("left", "right")  # A, in the order that breaks ties
+HANDS: tuple[Hand, Hand] = ("left", "right")  # the paper's A; at a tie the first hand is chosen
 BASE_DOF = 2
 
 
 class Arm(NamedTuple):
-    """Arm of a robot, as the formulas and the compiled kernels read it."""
+    """An arm of a robot in the form that the formulas and the compiled kernels read."""
 
-    first: int
-    """Index in ``q`` of the angle of its first joint."""
+    first_joint: int
+    """Index in ``q`` of the angle of the arm's first joint."""
     links: Any
-    """Lengths of its links from shoulder to hand, shape ``(n,)``, length unit."""
+    """Lengths of the links from shoulder to hand, shape ``(n,)``, length unit."""
     shoulder_x: float
-    """Place of the shoulder in x from the centre of the base, length unit."""
+    """x of the shoulder, measured from the centre of the base, length unit."""
     shoulder_y: float
-    """Place of the shoulder in y from the centre of the base, length unit."""
+    """y of the shoulder, measured from the centre of the base, length unit."""
 
 
 def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
-    """Fill ``xs`` and ``ys``, in place, with x and y of an arm's shoulder, joints and hand.
+    """Compute the positions of an arm's shoulder, joints and hand, in place.
 
-    In length unit. Entry 0 is the shoulder, entry ``n`` (the number of links) the hand. ``q`` is
-    one configuration or several, shape ``(dof, ...)``, of numbers or symbols; ``cos`` and ``sin``
-    fit their type. Source: Craig (2004).
+    Parameters
+    ----------
+    q : array or sequence, shape (dof, ...)
+        One configuration or many, of numbers or symbols; the first axis is the entry.
+    arm : Arm
+        The arm, with n links.
+    xs, ys : array or list, length n + 1
+        Filled with x and y, length unit. Entry 0 is the shoulder, entry n the hand.
+    cos, sin : callable
+        Cosine and sine for the type of ``q``.
+
+    Notes
+    -----
+    Source: Craig (2004).
     """
     x = q[0] + arm.shoulder_x
     y = q[1] + arm.shoulder_y
@@ -72,7 +83,7 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
     ys[0] = y
     angle = 0.0
     for k in range(len(arm.links)):
-        angle = angle + q[arm.first + k]
+        angle = angle + q[arm.first_joint + k]
         x = x + arm.links[k] * cos(angle)
         y = y + arm.links[k] * sin(angle)
         xs[k + 1] = x
@@ -80,12 +91,22 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
 
 
 def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
-    """Return the derivatives of x and of y of point ``tip`` of an arm by the angle of ``joint``.
+    """Compute the derivative of an arm's point by the angle of one of its joints.
 
-    In length unit per rad: a column of the geometric Jacobian. ``joint`` and ``tip`` (``joint <=
-    tip``) are indices in ``xs`` and ``ys``, x and y of shoulder (0), joints and hand
-    (:func:`chain`). A rotation about a joint moves the tip at right angles to the line between
-    them.
+    A rotation about a joint moves the point at right angles to the line between them. The result is
+    a column of the geometric Jacobian.
+
+    Parameters
+    ----------
+    xs, ys : array or list, length n + 1
+        x and y of shoulder, joints and hand, as :func:`chain` fills them.
+    joint, tip : int
+        Indices in ``xs`` and ``ys`` of the joint and of the point, with ``joint <= tip``.
+
+    Returns
+    -------
+    dx, dy
+        Derivatives of the point's x and y, length unit per rad.
     """
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
 
@@ -93,40 +114,41 @@ def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
 @in_sentences
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class Robot:
-    """Geometry of a two-armed planar robot, and its kinematics; the default is the paper's.
+    """Geometry and kinematics of a planar robot with two arms, by default the paper's.
 
-    Four unit links an arm on a box 1 wide and 0.2 high are published (Figure 1).
-    Shoulders on the top corners of the box are inferred: only a height of +0.1
+    The paper publishes four links of length 1 for each arm and a box 1 wide and 0.2 high (Figure
+    1). That the shoulders are on the top corners of the box is inferred: only a height of +0.1
     gives the published initial rewards of the one-armed tasks (docs/model.md).
 
-    A configuration ``q`` has shape ``(dof,)``: the base's x and y (length unit), the joint angles
+    A configuration ``q`` has shape ``(dof,)``: x and y of the base (length unit), the joint angles
     of the left arm and the joint angles of the right arm (rad, each from the link before). Methods
-    for arrays take one or many, shape ``(..., dof)``, and raise ValueError for a ``q`` of another
-    shape or that is not finite, and for a hand that is neither ``"left"`` nor ``"right"``.
+    that take arrays accept one configuration or many, shape ``(..., dof)``. They raise ValueError
+    if ``q`` has another shape or is not finite, or if a hand is neither ``"left"`` nor ``"right"``.
     """
 
     left_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
-    """Lengths of the links of the left arm, from the shoulder outwards, length unit."""
+    """Lengths of the links of the left arm from the shoulder outwards, length unit."""
     right_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
-    """Lengths of the links of the right arm, likewise."""
+    """Lengths of the links of the right arm from the shoulder outwards, length unit."""
     left_shoulder: tuple[Finite, Finite] = (-0.5, 0.1)
-    """Left shoulder, x and y from the centre of the base, length unit."""
+    """x and y of the left shoulder, measured from the centre of the base, length unit."""
     right_shoulder: tuple[Finite, Finite] = (0.5, 0.1)
-    """Right shoulder, likewise."""
+    """x and y of the right shoulder, measured from the centre of the base, length unit."""
     base_size: tuple[Length, Length] = (1.0, 0.2)
-    """Width and height of the base, length unit, for drawings only. The default is for arms of
-    length 4 and is drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
+    """Width and height of the base, length unit, for drawings only. The default fits arms of length
+    4 and is drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
 
     @cached_property
     def scale(self) -> float:
-        """Length of the shorter arm divided by the paper's, 4 length units: the factor for sizes in
-        drawings."""
+        """Scale of drawings: the length of the shorter arm, divided by the paper's 4."""
         return min(math.fsum(self.left_links), math.fsum(self.right_links)) / 4.0
 
     @property
     def drawn_base(self) -> tuple[float, float]:
-        """Width and height of the base in drawings, length unit: :attr:`base_size`; the default
-        size is multiplied by :attr:`scale`."""
+        """Width and height of the base in drawings, length unit.
+
+        This is :attr:`base_size`. If it is the default, it is multiplied by :attr:`scale`.
+        """
         width, height = self.base_size
         is_default = self.base_size == type(self).__dataclass_fields__["base_size"].default
         return (width * self.scale, height * self.scale) if is_default else (width, height)
@@ -137,8 +159,8 @@ class Robot:
         return BASE_DOF + len(self.left_links) + len(self.right_links)
 
     @cached_property
-    def most_links(self) -> int:
-        """Number of links of the arm that has more links."""
+    def max_links(self) -> int:
+        """Number of links of the arm with more links."""
         return max(len(self.left_links), len(self.right_links))
 
     @cached_property
@@ -150,32 +172,39 @@ class Robot:
 
     @cached_property
     def _arms(self) -> dict[str, Arm]:
-        arms, first = dict[str, Arm](), BASE_DOF
+        arms, first_joint = dict[str, Arm](), BASE_DOF
         for hand in HANDS:
             links = np.array(getattr(self, f"{hand}_links"), dtype=np.float64)
             links.setflags(write=False)
-            arms[hand] = Arm(first, links, *map(float, getattr(self, f"{hand}_shoulder")))
-            first += len(links)
+            shoulder = map(float, getattr(self, f"{hand}_shoulder"))
+            arms[hand] = Arm(first_joint, links, *shoulder)
+            first_joint += len(links)
         return arms
 
     def arm(self, hand: Hand) -> Arm:
-        """Return the :class:`Arm` of a hand: index of its first joint, links and shoulder. Raises
-        ValueError for an unknown hand."""
+        """Return the :class:`Arm` of a hand.
+
+        Raises ValueError for an unknown hand.
+        """
         try:
             return self._arms[hand]
         except (KeyError, TypeError):
             raise ValueError(f"unknown hand {hand!r}: a hand is 'left' or 'right'") from None
 
     def joints(self, hand: Hand) -> slice:
-        """Return the slice of a configuration that holds the joint angles of a hand's arm: ``q[...,
-        robot.joints("left")]`` has shape ``(..., n)``, rad. Raises ValueError for an unknown hand.
+        """Return the slice of a configuration that holds the joint angles of a hand's arm.
+
+        ``q[..., robot.joints("left")]`` has shape ``(..., n)``, rad. Raises ValueError for an
+        unknown hand.
         """
         arm = self.arm(hand)
-        return slice(arm.first, arm.first + len(arm.links))
+        return slice(arm.first_joint, arm.first_joint + len(arm.links))
 
     def reach(self, hand: Hand) -> tuple[float, float]:
-        """Return the least and the largest distance of a hand from its shoulder, length unit:
-        joints have no limits. Raises ValueError for an unknown hand."""
+        """Return the smallest and the largest distance of a hand from its shoulder.
+
+        Both are in length units. Joints have no limits. Raises ValueError for an unknown hand.
+        """
         links = self.arm(hand).links.tolist()
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
 
@@ -201,7 +230,7 @@ class Robot:
         return self._hand(*self._numpy_chain(array, hand), array)
 
     def joint_positions(self, q: ArrayLike, hand: Hand) -> Array:
-        """Compute the positions, x and y, of the shoulder, the joints and the hand of a hand's arm.
+        """Compute the positions of the shoulder, the joints and the hand of an arm.
 
         Parameters
         ----------
@@ -211,7 +240,7 @@ class Robot:
         Returns
         -------
         ndarray, shape (..., n + 1, 2)
-            Positions from the shoulder to the hand of an arm with n links, length unit.
+            x and y from the shoulder to the hand of an arm with n links, length unit.
 
         Raises
         ------
@@ -243,9 +272,25 @@ class Robot:
         return self.linearised(q, hand)[1]
 
     def linearised(self, q: ArrayLike, hand: Hand) -> tuple[Array, Array]:
-        """Return the positions of a hand, ``(..., 2)``, length unit, and their Jacobians, ``(...,
-        2, dof)``, for configurations ``(..., dof)``: :meth:`forward_kinematics` and
-        :meth:`jacobian` at once. Raises ValueError if ``q`` or ``hand`` does not fit the robot."""
+        """Compute the position of a hand and its Jacobian at once.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., dof)
+        hand : {"left", "right"}
+
+        Returns
+        -------
+        position : ndarray, shape (..., 2)
+            As :meth:`forward_kinematics` returns it, length unit.
+        jacobian : ndarray, shape (..., 2, dof)
+            As :meth:`jacobian` returns it.
+
+        Raises
+        ------
+        ValueError
+            ``q`` or ``hand`` does not fit the robot.
+        """
         array = self._configuration(q)
         xs, ys = self._numpy_chain(array, hand)
         arm, tip = self.arm(hand), len(xs) - 1
@@ -253,7 +298,8 @@ class Robot:
         result[..., 0, 0] = 1.0
         result[..., 1, 1] = 1.0
         for k in range(tip):
-            result[..., 0, arm.first + k], result[..., 1, arm.first + k] = lever(xs, ys, k, tip)
+            j = arm.first_joint + k
+            result[..., 0, j], result[..., 1, j] = lever(xs, ys, k, tip)
         return self._hand(xs, ys, array), result
 
     def base_outline(self, q: ArrayLike) -> Array:
@@ -279,8 +325,22 @@ class Robot:
         return array[..., None, :BASE_DOF] + corners
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
-        """Return the position of a hand, x and y, as a CasADi expression, 2 x 1, length unit, for a
-        CasADi ``q``, dof x 1. Raises ValueError if ``q`` has another size, and for an unknown hand.
+        """Return the position of a hand as a CasADi expression.
+
+        Parameters
+        ----------
+        q : CasADi matrix, dof x 1
+        hand : {"left", "right"}
+
+        Returns
+        -------
+        CasADi matrix, 2 x 1
+            x and y, length unit.
+
+        Raises
+        ------
+        ValueError
+            ``q`` has another size, or the hand is unknown.
         """
         import casadi
 
@@ -294,21 +354,36 @@ class Robot:
         return casadi.vertcat(xs[-1], ys[-1])
 
     def symbolic_hand_jerk(self, q: Sequence[Any], hand: Hand) -> Any:
-        """Return the third time derivative of a hand's position as a CasADi expression (SX), 2 x 1,
-        length unit per cubed unit of time. ``q`` lists the configuration and its first three time
-        derivatives, SX expressions of ``dof`` entries.
+        """Return the third time derivative of a hand's position as a CasADi expression.
 
-        Written out, because CasADi's third derivatives make Hessians of twice as many operations.
-        Raises ValueError for an unknown hand.
+        It is written out, because the Hessians of CasADi's third derivatives have twice as many
+        operations.
+
+        Parameters
+        ----------
+        q : sequence of four SX expressions of ``dof`` entries
+            The configuration and its first three time derivatives.
+        hand : {"left", "right"}
+
+        Returns
+        -------
+        SX expression, 2 x 1
+            The jerk in x and y, length unit per cubed unit of time.
+
+        Raises
+        ------
+        ValueError
+            The hand is unknown.
         """
         import casadi
 
         arm, (x, y) = self.arm(hand), (q[3][0], q[3][1])
         angles = [casadi.SX(0)] * 4  # of a link, and its derivatives
         for k, link in enumerate(arm.links.tolist()):
-            angles = [angle + each[arm.first + k] for angle, each in zip(angles, q, strict=True)]
-            angle, first, second, third = angles
-            along, across = -3 * first * second, third - first**3
+            turns = [derivative[arm.first_joint + k] for derivative in q]
+            angles = [angle + turn for angle, turn in zip(angles, turns, strict=True)]
+            angle, rate, acceleration, jerk = angles
+            along, across = -3 * rate * acceleration, jerk - rate**3
             cos, sin = casadi.cos(angle), casadi.sin(angle)
             x += link * (along * cos - across * sin)
             y += link * (along * sin + across * cos)
@@ -330,16 +405,14 @@ class Robot:
 
     @staticmethod
     def _hand(xs: list[Any], ys: list[Any], q: Array) -> Array:
-        """Return positions of a hand, the last entries of ``xs`` and ``ys``, as an array ``(...,
-        2)`` for configurations ``q``, ``(..., dof)``."""
+        """Return the hand's positions, ``(..., 2)``, from the last entries of ``xs`` and ``ys``."""
         position = np.empty((*q.shape[:-1], 2))
         position[..., 0], position[..., 1] = xs[-1], ys[-1]
         return position
 
 
 def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[Any]]:
-    """Return two lists, x and y, length unit, of shoulder, joints and hand of an arm with n links
-    in ``q`` (:func:`chain`), n + 1 entries each; ``cos`` and ``sin`` fit the type of ``q``."""
+    """Return lists of x and y of an arm's shoulder, joints and hand (:func:`chain`)."""
     xs: list[Any] = [None] * (len(arm.links) + 1)
     ys = [*xs]
     chain(q, arm, xs, ys, cos, sin)
@@ -347,7 +420,9 @@ def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[An
 
 
 def directions(angles: ArrayLike) -> Array:
-    """Return the unit vectors (cos, sin), shape ``(..., 2)``, of ``angles`` from +x, rad, shape
-    ``(...)``."""
+    """Return the unit vectors of angles that are measured from +x.
+
+    ``angles`` are in rad, shape ``(...)``; the vectors (cos, sin) have shape ``(..., 2)``.
+    """
     absolute = np.asarray(angles, dtype=np.float64)
     return np.stack([np.cos(absolute), np.sin(absolute)], axis=-1)

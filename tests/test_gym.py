@@ -87,7 +87,7 @@ def test_a_trial_is_the_execution_of_its_targets(name, moves, ahead):
             arms = [q[task.robot.joints(hand)] for hand in task.hands]
             arms = [np.pad(arm, (0, links - len(arm))) for arm in arms]
             free = [axis not in task.locked_base for axis in moves]
-            has = [np.arange(links) < task.robot.most_links for _ in task.hands]
+            has = [np.arange(links) < task.robot.max_links for _ in task.hands]
             flags = np.concatenate([free, *has]) if name == MIXED else []
             there, places, rest = np.split(seen, [ahead + 1, 3 * (ahead + 1)])
             np.testing.assert_array_equal(

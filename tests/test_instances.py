@@ -68,5 +68,5 @@ def test_given_tasks_are_strata():
     assert mean.value == pytest.approx(150 + runs.mean())
     assert width(mean) == due(runs.var(axis=1).sum() / 4**2, 20, 0.1)
     assert task_mean([[1.0] * 4, [5.0] * 40]).value == 3.0  # each counts the same
-    with pytest.raises(ValueError, match="needed is a sample at least"):
+    with pytest.raises(ValueError, match="at least one sample"):
         task_mean([])

@@ -185,7 +185,7 @@ def _by_steps(q, arm, goal, gain, tolerance, most, xs, ys):
         q[1] += gain * error_y
         for k in range(tip):
             dx, dy = joint_lever(xs, ys, k, tip)
-            q[arm.first + k] += gain * (dx * error_x + dy * error_y)
+            q[arm.first_joint + k] += gain * (dx * error_x + dy * error_y)
     return most
 
 
@@ -201,7 +201,7 @@ def test_an_arm_that_is_wound_up_is_corrected_to_the_bit(seed):
     model = PAPER.for_radius()
     iterations = _by_steps(
         slow, robot.arm(hand), tuple(goal), model.gain, model.correction_tolerance,
-        model.max_iterations, *np.empty((2, robot.most_links + 1)),
+        model.max_iterations, *np.empty((2, robot.max_links + 1)),
     )  # fmt: skip
     assert fast.iterations == iterations
     np.testing.assert_array_equal(fast.q, slow)

@@ -212,8 +212,8 @@ def workspace_for(runs: int, task: Task) -> _Workspace:
         batch=batch_for(task.robot, runs),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
         returns=np.empty(len(task.goals)),
-        xs=np.empty(task.robot.most_links + 1),
-        ys=np.empty(task.robot.most_links + 1),
+        xs=np.empty(task.robot.max_links + 1),
+        ys=np.empty(task.robot.max_links + 1),
         jacobian=np.zeros((3, width_of(task.robot))),
     )
 
@@ -329,7 +329,7 @@ def drift(
     chain_by(run.target, arm, workspace.xs, workspace.ys, cosine, sine)
     for j in range(len(run.q)):
         x[j], y[j], v[j] = 0.0, 0.0, 0.0
-        k = j - arm.first
+        k = j - arm.first_joint
         if learner.explored[run.hand, j]:
             away = run.preferred[j] - run.target[j]
             if j == 0:

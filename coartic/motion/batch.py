@@ -37,9 +37,9 @@ SlotArrays = Any
 
 def _links_for(robot: Robot) -> int:
     """Return the number of links per arm for which the kernels of a robot are compiled, so that
-    most robots share machine code: 4 or 8 if no arm has more links, else :attr:`Robot.most_links`.
+    most robots share machine code: 4 or 8 if no arm has more links, else :attr:`Robot.max_links`.
     """
-    return 4 if robot.most_links <= 4 else max(robot.most_links, 8)
+    return 4 if robot.max_links <= 4 else max(robot.max_links, 8)
 
 
 def width_of(robot: Robot) -> int:
@@ -55,7 +55,7 @@ def width_of(robot: Robot) -> int:
 @cache
 def _parameters_type(links: int) -> np.dtype[np.void]:
     """Return the NumPy type of the record of :func:`robot_parameters` for ``links`` per arm."""
-    arm = {"first": np.int64, "count": np.int64, "links": (np.float64, links)}
+    arm = {"first_joint": np.int64, "count": np.int64, "links": (np.float64, links)}
     shoulder = dict.fromkeys(("shoulder_x", "shoulder_y"), np.float64)
     model = dict.fromkeys(MotionModel._fields, np.float64) | {"max_iterations": np.int64}
     fields = {
@@ -90,8 +90,9 @@ def robot_parameters(
         raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
     parameters = np.zeros(1, _parameters_type(_links_for(robot)))
     for hand, arm in zip(HANDS, parameters["arms"][0], strict=True):
-        first, links, *shoulder = robot.arm(hand)
-        arm["first"], arm["count"], arm["links"][: len(links)] = first, len(links), links
+        first_joint, links, *shoulder = robot.arm(hand)
+        arm["first_joint"], arm["count"] = first_joint, len(links)
+        arm["links"][: len(links)] = links
         arm["shoulder_x"], arm["shoulder_y"] = shoulder
     parameters["model"] = model.for_radius(radius)
     parameters["radius"], parameters["checks"] = radius, checks
@@ -105,7 +106,7 @@ def arm_of(robot: RobotRecord, hand: int) -> Arm:
     """Return the :class:`Arm` of a hand (0 left, 1 right) from a record of
     :func:`robot_parameters`; its links share memory with the record."""
     arm = robot.arms[hand]
-    return Arm(arm.first, arm.links[: arm.count], arm.shoulder_x, arm.shoulder_y)
+    return Arm(arm.first_joint, arm.links[: arm.count], arm.shoulder_x, arm.shoulder_y)
 
 
 # ---- Runs and slots ----
@@ -163,7 +164,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     shapes = {
         "q": joints,  # base x and y, then the joints of the arm
         "run": (),  # index of the run in the slot
-        "first": (),  # index in a configuration of the first joint of its arm
+        "first_joint": (),  # index in a configuration of the first joint of its arm
         "links": (),  # of its arm
         "length": (links,),
         "shoulder": (2,),
@@ -181,7 +182,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "pull": joints,  # what an iteration of a correction adds to q
         "jacobian": (2, *joints),
     }
-    kinds = dict.fromkeys(("run", "first", "links"), np.int64)
+    kinds = dict.fromkeys(("run", "first_joint", "links"), np.int64)
     record = np.dtype(
         [(name, kinds.get(name, np.float64), (*shape, SLOTS)) for name, shape in shapes.items()]
     )
@@ -196,14 +197,14 @@ def _copy_arm(row: Any, slot: int, q: Any, arm: Arm) -> None:
     row[0, slot] = q[0]
     row[1, slot] = q[1]
     for k in range(len(row) - BASE_DOF):
-        row[BASE_DOF + k, slot] = q[arm.first + k] if k < len(arm.links) else 0.0
+        row[BASE_DOF + k, slot] = q[arm.first_joint + k] if k < len(arm.links) else 0.0
 
 
 @inlined
 def load(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
     """Copy ``number``, goal, base and joints of ``run``, record ``number`` (from 0) of its batch,
     and shoulder and links of its ``arm`` into column ``slot`` of the arrays ``at``, in place."""
-    at.run[slot], at.first[slot], at.links[slot] = number, arm.first, len(arm.links)
+    at.run[slot], at.first_joint[slot], at.links[slot] = number, arm.first_joint, len(arm.links)
     at.shoulder[0, slot] = arm.shoulder_x
     at.shoulder[1, slot] = arm.shoulder_y
     at.goal[0, slot], at.goal[1, slot] = run.goal[0], run.goal[1]
@@ -240,7 +241,7 @@ def store(at: SlotArrays, slot: int, q: Any) -> None:
     q[0] = at.q[0, slot]
     q[1] = at.q[1, slot]
     for k in range(at.links[slot]):
-        q[at.first[slot] + k] = at.q[BASE_DOF + k, slot]
+        q[at.first_joint[slot] + k] = at.q[BASE_DOF + k, slot]
 
 
 @inlined

@@ -467,7 +467,7 @@ def _pull_to_preferred(at: SlotArrays, count: int, robot: RobotRecord, runs: Any
             v[1], y[1] = run.preferred[1] - at.q[1, i], 1.0
         for k in range(at.links[i]):
             j = BASE_DOF + k
-            v[j] = run.preferred[at.first[i] + k] - at.q[j, i]
+            v[j] = run.preferred[at.first_joint[i] + k] - at.q[j, i]
             x[j], y[j] = joint_lever(at.x[:, i], at.y[:, i], k, tip)
         project(v, x, y)
         for j in range(BASE_DOF + tip):

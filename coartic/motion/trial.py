@@ -337,7 +337,7 @@ def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any
 SHARE = 14 * SLOTS
 """Least number of arms for a thread: its start takes as long as a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
-"""Batches that no thread uses, by :attr:`Robot.most_links`."""
+"""Batches that no thread uses, by :attr:`Robot.max_links`."""
 
 
 def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
@@ -358,7 +358,7 @@ def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Account
     checked. Many arms are shared among threads.
     """
     count, goals, moves, _ = arms.targets.shape
-    accounts, idle = empty_accounts(robot, count, goals, moves), _IDLE[robot.most_links]
+    accounts, idle = empty_accounts(robot, count, goals, moves), _IDLE[robot.max_links]
 
     def work(part: slice) -> None:
         some, results = arms, accounts

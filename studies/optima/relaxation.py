@@ -79,7 +79,7 @@ class Relaxation:
         # The absolute angle of a link is a sum of joints.
         sums = np.zeros((len(links), goals, dof))
         for summed, (g, arm, k) in zip(sums, links, strict=True):
-            summed[g, arm.first : arm.first + k + 1] = 1.0
+            summed[g, arm.first_joint : arm.first_joint + k + 1] = 1.0
         self._sums = sums.reshape(len(links), goals * dof)
         self._slopes = np.linalg.pinv(self._sums.T).round()  # of joints, as those of angles
         self._start_angles = self._sums @ np.tile(q0, goals)

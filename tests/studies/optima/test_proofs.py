@@ -79,7 +79,7 @@ def test_the_disc_of_an_undecided_hand_holds_both_hands():
     far = []
     for hand in task.hands:
         q = straight.copy()
-        q[:, task.robot.arm(hand).first] = np.linspace(-math.pi, math.pi, len(q))
+        q[:, task.robot.arm(hand).first_joint] = np.linspace(-math.pi, math.pi, len(q))
         away = np.linalg.norm(task.robot.forward_kinematics(q, hand) - middle, axis=1)
         far.append(task.radius + away.max())
     assert radius - 1e-4 < max(far) <= radius + 1e-12
@@ -302,7 +302,7 @@ def test_no_hand_is_faster_than_the_fastest(locked):
     task = uneven_task([0.5], [0.5] * 4, goals=goals, locked_base=locked)
     q = np.random.default_rng(5).uniform(-3, 3, (2000, UNEVEN.dof))
     q[0, 2:] = 0.0
-    q[0, [task.robot.arm(hand).first for hand in task.hands]] = math.pi / 2  # at right angles to x
+    q[0, [task.robot.arm(hand).first_joint for hand in task.hands]] = math.pi / 2  # at right angles to x
     moving = np.ones(UNEVEN.dof)
     moving[["xy".index(axis) for axis in locked]] = 0.0
     for hand in task.hands:
