@@ -302,7 +302,8 @@ def test_no_hand_is_faster_than_the_fastest(locked):
     task = uneven_task([0.5], [0.5] * 4, goals=goals, locked_base=locked)
     q = np.random.default_rng(5).uniform(-3, 3, (2000, UNEVEN.dof))
     q[0, 2:] = 0.0
-    q[0, [task.robot.arm(hand).first_joint for hand in task.hands]] = math.pi / 2  # at right angles to x
+    shoulders = [task.robot.arm(hand).first_joint for hand in task.hands]
+    q[0, shoulders] = math.pi / 2  # at right angles to x
     moving = np.ones(UNEVEN.dof)
     moving[["xy".index(axis) for axis in locked]] = 0.0
     for hand in task.hands:
