@@ -38,7 +38,7 @@ def lever(folder):
     sys.path.insert(0, str(folder))
     from kernel import across, joint_lever
 
-    with pytest.raises(TypeError, match="lever is called by kernels alone"):
+    with pytest.raises(TypeError, match="lever can only be called by other kernels"):
         joint_lever(np.zeros(2), np.zeros(2), 0, 1)
     dy = across(np.array([1.0, 6.5]), np.zeros(2))
     return float(dy), sum(across.dispatcher.stats.cache_hits.values())
@@ -67,7 +67,7 @@ def test_variables_that_numba_refuses_get_a_sentence(tmp_path):
         except Exception as error:
             print(type(error).__name__, error)"""
     done = python("-c", code, cwd=tmp_path, NUMBA_NUM_THREADS="0")
-    assert done.stdout.startswith("CoarticError Numba cannot begin (Number of threads")
+    assert done.stdout.startswith("CoarticError Numba cannot start (Number of threads")
 
 
 def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):

@@ -311,8 +311,8 @@ def test_a_condition_keeps_its_limits(field, value):
         ({"goals": ((3.0, 1.0),) * 5}, "for each of 5 goals"),
         ({"goals": ((3.0, 1.0),) * 3 + ((3.0, np.nan),)}, "not finite"),
         ({"initial_hands": "L"}, "'L' do not fit task"),
-        ({"start": Start(left=(0.0,), right=(0.0,))}, r"needed is \(10,\)"),
-        ({"robot": Robot(left_links=(1.0,), right_links=(1.0,))}, r"needed is \(4,\)"),
+        ({"start": Start(left=(0.0,), right=(0.0,))}, r"it must be \(10,\)"),
+        ({"robot": Robot(left_links=(1.0,), right_links=(1.0,))}, r"it must be \(4,\)"),
         ({"radius": np.inf}, "radius is inf"),
     ],
 )

@@ -216,13 +216,13 @@ SOLUTION = corrective_trial("ascending", "RRR").movements
         *(({"motor_noise": noise}, "motor_noise is") for noise in (-0.01, np.nan, np.inf, "0.01")),
         *(({"repeats": repeats}, "repeats is") for repeats in (0, -1, 2.0)),
         *(({"seed": seed}, "seed is") for seed in (-1, 0.5, None, [True])),
-        ({"seed": [1, 2]}, "seed has 2 entries; it needs one for each of the 1 solutions"),
+        ({"seed": [1, 2]}, "seed has 2 entries; it must have one for each of the 1"),
         ({"model": MotionModel(gain=0.0)}, "gain"),
         ({"task": "two-armed-2"}, r"solutions\[0\]: task .* goals \[1, 2, 3\]"),
         ({"task": "descending"}, r"took 319 ticks; on task 'descending'.* of another task\?"),
         ({"task": changed("ascending", hands=["left"], initial_hands="LLL")}, "has no right hand"),
         ({"task": uneven_task(goals=[[1.0, 2.0]] * 3, initial_hands="RRR")}, "configuration has"),
-        ({"solutions": SOLUTION}, r"solutions\[0\]: .* needed is a list of movements"),
+        ({"solutions": SOLUTION}, r"solutions\[0\]: .* must be a list of movements"),
     ],
 )
 def test_wrong_arguments_are_refused(change, words):

@@ -217,7 +217,7 @@ def test_the_runs_of_a_batch_are_scored():
         [0, "timeout", *nothing, 4, 2.0, None],
     ]
     reasons = [run.outcome.reason for run in runs]
-    assert "movements for goals [1], wanted [1, 2, 3]" in reasons.pop(3)
+    assert "movements for goals [1]; it must" in reasons.pop(3)
     assert reasons == ["", "", "it reported ok, but returned no solution", "too slow"]
     better = replace(runs[0].outcome, rewards=[None, -310, -319, -319])  # than the solution
     downsampled = replace(runs[0], outcome=better).downsample()

@@ -63,7 +63,7 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
 @pytest.mark.parametrize(
     ("movements", "words"),
     [
-        (planned(posture(1.0)), "movements for goals [1], wanted [1, 2]"),
+        (planned(posture(1.0)), "movements for goals [1]; it must"),
         (planned([0.0] * 9, posture(1.0)), "goal 1: configuration has shape (9,)"),
         (planned(posture(np.nan), posture(1.0)), "goal 1: configuration"),
         (
@@ -72,12 +72,15 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
         ),
         (planned(posture(1.0), posture(2.0), hand="left"), "has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
-        ([Movement(None, "right", "planned", WAY[0])], "it must be a whole number"),
-        ([Movement(1, "right", "jump", np.zeros(10))], "unknown kind 'jump'"),
+        ([Movement(None, "right", "planned", WAY[0])], "it must be an integer"),
+        ([Movement(1, "right", "jump", np.zeros(10))], "kind of a movement is 'jump'"),
         ([Movement(1, "right", "path", waypoints=[])], "a path needs waypoints"),
         ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),
         ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "target is its last waypoint"),
-        ([Movement(1, "right", "planned", WAY[0], waypoints=WAY)], "movement has no waypoints"),
+        (
+            [Movement(1, "right", "planned", WAY[0], waypoints=WAY)],
+            "movement cannot have waypoints",
+        ),
     ],
 )
 def test_solutions_that_break_the_rules(movements, words):
@@ -107,7 +110,7 @@ def test_a_base_that_a_solver_moves_a_little_is_held():
 
 def test_a_goal_is_hit_by_one_hand():
     both = [Movement(1, hand, "planned", np.zeros(10)) for hand in ("left", "right")]
-    with pytest.raises(CoarticError, match="goal 1: two hands for one goal"):
+    with pytest.raises(CoarticError, match="goal 1: movements have different hands"):
         execute(tiny_task(), both)
 
 

@@ -244,7 +244,7 @@ def _nearest_posture(
     for hand in learner.hands:
         run.hand = hand
         fill_row(run.target, run.q)
-        load(batch.at[0], 0, n, run, arm_of(robot, hand))
+        load(batch.slots[0], 0, n, run, arm_of(robot, hand))
         correct_slots(batch, 1, robot)
         workspace.counts[n, ITERATIONS] += run.iterations
         square = squared_distance(run)

@@ -1,2 +1,4 @@
-"""Motion of the robot: kernels, the corrective process, trials, and execution of solutions. It
-knows robot, model and task, and no method."""
+"""Motion of the robot: kernels, corrective process, trials, execution of solutions.
+
+This package knows robot, model and task, but not methods.
+"""

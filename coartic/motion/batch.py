@@ -1,12 +1,14 @@
-"""Many arms side by side: the arrays on which the compiled kernels work.
+"""Arrays with which the compiled kernels move many arms side by side.
 
-A *run* is a robot that makes a trial, a record of the batch. A *slot* holds the arm of a run while
-it moves or is corrected. The innermost loop of a kernel runs over slots, so that the compiler makes
-vector instructions of it; the number of links belongs to the type of the rows, so that loops over
-links are unrolled. No operation mixes slots and none is reordered or fused: the result of a slot
-does not depend on other slots, on their number or on the width of the vectors.
+A *run* is a robot that makes a trial; a batch has a record for each run. A *slot* holds the arm of
+a run while it moves or is corrected. The innermost loop of a kernel runs over slots, so that the
+compiler turns it into vector instructions. The number of links belongs to the type of the rows, so
+that loops over links are unrolled. No operation mixes slots, and none is reordered or fused. The
+result of a slot therefore depends neither on other slots nor on their number or the width of the
+vectors.
 
-Robot parameters are one record: Numba looks at every field of a tuple each time a kernel is called.
+Robot parameters are one record, because Numba looks at every field of a tuple each time it calls a
+kernel.
 """
 
 from __future__ import annotations
@@ -24,28 +26,32 @@ from coartic.robot import BASE_DOF, HANDS, Arm, Robot
 
 SLOTS = 72
 """Number of slots of a batch: few enough to stay in the processor's innermost cache."""
-_VECTOR = 8  # slots that vectors hold; SLOTS is a multiple of it
+_VECTOR = 8  # number of slots in a vector; SLOTS is a multiple of it
 GOING = 0.0
-"""Status of a slot that has not ended."""
+"""Status of a slot whose movement or correction goes on."""
 RobotRecord = Any
-"""Record of a robot, its task's limits and the model, for kernels (:func:`robot_parameters`)."""
+"""Record of robot, limits of its task and model for kernels (:func:`robot_parameters`)."""
 RunRecord = Any
-"""Record of a run, a robot that makes a trial (:func:`batch_for`)."""
+"""Record of a run, that is, a robot that makes a trial (:func:`batch_for`)."""
 SlotArrays = Any
-"""Record of the slots' arrays by name, whose last axis is the slot (:func:`layout`)."""
+"""Record of the slots' arrays by name; the last axis of each array is the slot (:func:`layout`)."""
 
 
 def _links_for(robot: Robot) -> int:
-    """Return the number of links per arm for which the kernels of a robot are compiled, so that
-    most robots share machine code: 4 or 8 if no arm has more links, else :attr:`Robot.max_links`.
+    """Return the number of links per arm for which a robot's kernels are compiled.
+
+    It is 4 or 8 if no arm has more links, so that most robots share machine code, and otherwise
+    :attr:`Robot.max_links`.
     """
     return 4 if robot.max_links <= 4 else max(robot.max_links, 8)
 
 
 def width_of(robot: Robot) -> int:
-    """Return the number of entries of a robot's configuration in records of kernels: the ``dof``
-    entries of the robot, then unused ones up to a base and two arms of :func:`_links_for` links
-    each."""
+    """Return the number of entries of a robot's configuration in records of kernels.
+
+    The ``dof`` entries of the robot come first. Unused entries follow, up to a base and two arms of
+    :func:`_links_for` links each.
+    """
     return BASE_DOF + 2 * _links_for(robot)
 
 
@@ -78,16 +84,34 @@ def robot_parameters(
     model: MotionModel = PAPER,
     checks: bool = True,
 ) -> NDArray[np.void]:
-    """Return robot, constants and options for kernels as one record, in an array of shape ``(1,)``.
+    """Return robot, constants and options as a record for kernels.
+
     The array is cached: copy it before you change it.
 
-    ``radius`` is the radius of the goals, length unit. The corrective process does not change base
-    coordinates in ``locked_base``. With ``checks``, an arm without a target stays if its hand is in
-    its goal already; without, the corrective process begins at once. Raises ValueError for a lock
-    other than "x" and "y".
+    Parameters
+    ----------
+    robot : Robot
+    radius : float
+        Radius of the goals, length unit.
+    locked_base : tuple of {"x", "y"}
+        Coordinates of the base that the corrective process does not change.
+    model : MotionModel
+    checks : bool
+        True if an arm without a target stays when its hand is in the goal already; False if the
+        corrective process begins at once.
+
+    Returns
+    -------
+    ndarray, shape (1,)
+        The record.
+
+    Raises
+    ------
+    ValueError
+        ``locked_base`` has an entry other than ``"x"`` and ``"y"``.
     """
     if not set(locked_base) <= {"x", "y"}:
-        raise ValueError(f"locked_base is {locked_base!r}; it may name 'x' and 'y'")
+        raise ValueError(f"locked_base is {locked_base!r}; it may only have 'x' and 'y'")
     parameters = np.zeros(1, _parameters_type(_links_for(robot)))
     for hand, arm in zip(HANDS, parameters["arms"][0], strict=True):
         first_joint, links, *shoulder = robot.arm(hand)
@@ -103,8 +127,10 @@ def robot_parameters(
 
 @inlined
 def arm_of(robot: RobotRecord, hand: int) -> Arm:
-    """Return the :class:`Arm` of a hand (0 left, 1 right) from a record of
-    :func:`robot_parameters`; its links share memory with the record."""
+    """Return the :class:`Arm` of a hand (0 left, 1 right) from the record of a robot.
+
+    Its links share memory with the record, which comes from :func:`robot_parameters`.
+    """
     arm = robot.arms[hand]
     return Arm(arm.first_joint, arm.links[: arm.count], arm.shoulder_x, arm.shoulder_y)
 
@@ -117,49 +143,62 @@ class Batch(NamedTuple):
 
     runs: Any
     """Records of the N runs, shape ``(N,)``."""
-    at: Any
-    """The rows of the slots, by name (:func:`layout`): a record in an array of shape ``(1,)``."""
+    slots: Any
+    """The rows of the slots by name (:func:`layout`): a record in an array of shape ``(1,)``."""
     corrected: Any
-    """The rows in ``at`` with all that a correction needs, in the same memory, shape ``(rows,
-    SLOTS)``. Only to be copied: some rows are integers."""
+    """The rows of ``slots`` that a correction needs, in the same memory, shape ``(rows, SLOTS)``.
+    Only copy columns: some rows hold integers."""
     moved: Any
-    """The rows in ``at`` with all that a movement needs, likewise."""
+    """The rows of ``slots`` that a movement needs, in the same form."""
 
 
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
-    """Return a new batch for kernels: ``count`` records of runs, with room for the links of
-    ``robot``, and the arrays of 72 slots (:data:`SLOTS`), all entries 0. Each run needs a slot, so
-    kernels take at most 72 runs."""
+    """Return a new batch for kernels, with all entries 0.
+
+    It has ``count`` records of runs with room for the links of ``robot``, and arrays of 72 slots
+    (:data:`SLOTS`). Each run needs a slot, so a kernel moves at most 72 runs at a time.
+    """
     width = width_of(robot)
     fields = {
         "q": (np.float64, width),  # where the robot is, length unit and rad
-        "target": (np.float64, width),  # where it is to go, or where the correction has ended
-        "preferred": (np.float64, width),  # posture that information prefers, length unit and rad
-        "drift": np.float64,  # share of the way to it by which the mean of exploration moves
-        "pull": np.float64,  # share that an iteration of the corrective process adds
+        "target": (np.float64, width),  # of a movement; where a correction has ended
+        "preferred": (np.float64, width),  # preferred posture, length unit and rad
+        "drift": np.float64,  # by what share of the path to it exploration's mean moves
+        "pull": np.float64,  # share of that path in an iteration of the corrective process
         "goal": (np.float64, 2),  # x and y, length unit
-        "hand": np.int64,  # that is to hit the goal: 0 left, 1 right
-        "action": np.int64,  # next: see coartic.motion.trial
+        "hand": np.int64,  # the hand that is to hit the goal: 0 left, 1 right
+        "action": np.int64,  # the next action: see coartic.motion.trial
         "corrects": np.bool_,  # True if the corrective process acts where a movement misses
-        "going": np.bool_,  # True if it has missed no goal so far
+        "going": np.bool_,  # True if the run has hit every goal so far
         "acting": np.bool_,  # True if the run is among those that are moved or corrected next
         "hit": np.bool_,  # True if the hand is within the goal's radius
-        "converged": np.bool_,  # True if the corrective process did
+        "converged": np.bool_,  # True if the corrective process has converged
         "ticks": np.int64,  # of the movement
         "iterations": np.int64,  # of the corrective process
         "evaluations": np.int64,  # of forward kinematics, since the last account
     }
     record, corrected, moved = layout(_links_for(robot))
-    at = np.zeros(1, record)
-    rows = at.view(np.float64).reshape(-1, SLOTS)
-    return Batch(np.zeros(count, record_type(fields)), at, rows[corrected], rows[moved])
+    slots = np.zeros(1, record)
+    rows = slots.view(np.float64).reshape(-1, SLOTS)
+    return Batch(np.zeros(count, record_type(fields)), slots, rows[corrected], rows[moved])
 
 
 @cache
 def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
-    """Return the NumPy type of :data:`SlotArrays` for arms with ``links`` links, and two slices of
-    its rows (a row has a number for each slot): rows with all that a correction needs, and rows
-    with all that a movement needs. Shorter arms end in links of length 0."""
+    """Return the type of :data:`SlotArrays`, and which of its rows are copied together.
+
+    Parameters
+    ----------
+    links : int
+        Number of links of each arm. Shorter arms end in links of length 0.
+
+    Returns
+    -------
+    record : dtype
+        The type of the record. A row has a number for each slot.
+    corrected, moved : slice
+        The rows that a correction needs, and the rows that a movement needs.
+    """
     joints = (BASE_DOF + links,)
     shapes = {
         "q": joints,  # base x and y, then the joints of the arm
@@ -173,8 +212,8 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "target": joints,
         "rate": (links,),  # of the absolute link angles, rad a step
         "base_rate": (2,),
-        "end": (2,),  # of the hand, where the target would put it
-        "distance": (),  # from start to target; its square, before the arm sets off
+        "end": (2,),  # position to which the target would bring the hand
+        "distance": (),  # from start to target; before divide_steps its square
         **dict.fromkeys(("step", "last", "slowness", "bend", "clearance"), ()),
         "x": (links + 1,),  # of shoulder, joints and hand
         "y": (links + 1,),
@@ -186,14 +225,16 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
     record = np.dtype(
         [(name, kinds.get(name, np.float64), (*shape, SLOTS)) for name, shape in shapes.items()]
     )
-    before = {name: place[1] // (8 * SLOTS) for name, place in (record.fields or {}).items()}
-    return record, slice(before["target"]), slice(before["run"], before["x"])
+    row_of = {name: field[1] // (8 * SLOTS) for name, field in (record.fields or {}).items()}
+    return record, slice(row_of["target"]), slice(row_of["run"], row_of["x"])
 
 
 @inlined
 def _copy_arm(row: Any, slot: int, q: Any, arm: Arm) -> None:
-    """Copy base and joints of ``arm`` from configuration ``q`` into column ``slot`` of ``row``,
-    shape ``(2 + links, slots)``, in place; entries of links that the arm lacks become 0."""
+    """Copy base and joints of an arm from configuration ``q`` into a column, in place.
+
+    ``row`` has shape ``(2 + links, slots)``. Entries of links that the arm does not have become 0.
+    """
     row[0, slot] = q[0]
     row[1, slot] = q[1]
     for k in range(len(row) - BASE_DOF):
@@ -201,16 +242,22 @@ def _copy_arm(row: Any, slot: int, q: Any, arm: Arm) -> None:
 
 
 @inlined
-def load(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
-    """Copy ``number``, goal, base and joints of ``run``, record ``number`` (from 0) of its batch,
-    and shoulder and links of its ``arm`` into column ``slot`` of the arrays ``at``, in place."""
-    at.run[slot], at.first_joint[slot], at.links[slot] = number, arm.first_joint, len(arm.links)
-    at.shoulder[0, slot] = arm.shoulder_x
-    at.shoulder[1, slot] = arm.shoulder_y
-    at.goal[0, slot], at.goal[1, slot] = run.goal[0], run.goal[1]
-    for k in range(len(at.length)):
-        at.length[k, slot] = arm.links[k] if k < len(arm.links) else 0.0
-    _copy_arm(at.q, slot, run.q, arm)
+def load(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
+    """Load a run into a slot, in place: its goal, its configuration and its arm.
+
+    ``number`` is the index of ``run`` in its batch, from 0.
+    """
+    slots.run[slot], slots.first_joint[slot], slots.links[slot] = (
+        number,
+        arm.first_joint,
+        len(arm.links),
+    )
+    slots.shoulder[0, slot] = arm.shoulder_x
+    slots.shoulder[1, slot] = arm.shoulder_y
+    slots.goal[0, slot], slots.goal[1, slot] = run.goal[0], run.goal[1]
+    for k in range(len(slots.length)):
+        slots.length[k, slot] = arm.links[k] if k < len(arm.links) else 0.0
+    _copy_arm(slots.q, slot, run.q, arm)
 
 
 @inlined
@@ -224,30 +271,37 @@ def squared_distance(run: RunRecord) -> float:
 
 
 @inlined
-def start(at: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
-    """Copy ``run``, record ``number`` (from 0) of its batch, into column ``slot`` of ``at``
-    (:func:`load`), and with it the start, the target and the squared joint-space distance of its
-    movement, so that :func:`move_slots` can make this movement."""
-    load(at, slot, number, run, arm)
-    _copy_arm(at.start, slot, run.q, arm)
-    _copy_arm(at.target, slot, run.target, arm)
-    at.distance[slot] = squared_distance(run)
+def start(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
+    """Load a run into a slot for a movement, in place, so that :func:`move_slots` can make it.
+
+    In addition to :func:`load`, this copies start and target and the squared joint-space distance
+    between them.
+    """
+    load(slots, slot, number, run, arm)
+    _copy_arm(slots.start, slot, run.q, arm)
+    _copy_arm(slots.target, slot, run.target, arm)
+    slots.distance[slot] = squared_distance(run)
 
 
 @inlined
-def store(at: SlotArrays, slot: int, q: Any) -> None:
-    """Copy the base and the joints of the arm in column ``slot`` of ``at`` into configuration
-    ``q``, in place; entries of the other arm stay."""
-    q[0] = at.q[0, slot]
-    q[1] = at.q[1, slot]
-    for k in range(at.links[slot]):
-        q[at.first_joint[slot] + k] = at.q[BASE_DOF + k, slot]
+def store(slots: SlotArrays, slot: int, q: Any) -> None:
+    """Copy base and joints of the arm in a slot into configuration ``q``, in place.
+
+    The entries of the other arm do not change.
+    """
+    q[0] = slots.q[0, slot]
+    q[1] = slots.q[1, slot]
+    for k in range(slots.links[slot]):
+        q[slots.first_joint[slot] + k] = slots.q[BASE_DOF + k, slot]
 
 
 @inlined
 def compact(rows: Any, slot: int, last: int) -> None:
-    """Copy column ``last`` of ``rows``, shape ``(rows, slots)``, over column ``slot``, in place:
-    the run in ``slot`` has ended, and the run in slot ``last`` takes its place."""
+    """Copy column ``last`` over column ``slot``, in place.
+
+    The run in ``slot`` has ended, and the run in slot ``last`` takes its place. ``rows`` has shape
+    ``(rows, slots)``.
+    """
     if slot != last:
         for row in range(len(rows)):
             rows[row, slot] = rows[row, last]
@@ -255,8 +309,10 @@ def compact(rows: Any, slot: int, last: int) -> None:
 
 @inner
 def padded_count(count: int) -> int:
-    """Return the number of slots to work on if ``count`` are in use: ``count`` itself for 0 and 1,
-    else ``count`` rounded up to whole vectors of 8 slots, whose last slots may hold no run."""
+    """Return the number of slots to work on if ``count`` are in use.
+
+    Counts above 1 are rounded up to whole vectors of 8 slots, whose last slots may hold no run.
+    """
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 
 
@@ -265,8 +321,10 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return an upper bound on the absolute angle from +x of every link of the arm in a slot
-    (column of ``q``), rad: the sum of the absolute angles of its joints."""
+    """Return an upper bound on the absolute angle of every link of the arm in a slot, rad.
+
+    It is the sum of the absolute angles of its joints. ``q`` has a column for each slot.
+    """
     total = 0.0
     for k in range(len(q) - BASE_DOF):
         total += abs(q[BASE_DOF + k, slot])
@@ -274,25 +332,29 @@ def winding(q: Any, slot: int) -> float:
 
 
 @inner
-def are_near(at: SlotArrays, count: int) -> bool:
-    """Return whether the absolute angle from +x of every link in the first ``count`` columns of
-    ``at``, and in columns that pad them (:func:`padded_count`), is certain to be below 1e5 rad
-    (:func:`winding`)."""
+def are_near(slots: SlotArrays, count: int) -> bool:
+    """Return whether all link angles in the first ``count`` slots are certainly below 1e5 rad.
+
+    Angles are absolute, from +x (:func:`winding`). Slots that pad the count are included
+    (:func:`padded_count`).
+    """
     far = 0
     for i in range(padded_count(count)):
-        far += 0 if winding(at.q, i) < LARGEST else 1
+        far += 0 if winding(slots.q, i) < LARGEST else 1
     return far == 0
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Return a kernel ``chains(at, count)`` that fills ``at.x`` and ``at.y`` in ``count`` columns
-    as :func:`place` does, by the functions ``cos`` and ``sin``."""
+    """Return a kernel that fills ``slots.x`` and ``slots.y`` by these functions.
+
+    Its arguments are the slots and the number of columns to fill (:func:`find_positions`).
+    """
 
     @inner
-    def chains(at: SlotArrays, count: int) -> None:
+    def chains(slots: SlotArrays, count: int) -> None:
         for i in range(count):
-            arm = Arm(BASE_DOF, at.length[:, i], at.shoulder[0, i], at.shoulder[1, i])
-            chain_by(at.q[:, i], arm, at.x[:, i], at.y[:, i], cos, sin)
+            arm = Arm(BASE_DOF, slots.length[:, i], slots.shoulder[0, i], slots.shoulder[1, i])
+            chain_by(slots.q[:, i], arm, slots.x[:, i], slots.y[:, i], cos, sin)
 
     return chains
 
@@ -302,11 +364,13 @@ _far_chains = _chains_by(cosine, sine)
 
 
 @inner
-def place(at: SlotArrays, count: int, near: bool) -> None:
-    """Fill the arrays ``x`` and ``y`` in the first ``count`` columns of ``at``, and in columns that
-    pad them, in place, with the places of shoulder, joints and hand, length unit, for the
-    configurations ``at.q``. ``near`` promises absolute link angles below 1e5 rad."""
+def find_positions(slots: SlotArrays, count: int, near: bool) -> None:
+    """Fill ``x`` and ``y`` of the first ``count`` slots for the configurations ``q``, in place.
+
+    These are the positions of shoulder, joints and hand, length unit. Slots that pad the count are
+    filled as well. Pass ``near`` as True only if all absolute link angles are below 1e5 rad.
+    """
     if near:
-        _near_chains(at, padded_count(count))
+        _near_chains(slots, padded_count(count))
     else:
-        _far_chains(at, padded_count(count))
+        _far_chains(slots, padded_count(count))

@@ -1,9 +1,9 @@
-"""Kernels: functions that Numba compiles when they are first called, and what kernels share.
+"""Kernels: functions that Numba compiles when they are first called.
 
-Numba is imported with the first call: a command that lists names needs no compiler. Machine code is
-kept on disk. Numba keys it by the file of the cached function alone, so that a change in a function
-from another file would go unnoticed. Here the folder of the machine code is named after a hash of
-the model's sources: changed sources, fresh code.
+Numba is imported with the first call, so that a command that only lists names needs no compiler.
+Machine code is stored on disk. Numba itself looks only at the file of the cached function, and
+would miss a change in a function from another file. Here the folder of the machine code is named
+after a hash of the model's sources, so that changed sources are compiled again.
 """
 
 from __future__ import annotations
@@ -33,16 +33,19 @@ from coartic.errors import CoarticError
 from coartic.robot import chain, lever
 
 PACKAGE = Path(__file__).parent.parent
-_KEPT_S = 30 * 24 * 3600.0  # how long machine code of other sources stays
+_KEPT_S = 30 * 24 * 3600.0  # time for which unused machine code of other sources is stored
 _LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
-_TOLD_S = 5.0  # wait for another process after which a message names the process
-_IMPORTING = Lock()  # LLVM takes an option once
+_TOLD_S = 5.0  # time after which a message names the process that is waited for
+_IMPORTING = Lock()  # an option of LLVM can be set only once
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def _hash_of_sources() -> str:
-    """Return the first 16 hex digits of a hash (SHA-256) of the model's sources: ``robot.py``,
-    ``model.py``, ``tasks/task.py`` and the modules of ``motion``, ``learner`` and ``method``."""
+    """Return 16 hex digits of the SHA-256 hash of the model's sources.
+
+    The sources are ``robot.py``, ``model.py``, ``tasks/task.py`` and the modules of ``motion``,
+    ``learner`` and ``method``.
+    """
     single = (PACKAGE / name for name in ("robot.py", "model.py", "tasks/task.py"))
     folders = ((PACKAGE / folder).glob("*.py") for folder in ("motion", "learner", "method"))
     files = sorted([*single, *(path for folder in folders for path in folder)])
@@ -55,7 +58,7 @@ FINGERPRINT = _hash_of_sources()
 
 
 class _Kernel:
-    """Function that Numba compiles when it is first called (:func:`_compile_kernel`)."""
+    """A function that Numba compiles when it is first called (:func:`_compile_kernel`)."""
 
     def __init__(self, kind: str, function: Callable[..., Any]) -> None:
         self.kind, self.function = kind, function
@@ -63,20 +66,28 @@ class _Kernel:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """Compiled function: a dispatcher of Numba, which compiles it, or reads its machine code,
-        when first called, or an intrinsic. Raises CoarticError as :func:`_compile_kernel` does."""
+        """The compiled function: a dispatcher of Numba, or an intrinsic.
+
+        A dispatcher compiles the function, or reads its machine code, when it is first called.
+        Raises CoarticError as :func:`_compile_kernel` does.
+        """
         return _compile_kernel(self.function, self.kind)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the compiled function, and return its result. Raises TypeError for a kernel that
-        only other kernels can call: Numba makes no way in from Python for it."""
+        """Call the compiled function, and return its result.
+
+        Raises TypeError for a kernel that only other kernels can call, because Numba makes no entry
+        from Python for it.
+        """
         if self.kind not in ("entry", "scalar"):
-            raise TypeError(f"{self.function.__name__} is called by kernels alone")
+            raise TypeError(f"{self.function.__name__} can only be called by other kernels")
         return self.dispatcher(*arguments)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an attribute of :attr:`dispatcher` that Numba asks for when another kernel calls
-        this kernel; raise AttributeError for other attributes."""
+        """Return an attribute of :attr:`dispatcher` that Numba needs when another kernel calls it.
+
+        Raises AttributeError for other attributes.
+        """
         if name in ("_numba_type_", "py_func", "targetoptions"):
             return getattr(self.dispatcher, name)
         raise AttributeError(f"a kernel has no attribute {name!r}")
@@ -88,16 +99,16 @@ def _decorator(kind: str) -> Callable[[F], F]:
 
 
 entry = _decorator("entry")
-"""A kernel that Python calls; its machine code is kept on disk."""
+"""A kernel that Python calls; its machine code is stored on disk."""
 inner = _decorator("inner")
 """A kernel that only other kernels call; a division by 0 gives infinity or NaN."""
 shared = _decorator("shared")
-"""An inner kernel that several entries call: its machine code is kept on disk, too."""
+"""An inner kernel that several entries call; its machine code is stored on disk as well."""
 inlined = _decorator("inlined")
-"""An inner kernel that becomes a part of its callers, with their error model: passing whole tables
-would cost, and loops over a shape are unrolled where it is known."""
+"""An inner kernel that becomes a part of its callers and has their error model. Calls with whole
+tables would take time, and loops over a known shape are unrolled."""
 scalar = _decorator("scalar")
-"""A kernel of numbers, which Python and compiled functions of others may call, too."""
+"""A kernel of numbers that Python, and functions compiled elsewhere, may call as well."""
 intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
 """A function that gives the type of a call in a kernel and builds its machine code."""
 
@@ -106,8 +117,10 @@ intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
-    """Return the NumPy type of an aligned record for kernels, from the types of its fields by name,
-    in this order."""
+    """Return the NumPy type of an aligned record for kernels.
+
+    ``fields`` has the types of its fields by name, in order.
+    """
     return np.dtype(list(fields.items()), align=True)
 
 
@@ -124,9 +137,11 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 
 
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
-    """Return the addresses with which kernels draw from N > 0 NumPy generators
-    (:func:`generator_at`), of state and two functions, shape ``(N, 3)``. The generators must
-    outlive the kernel's call."""
+    """Return the addresses through which kernels draw from N > 0 NumPy generators.
+
+    Shape ``(N, 3)``: the state and two functions of each generator, for :func:`generator_at`. The
+    generators must outlive the kernel's call.
+    """
     rows = [
         [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
         for c in (generator.bit_generator.ctypes for generator in generators)
@@ -136,9 +151,11 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 
 @intrinsic
 def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
-    """Return signature and builder of a call that makes, in a kernel, NumPy's generator from the
-    addresses of its state and drawing functions (:func:`addresses`): an intrinsic, whose arguments
-    are types of Numba."""
+    """Return signature and builder of a call that makes NumPy's generator in a kernel.
+
+    It makes the generator from the addresses of its state and drawing functions
+    (:func:`addresses`). As for every intrinsic, the arguments are types of Numba.
+    """
     from numba.core import cgutils, types
 
     kind = types.NumPyRandomGeneratorType("generator")
@@ -156,7 +173,7 @@ def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any
 
 @inner
 def generator_at(addresses: Any, run: int) -> Any:
-    """Return the NumPy generator of run ``run`` (from 0), from its row of :func:`addresses`."""
+    """Return the NumPy generator of run ``run`` (from 0) from its row of :func:`addresses`."""
     return _generator_of(addresses[run, 0], addresses[run, 1], addresses[run, 2])
 
 
@@ -171,32 +188,35 @@ def import_numba() -> Any:
 
 @cache
 def _set_up_numba() -> Any:
-    """Import Numba, set it up, and return the module. LLVM's options change only the speed of
-    kernels; in a program that has compiled something else with Numba before, they come too late."""
+    """Import Numba, set it up, and return the module.
+
+    LLVM's options change only the speed of kernels. They have no effect if the program has compiled
+    something else with Numba before.
+    """
     modules: dict[str, Any] = sys.modules
-    kept = {"yaml": modules["yaml"]} if "yaml" in modules else {}
-    modules["yaml"] = None  # no settings are read from a file in the folder where one stands
+    yaml_module = {"yaml": modules["yaml"]} if "yaml" in modules else {}
+    modules["yaml"] = None  # Numba then reads no settings from a file in the current folder
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "A Numba config file is found")
             from numba.core import config
     finally:
         del modules["yaml"]
-        modules.update(kept)
-    config._config_fname = ""  # nor before it compiles
+        modules.update(yaml_module)
+    config._config_fname = ""  # nor does it before it compiles
 
-    from llvmlite import binding  # which Numba brings, in the one version that it takes
+    from llvmlite import binding  # installed with Numba, in the version that Numba needs
 
-    # Loops over the links of an arm are unrolled, or the loop over slots around them could not be
-    # made of vector instructions: LLVM's own bound ends that at four links.
+    # Unroll loops over the links of an arm. Otherwise the loop over slots around them could not
+    # become vector instructions; LLVM's default bound stops unrolling at four links.
     binding.set_option("coartic", "-unroll-threshold=1000")
-    # No loop peeling: it would take the first slot out of a loop over whole vectors and leave seven
+    # No loop peeling: it would take one slot out of a loop over whole vectors and leave seven.
     binding.set_option("coartic", "-unroll-peel-max-count=0")
     import numba.extending
     from numba.core.codegen import get_host_cpu_features
 
-    # Vectors have 512 bits where there are any: on Intel's processors LLVM would prefer 256, with
-    # which kinematics take 1.5 times as long.
+    # Use vectors of 512 bits where the processor has them. On Intel's processors LLVM would prefer
+    # 256 bits, with which kinematics take 1.5 times as long.
     features = get_host_cpu_features()
     if config.CPU_FEATURES is None and "+avx512f" in features.split(","):
         config.CPU_FEATURES = f"{features},-prefer-256-bit"
@@ -204,61 +224,71 @@ def _set_up_numba() -> Any:
     def mangling_args(record: Any) -> tuple[str, tuple[int, ...]]:
         return "Record", (int(hashlib.sha256(record.name.encode()).hexdigest()[:15], 16),)
 
-    # Machine code on disk calls functions by names that say their types. Numba names a record by
-    # its number in the process that compiles, so a process that loads code of two such processes
-    # may call one's function with the other's record. The name of its fields holds everywhere.
+    # Machine code on disk calls functions by names that include the types of their arguments.
+    # Numba names a record type by its number in the process that compiles. A process that loads
+    # code from two such processes could call the function of one with the record of the other, so
+    # here a record type is named by its fields.
     numba.types.Record.mangling_args = property(mangling_args)
     from numba.core import inline_closurecall
 
-    # Numba copies an inlined function twice, block by block, and with each block all its variables:
-    # a third of the time. The blocks of our kernels share them, which Numba reads anew each time.
+    # Numba copies an inlined function twice, block by block, and with each block all its variables,
+    # which takes a third of the time. The blocks of this project's kernels share their variables.
     def copy_block(block: Any) -> Any:
-        ours = block.loc.filename.startswith(str(PACKAGE))
-        return copy.deepcopy(block, {id(block.scope): block.scope} if ours else {})
+        is_own = block.loc.filename.startswith(str(PACKAGE))
+        return copy.deepcopy(block, {id(block.scope): block.scope} if is_own else {})
 
     inline_closurecall.copy = SimpleNamespace(copy=copy.copy, deepcopy=copy_block)
     return numba
 
 
 def _compile_kernel(function: Callable[..., Any], kind: str) -> Any:
-    """Return the dispatcher or intrinsic that Numba makes of a function, by the decorator called
-    ``kind``. Raises CoarticError if environment variables keep Numba from compiling."""
+    """Return the dispatcher or intrinsic that Numba makes of a function.
+
+    ``kind`` is the name of its decorator. Raises CoarticError if environment variables keep Numba
+    from compiling.
+    """
     try:
         numba = import_numba()
     except ValueError as error:
-        words = f"Numba cannot begin ({error}): unset its variables, such as NUMBA_NUM_THREADS"
-        raise CoarticError(words) from None
+        raise CoarticError(
+            f"Numba cannot start ({error}): unset its environment variables, such as "
+            "NUMBA_NUM_THREADS"
+        ) from None
     if numba.config.DISABLE_JIT:
-        raise CoarticError("NUMBA_DISABLE_JIT is set: unset it, as coartic's kernels are compiled")
-    # Kernels allocate nothing and work on arrays that their caller holds, so that they need not
-    # count references to them (NRT, Numba's run time): counting takes a quarter of the time.
+        raise CoarticError(
+            "NUMBA_DISABLE_JIT is set: unset it, because coartic's kernels have to be compiled"
+        )
+    # Kernels allocate nothing and work on arrays that their caller holds. They need not count
+    # references (NRT, Numba's run time), which would take a quarter of the time.
     options: dict[str, Any] = {"nogil": True, "_nrt": False, "no_cfunc_wrapper": True}
     if kind in ("inner", "shared", "inlined"):
-        options["no_cpython_wrapper"] = True  # which would take as long to compile
+        options["no_cpython_wrapper"] = True  # the wrapper would take as long to compile
     match kind:
         case "entry":
             return _keep_on_disk(numba.njit(**options)(function), function)
         case "inner" | "shared":
             compiled = numba.njit(**options, error_model="numpy")(function)
-            # Not compiled again for literal integers such as count = 0.
+            # Do not compile again for literal integers such as count = 0.
             template, unliteral = compiled.get_call_template, numba.types.unliteral
-            compiled.get_call_template = lambda given, names: template(
-                tuple(map(unliteral, given)), names
+            compiled.get_call_template = lambda types, names: template(
+                tuple(map(unliteral, types)), names
             )
             return _keep_on_disk(compiled, function) if kind == "shared" else compiled
         case "inlined":
             return numba.njit(**options, inline="always")(function)
         case "scalar":
             return numba.njit(nogil=True)(function)
-    made, context = numba.extending.intrinsic(function), numba.core.registry.cpu_target
-    context.typing_context.refresh()  # which then knows it
-    made._numba_type_ = context.typing_context.resolve_value_type(made)
-    return made
+    builder, context = numba.extending.intrinsic(function), numba.core.registry.cpu_target
+    context.typing_context.refresh()  # so that it knows the intrinsic
+    builder._numba_type_ = context.typing_context.resolve_value_type(builder)
+    return builder
 
 
 def _keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
-    """Return the compiled function itself, changed so that its machine code is read from disk and
-    kept there, if a folder can be written."""
+    """Make a compiled function read and store its machine code on disk, and return it.
+
+    It is returned unchanged if no folder can be written.
+    """
     folder, config = _cache_folder(), import_numba().config
     if folder is not None:
         before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
@@ -270,14 +300,17 @@ def _keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
 
 
 def _cache_folder() -> Path | None:
-    """Return the folder for machine code of these sources, which is made if it is missing; None if
-    no folder is writable. Old folders next to it are removed (:func:`_remove_old`)."""
+    """Return the folder for machine code of these sources, or None if none is writable.
+
+    The folder is made if it does not exist. Old folders next to it are removed
+    (:func:`_remove_old`).
+    """
     roots, chosen = [PACKAGE / "__pycache__"], import_numba().config.CACHE_DIR
-    if Path(chosen).is_absolute():  # or it would change with where one stands
+    if Path(chosen).is_absolute():  # a relative folder would change with the current folder
         roots.insert(0, Path(chosen) / "coartic")
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    if Path(given).is_absolute():
-        roots.append(Path(given) / "coartic")
+    cache_home = os.environ.get("XDG_CACHE_HOME", "")
+    if Path(cache_home).is_absolute():
+        roots.append(Path(cache_home) / "coartic")
     else:
         with contextlib.suppress(RuntimeError):  # a user without a home
             roots.append(Path.home() / ".cache" / "coartic")
@@ -292,8 +325,11 @@ def _cache_folder() -> Path | None:
 
 
 def _remove_old(root: Path, current: Path) -> None:
-    """Remove the folders of machine code in ``root`` that no process has begun to use for 30 days;
-    ``current`` counts as used now, whatever the clock says."""
+    """Remove folders of machine code that no process has begun to use for 30 days.
+
+    The folders are looked for in ``root``. Folder ``current`` counts as used now, whatever the
+    clock says.
+    """
     with contextlib.suppress(OSError):
         os.utime(current)
     for folder in root.glob(f"kernel-{'[0-9a-f]' * 16}"):
@@ -304,15 +340,15 @@ def _remove_old(root: Path, current: Path) -> None:
 
 @cache
 def _log_once(message: str) -> None:
-    """Log a message (logger ``coartic``, level info), each text once a process."""
+    """Log a message once per process (logger ``coartic``, level info)."""
     logging.getLogger("coartic").info(message)
 
 
 class _MachineCode:
-    """Machine code of a function on disk, as Numba's dispatchers ask for it.
+    """Machine code of a function on disk, in the form in which Numba's dispatchers ask for it.
 
-    Of processes that lack the same code one compiles the code and the others wait, at most 120 s,
-    if files can be locked. Code that is damaged or cannot be kept is compiled again.
+    If several processes need the same code, one compiles it and the others wait, at most 120 s,
+    provided that files can be locked. Code that is damaged or cannot be stored is compiled again.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -324,13 +360,17 @@ class _MachineCode:
         self.lock: IO[bytes] | None = None  # held while this process compiles
 
     def load_overload(self, *wanted: Any) -> Any:
-        """Return the machine code of a signature (``wanted``, as Numba passes it) from disk,
-        waiting for a process that compiles it (:meth:`wait_for_lock`); None, with a log message the
-        first time, if this process is to compile it."""
+        """Return the machine code of a signature from disk, or None if this process is to compile
+        it.
+
+        It waits for another process that compiles the same code (:meth:`wait_for_lock`). The first
+        time that code is to be compiled, a message is logged. ``wanted`` is the signature as Numba
+        passes it.
+        """
         self.unlock()
         code = self.load(*wanted)
         if code is None and self.wait_for_lock():
-            code = self.load(*wanted)  # somebody may have compiled it meanwhile
+            code = self.load(*wanted)  # another process may have compiled it meanwhile
             if code is not None:
                 self.unlock()
         if code is None:
@@ -338,27 +378,32 @@ class _MachineCode:
         return code
 
     def load(self, *wanted: Any) -> Any:
-        """Return the machine code of a signature (``wanted``, as Numba passes it) from disk; None
-        if it is not there or its file does not open, or if it is damaged, which empties the index
-        of the function's code."""
+        """Return the machine code of a signature from disk, or None if there is none.
+
+        If the file cannot be opened or is damaged, the index of the function's code is emptied.
+        ``wanted`` is the signature as Numba passes it.
+        """
         try:
-            # Not load_overload, which first lists all that Numba could compile.
+            # Not load_overload, which first lists everything that Numba could compile.
             return self.files._load_overload(*wanted)
-        except Exception:  # an unpickler may say anything
+        except Exception:  # an unpickler may raise any error
             with contextlib.suppress(OSError):
                 self.files.flush()
             return None
 
     def save_overload(self, *compiled: Any) -> None:
-        """Keep compiled code, as Numba passes it, on disk if possible, and release the lock."""
+        """Store compiled code, as Numba passes it, on disk if possible, and release the lock."""
         with contextlib.suppress(Exception):
             self.files.save_overload(*compiled)
         self.unlock()
 
     def wait_for_lock(self) -> bool:
-        """Lock this function's code for this process, whose id the file of the lock gets unless the
-        disk is full, and return True; return False if it cannot be locked, or another process holds
-        the lock for more than 120 s. A log message names that process after 5 s."""
+        """Lock this function's code for this process, and return whether that succeeded.
+
+        The process id is written into the lock file, unless the disk is full. The lock fails if the
+        file cannot be locked, or if another process holds it for more than 120 s. After 5 s a
+        message names that process.
+        """
         with contextlib.suppress(OSError):
             file = open(f"{self.cache_path}/{self.name}.lock", "a+b", buffering=0)  # noqa: SIM115
             for tries in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
@@ -372,8 +417,8 @@ class _MachineCode:
                 time.sleep(_RETRY_S)
                 if tries == round(_TOLD_S / _RETRY_S):
                     process = os.pread(file.fileno(), 20, 0).decode(errors="replace")
-                    held = f"which compiles, or is stopped: it holds {file.name}"
-                    _log_once(f"Waiting for process {process}, {held}")
+                    state = f"which compiles, or is stopped: it holds {file.name}"
+                    _log_once(f"Waiting for process {process}, {state}")
             file.close()
         return False
 

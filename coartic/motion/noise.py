@@ -1,9 +1,9 @@
-"""Motor noise: execute solutions that miss their targets at random.
+"""Motor noise: execute solutions whose movements miss their targets at random.
 
 :func:`execute_noisy` makes the movements of a solution as :func:`coartic.execute` does, except that
-each movement ends near its target instead of at it. Robots that execute one solution, each with its
-own noise, move side by side: compiled kernels make straight movements and corrections, and paths
-are followed one after the other.
+each movement ends near its target instead of at it. Robots that execute the same solution, each
+with its own noise, move side by side. Compiled kernels make straight movements and corrections;
+paths are followed one after the other.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from coartic.tasks.task import Task
 
 Flags = NDArray[np.bool_]
 MOST_CORRECTIONS = 50
-"""Corrective movements for one goal after which an execution with noise has failed."""
+"""Most corrective movements for one goal; an execution with noise that needs more fails."""
 _MOST_NOISE = 100.0  # standard deviation, length unit and rad
 _STAYS = 1e-9  # change up to which a coordinate does not move, length unit or rad
-_FIND, _FOLLOW = 4, 5  # actions beside MOVE and REPEAT: find a correction, follow a path
+_FIND, _FOLLOW = 4, 5  # further actions: find a correction, follow a path
 _ACTIONS = {"learned": MOVE, "planned": MOVE, "corrective": REPEAT, "path": _FOLLOW}
 
 
@@ -136,12 +136,12 @@ def execute_noisy(
     compiled = compiled_task(as_task(task), model)
     plans = [_plan_of(compiled.task, k, solution) for k, solution in enumerate(solutions)]
     generators = _generators(seed, len(plans))
-    alone, robots = _Robots(compiled, 1), _Robots(compiled, int(repeats))
+    exact, robots = _Robots(compiled, 1), _Robots(compiled, int(repeats))
     ticks = np.empty((len(plans), robots.count))
     for k, (plan, rng) in enumerate(zip(plans, generators, strict=True)):
-        aims = _execute_exactly(alone, plan)
-        _check_ticks(compiled.task, k, plan, alone.ticks[0])
-        ticks[k] = alone.ticks
+        aims = _execute_exactly(exact, plan)
+        _check_ticks(compiled.task, k, plan, exact.ticks[0])
+        ticks[k] = exact.ticks
         if motor_noise > 0.0:
             _execute_noisily(robots, plan, aims, _Noise(float(motor_noise), signal_dependent, rng))
             ticks[k] = robots.ticks
@@ -188,8 +188,11 @@ class _Robots:
         """Ticks of each execution so far, shape ``(count,)``; NaN once it has failed."""
 
     def goals(self, plan: Plan) -> Iterator[tuple[int, list[Movement]]]:
-        """Start at the task's start, and yield the index of each goal of a solution with the
-        movements for it, once it is the present goal. After the caller's movements, go on."""
+        """Start at the task's start, and yield each goal's index with the movements for it.
+
+        When an index is yielded, this goal is the present goal. The caller makes the movements
+        before it goes on.
+        """
         runs, task = self.batch.runs, self.compiled.task
         self.q[:], self.ticks[:] = task.q0, 0.0
         for index, movements in enumerate(plan):
@@ -202,12 +205,14 @@ class _Robots:
 
     @property
     def due(self) -> Flags:
-        """Which executions go on and have not hit the present goal, shape ``(count,)``."""
+        """Executions that go on and have not hit the present goal, shape ``(count,)``."""
         return ~self.hit & ~np.isnan(self.ticks)
 
     def aim(self, aim: _Aim, misses: Array) -> None:
-        """Make a movement with the robots that are due. It misses its end by ``misses``, shape
-        ``(count, dof)``, in the coordinates that move."""
+        """Make a movement with the robots that are due.
+
+        It misses its end by ``misses``, shape ``(count, dof)``, in the coordinates that move.
+        """
         if aim.action != _FOLLOW:
             self.targets[:] = np.where(aim.moves, aim.points + misses, self.q)
             self._move(aim.action)
@@ -218,13 +223,16 @@ class _Robots:
             run, q = self.batch.runs[n], self.q[n]
             points = np.where(aim.moves, aim.points + shares * misses[n], q)
             hand, goal = HANDS[run["hand"]], tuple(run["goal"])
-            made = follow(task.robot, q, points, hand, goal, task.radius, model=self.compiled.model)
-            self.q[n], self.hit[n] = made.q, made.hit
-            self.ticks[n] += made.ticks
+            model = self.compiled.model
+            result = follow(task.robot, q, points, hand, goal, task.radius, model=model)
+            self.q[n], self.hit[n] = result.q, result.hit
+            self.ticks[n] += result.ticks
 
     def correct(self, hand: Hand, noise: _Noise) -> None:
-        """Correct the robots that are due until they hit the goal. An execution fails where the
-        corrective process does not converge, and after 50 corrections."""
+        """Correct the robots that are due until they hit the goal.
+
+        An execution fails if the corrective process does not converge, or after 50 corrections.
+        """
         task = self.compiled.task
         free = np.zeros(task.robot.dof, dtype=np.bool_)
         free[:BASE_DOF] = [axis not in task.locked_base for axis in "xy"]
@@ -236,14 +244,14 @@ class _Robots:
             self.act(_FIND, due)
             self.ticks[due & ~self.batch.runs["converged"]] = np.nan
             due = self.due
-            found = self.targets[due]
-            misses = noise.sd * noise.rng.standard_normal(found.shape)
-            self.targets[due] = found + free * misses * _scale(found - self.q[due])
+            targets = self.targets[due]
+            misses = noise.sd * noise.rng.standard_normal(targets.shape)
+            self.targets[due] = targets + free * misses * _scale(targets - self.q[due])
             self._move(REPEAT)
         self.ticks[self.due] = np.nan
 
     def _move(self, action: int) -> None:
-        """Move the robots that are due straight to their targets, and pay the ticks."""
+        """Move the robots that are due straight to their targets, and count the ticks."""
         due = self.due
         self.act(action, due)
         self.ticks[due] += self.batch.runs["ticks"][due]
@@ -255,8 +263,11 @@ class _Robots:
 
 
 def _execute_exactly(robot: _Robots, plan: Plan) -> list[list[_Aim]]:
-    """Execute a solution with one robot and without noise. Return its aimed movements by goal, with
-    the coordinates that they move: the movements before the corrective process acts."""
+    """Execute a solution with one robot and without noise, and return its aimed movements.
+
+    The list has, for each goal, the movements before the corrective process acts, with the
+    coordinates that they move.
+    """
     aims = list[list[_Aim]]()
     exactly = _Noise(0.0, False, np.random.default_rng(0))
     for index, movements in robot.goals(plan):
@@ -275,13 +286,16 @@ def _execute_exactly(robot: _Robots, plan: Plan) -> list[list[_Aim]]:
 
 
 def _is_by_process(robot: _Robots, movement: Movement) -> bool:
-    """Return whether the target of a corrective movement is that of the corrective process, from
-    where a robot stands, to 1e-9: also where it has none, or the movement is not made."""
+    """Return whether a corrective movement has the target that the corrective process finds.
+
+    Targets are compared to 1e-9, from where the robot stands. True if the movement has no target or
+    is not made.
+    """
     if movement.target is None or not robot.due[0]:
         return True
     robot.act(_FIND, robot.due)
-    found = bool(robot.batch.runs["converged"][0])
-    return found and bool(np.abs(robot.targets - movement.target).max() <= _STAYS)
+    converged = bool(robot.batch.runs["converged"][0])
+    return converged and bool(np.abs(robot.targets - movement.target).max() <= _STAYS)
 
 
 def _execute_noisily(robots: _Robots, plan: Plan, aims: list[list[_Aim]], noise: _Noise) -> None:
@@ -305,22 +319,26 @@ def _scale(changes: Array) -> Array:
 
 @entry
 def _act_kernel(action: int, robot: NDArray[np.void], batch: Batch) -> None:
-    """Let the runs of ``batch`` whose ``acting`` is True act, 72 at a time, in place: move straight
-    to their targets, and stop on arrival, too (``MOVE``), or not (``REPEAT``); or set their targets
-    to where the corrective process ends, and ``converged`` (``_FIND``). ``robot`` comes from
-    :func:`coartic.motion.batch.robot_parameters`."""
-    at, slot, last = batch.at[0], 0, len(batch.runs) - 1
+    """Let the runs of a batch whose ``acting`` is True act, 72 at a time, in place.
+
+    - ``MOVE``: move straight to the target, and stop on a hit or on arrival;
+    - ``REPEAT``: move straight to the target, and stop on a hit;
+    - ``_FIND``: set the target to where the corrective process ends, and set ``converged``.
+
+    ``robot`` comes from :func:`coartic.motion.batch.robot_parameters`.
+    """
+    slots, slot, last_run = batch.slots[0], 0, len(batch.runs) - 1
     for i in range(len(batch.runs)):
         run = batch.runs[i]
         if run.acting:
             arm = arm_of(robot[0], run.hand)
             if action == _FIND:
                 fill_row(run.target, run.q)
-                load(at, slot, i, run, arm)
+                load(slots, slot, i, run, arm)
             else:
-                start(at, slot, i, run, arm)
+                start(slots, slot, i, run, arm)
             slot += 1
-        if slot == SLOTS or (i == last and slot > 0):
+        if slot == SLOTS or (i == last_run and slot > 0):
             if action == _FIND:
                 correct_slots(batch, slot, robot[0])
             else:
@@ -329,8 +347,10 @@ def _act_kernel(action: int, robot: NDArray[np.void], batch: Batch) -> None:
 
 
 def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
-    """Return the movements of ``solutions[number]`` by goal. Raises SolutionError if it breaks the
-    task's rules."""
+    """Return the movements of ``solutions[number]`` by goal.
+
+    Raises SolutionError if the solution breaks the task's rules.
+    """
     try:
         return movements_by_goal(task, solution)
     except SolutionError as error:
@@ -338,29 +358,34 @@ def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
 
 
 def _check_ticks(task: Task, number: int, plan: Plan, ticks: float) -> None:
-    """Raise SolutionError if all movements of a solution have ticks, and these do not add up to the
-    ``ticks`` that it takes without noise (NaN if it fails)."""
+    """Check that a solution's movements have the ticks that they take without noise.
+
+    ``ticks`` is that number, NaN if the execution fails. Nothing is checked if a movement has no
+    ticks. Raises SolutionError.
+    """
     stored = [movement.ticks for movements in plan for movement in movements]
-    known = [each for each in stored if each is not None]
-    if len(known) == len(stored) and sum(known) != ticks:
-        taken = "it fails" if np.isnan(ticks) else f"they take {ticks:.0f}"
+    counts = [count for count in stored if count is not None]
+    if len(counts) == len(stored) and sum(counts) != ticks:
+        outcome = "it fails" if np.isnan(ticks) else f"they take {ticks:.0f}"
         raise SolutionError(
-            f"solutions[{number}]: its movements took {sum(known)} ticks; on task {task.name!r}, "
-            f"with this model and without noise, {taken}. Is the solution of another task?"
+            f"solutions[{number}]: its movements took {sum(counts)} ticks; on task {task.name!r}, "
+            f"with this model and without noise, {outcome}. Is the solution of another task?"
         )
 
 
 def _generators(seed: Any, count: int) -> list[np.random.Generator]:
-    """Return a new generator for each of ``count`` solutions, from a seed for each, or from one
-    seed for all. Raises ValueError for other seeds."""
+    """Return a new random generator for each of ``count`` solutions.
+
+    ``seed`` is a seed for each solution, or one seed for all. Raises ValueError for other seeds.
+    """
     if not isinstance(seed, Iterable):
         check_limits("seed", seed, 0, MOST_RUN_SEED)
         return [*map(np.random.default_rng, np.random.SeedSequence(int(seed)).spawn(count))]
     seeds = [*seed]
     if len(seeds) != count:
         raise ValueError(
-            f"seed has {len(seeds)} entries; it needs one for each of the {count} solutions"
+            f"seed has {len(seeds)} entries; it must have one for each of the {count} solutions"
         )
-    for each in seeds:
-        check_limits("seed", each, 0, MOST_RUN_SEED)
-    return [np.random.default_rng(int(each)) for each in seeds]
+    for value in seeds:
+        check_limits("seed", value, 0, MOST_RUN_SEED)
+    return [np.random.default_rng(int(value)) for value in seeds]

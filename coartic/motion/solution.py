@@ -1,9 +1,9 @@
 """Solutions: movements, and the one function that executes and scores them.
 
 A solution is a list of movements, at least one per goal. :func:`execute` makes them from the task's
-start by the rule of :mod:`coartic.motion.trial`, pays every tick, and has the corrective process
-finish any goal that they miss. Whatever a method says of its own solution, its score is the reward
-of this execution.
+start by the rule of :mod:`coartic.motion.trial` and counts every tick. The corrective process
+finishes any goal that they miss. Whatever a method says about its own solution, the score is the
+reward of this execution.
 """
 
 from __future__ import annotations
@@ -42,40 +42,46 @@ Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 HELD = 1e-6
 """Largest distance of a locked base coordinate of a target from its value at the start, length
-unit; solvers leave less."""
+unit. Solvers leave smaller differences."""
 
 
 @dataclass(frozen=True, eq=False)
 class Movement:
-    """Movement of a solution (:func:`execute`).
+    """A movement of a solution (:func:`execute`).
 
     Source: paper, section *Generating Movement for Each Goal*.
     """
 
     goal: int
-    """Number of the goal that the movement is made for, from 1 as in the paper."""
+    """Number of the goal for which the movement is made, from 1 as in the paper."""
     hand: Hand
     """The hand that is to hit the goal, ``"left"`` or ``"right"``."""
     kind: Kind
-    """``"learned"``, ``"planned"``, ``"corrective"`` or ``"path"``. Learned and planned movements
-    are straight in joint space and end on a hit or on arrival; a path follows its waypoints and
-    ends on a hit or at the last waypoint; a corrective movement is straight and ends on a hit or at
-    its target. The first movement for a goal, unless corrective, is always made; all others are
-    made only while the goal is not hit."""
+    """Kind of the movement:
+
+    - ``"learned"`` and ``"planned"`` movements are straight in joint space and end on a hit or on
+      arrival;
+    - a ``"path"`` follows its waypoints and ends on a hit or at the last waypoint;
+    - a ``"corrective"`` movement is straight and ends on a hit or at its target.
+
+    The first movement for a goal is always made, unless it is corrective. All other movements are
+    made only while the goal is not hit.
+    """
     target: Array | None = None
-    """Target configuration q^t, shape ``(dof,)``, length unit and rad; the last waypoint of a path.
-    None in a corrective movement has the corrective process find it when the time comes."""
+    """Target configuration q^t, shape ``(dof,)``, length unit and rad; for a path its last
+    waypoint. If a corrective movement has None, the corrective process finds the target during
+    execution."""
     ticks: int | None = None
-    """Control ticks of the movement; None before it is executed."""
+    """Control ticks of the movement; None before the movement is executed."""
     waypoints: Array | None = None
-    """Configurations that a path passes through in turn from where the robot stands, shape ``(k,
-    dof)``, length unit and rad; None for the other kinds."""
+    """Configurations through which a path passes in turn, shape ``(k, dof)``, length unit and rad;
+    None for the other kinds."""
     __eq__ = equal_contents
 
     def __post_init__(self) -> None:
-        for name, given in (("target", self.target), ("waypoints", self.waypoints)):
-            if given is not None:
-                real_array(name, given)
+        for name, value in (("target", self.target), ("waypoints", self.waypoints)):
+            if value is not None:
+                real_array(name, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,21 +89,21 @@ class Execution:
     """An executed solution (:func:`execute`)."""
 
     movements: tuple[Movement, ...]
-    """The movements as made, with targets and ticks, in order."""
+    """The movements that were made, in order, with targets and ticks."""
     configurations: Array
     """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, length unit and
     rad."""
     ticks: int
-    """Control ticks spent in all."""
+    """Total number of control ticks."""
     corrections: int
-    """Corrective movements made, of a tick or more."""
+    """Number of corrective movements that took a tick or more."""
     iterations: int = 0
-    """Iterations of the corrective process, one Jacobian each."""
+    """Iterations of the corrective process, with one Jacobian each."""
     evaluations: int = 0
-    """Forward-kinematics evaluations, of a correction its iterations + 1; a further evaluation for
-    each goal tried, or two unless its first movement is corrective."""
+    """Forward-kinematics evaluations. A correction takes its iterations + 1. Each goal tried takes
+    one more if its first movement is corrective, and otherwise two more."""
     reason: str = ""
-    """Sentence on why the task was not completed; empty if it was."""
+    """Sentence on why the task was not completed; empty if it was completed."""
     __eq__ = equal_contents
 
     @property
@@ -112,7 +118,7 @@ class Execution:
 
     @property
     def hands(self) -> str:
-        """Hand of each goal that has a movement, in the order of goals, such as ``"LRLR"``."""
+        """Hand of each goal that has a movement, in goal order, such as ``"LRLR"``."""
         return hands_in(self.movements)
 
     def ticks_by_goal(self) -> tuple[int, ...]:
@@ -138,8 +144,8 @@ def execute(
 ) -> Execution:
     """Execute a solution from the task's start and score it.
 
-    The corrective process corrects a goal that is still missed after its movements, from where the
-    robot stands, and the correction is paid for.
+    If a goal is still missed after its movements, the corrective process corrects it from where the
+    robot stands, and the ticks of this movement count.
 
     Parameters
     ----------
@@ -151,18 +157,21 @@ def execute(
     Returns
     -------
     Execution
-        Movements as made, configurations at the hits, control ticks and reward. Where the
-        corrective process does not converge, the execution ends: ``completed`` is False and
-        ``reason`` says so, and why that may be.
+        Movements made, configurations at the hits, control ticks and reward. If the corrective
+        process does not converge, the execution ends: ``completed`` is False, and ``reason`` says
+        at which goal.
 
     Raises
     ------
     TaskError, TypeError
         The task cannot be used, or ``task`` or ``model`` has another type.
     SolutionError
-        The solution breaks the task's rules: goals are missing or out of order, a hand is not the
-        task's, a target has the wrong shape or is not finite, a locked base moves by more
-        than 1e-6.
+        The solution breaks a rule of the task:
+
+        - goals are missing or out of order;
+        - the task does not have a movement's hand;
+        - a target has the wrong shape or is not finite;
+        - a locked base moves by more than 1e-6.
     ValueError
         A constant of the model is out of bounds.
 
@@ -177,17 +186,21 @@ def execute(
 
 
 def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
-    """Return the numbers, from 1 and in order, of the goals that have corrective movements only."""
-    kinds = {(movement.goal, movement.kind == "corrective") for movement in movements}
-    return tuple(sorted(goal for goal, alone in kinds if alone and (goal, False) not in kinds))
+    """Return the numbers of the goals, from 1, that have only corrective movements."""
+    goals, aimed = set[int](), set[int]()
+    for movement in movements:
+        (goals if movement.kind == "corrective" else aimed).add(movement.goal)
+    return tuple(sorted(goals - aimed))
 
 
 def execute_many(
     compiled: CompiledTask, solutions: Iterable[Iterable[Movement]]
 ) -> list[Execution | Refused]:
-    """Execute and score solutions of one task: solutions without paths side by side, solutions with
-    a path one by one. Return a list with, for each solution in order, its execution, or, in its
-    place, the error that :func:`execute` would raise for the solution."""
+    """Execute and score many solutions of one task, and return a list in their order.
+
+    For a solution that cannot be executed, the list has the error that :func:`execute` would raise.
+    Solutions without paths are executed side by side, solutions with a path one after the other.
+    """
     executions: list[Execution | Plan | Refused] = []
     for solution in solutions:
         try:
@@ -196,60 +209,78 @@ def execute_many(
             executions.append(error)
         else:
             kinds = {movement.kind for movements in plan for movement in movements}
-            executions.append(_make_one_by_one(compiled, plan) if "path" in kinds else plan)
-    plans = [each for each in executions if isinstance(each, list)]
-    straight = iter(_make_straight(compiled, plans))
-    return [next(straight) if isinstance(x, list) else x for x in executions]
+            executions.append(_execute_with_paths(compiled, plan) if "path" in kinds else plan)
+    plans = [item for item in executions if isinstance(item, list)]
+    straight = iter(_execute_straight(compiled, plans))
+    return [next(straight) if isinstance(item, list) else item for item in executions]
 
 
 Plan = list[list[Movement]]
-"""The movements of a solution, goal by goal; the plan of a suite is another thing."""
+"""The movements of a solution, goal by goal. (The plan of a suite is something else.)"""
 
 
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
-    """Return the ``movements`` for a goal before the first movement without a target, for which the
-    corrective process acts; before them None, a check of the hand, if the first is corrective."""
-    given: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
+    """Return the movements for a goal that have targets, up to the first one without.
+
+    From that one on the corrective process acts. If the first movement is corrective, the list
+    begins with None, which stands for a check of the hand.
+    """
+    aimed: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
         if movement.target is None:
             break
-        given.append(movement)
-    return given
+        aimed.append(movement)
+    return aimed
 
 
-def _make_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execution]:
+def _execute_straight(compiled: CompiledTask, plans: Sequence[Plan]) -> list[Execution]:
     """Execute plans without paths side by side, and return the executions in their order."""
     if not plans:
         return []
-    given = [[_with_targets(movements) for movements in plan] for plan in plans]
-    most = max([len(of_goal) for of_plan in given for of_goal in of_plan])
-    rows = [m for each in given for some in each for m in some + [None] * (most - len(some))]
+    requested = [[_with_targets(movements) for movements in plan] for plan in plans]
+    goals = [movements for plan in requested for movements in plan]
+    length = max(map(len, goals))
+    rows = [m for movements in goals for m in movements + [None] * (length - len(movements))]
     hands = [HANDS.index(movements[0].hand) for plan in plans for movements in plan]
-    stay, shape = [math.nan] * compiled.starts.shape[1], (len(plans), -1, most)
+    stay, shape = [math.nan] * compiled.starts.shape[1], (len(plans), -1, length)
     accounts = make_trials(
         compiled,
         np.array(hands).reshape(shape[:2]),
         np.array([stay if m is None else m.target for m in rows]).reshape(*shape, len(stay)),
         np.array([m is None or m.kind != "corrective" for m in rows]).reshape(shape),
     ).goals
-    made = movements_in(accounts, compiled.task.robot.dof, given)
-    goals = accounts[..., 0]
-    return [_execution_of(compiled, *each) for each in zip(plans, made, goals, strict=True)]
+    executed = movements_in(accounts, compiled.task.robot.dof, requested)
+    trials = zip(plans, executed, accounts[..., 0], strict=True)
+    return [_execution_of(compiled, *trial) for trial in trials]
 
 
 def movements_in(
-    accounts: NDArray[np.void], dof: int, given: Iterable[Iterable[Sequence[Movement | None]]]
+    accounts: NDArray[np.void], dof: int, requested: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
-    """Return a list for each of N trials, of the movements made for goals up to the first goal
-    missed, from the accounts of goals, shape ``(N, G, M)``; ``dof`` is the length of a
-    configuration. ``given`` has the movements to be made by trial and goal (:func:`_with_targets`),
-    from which the kinds come. A goal hit without a movement has a corrective movement of 0 ticks.
+    """Return the movements that were made in N trials, up to the first goal missed.
+
+    A goal that is hit without a movement has a corrective movement of 0 ticks.
+
+    Parameters
+    ----------
+    accounts : ndarray, shape (N, G, M)
+        Accounts of the goals.
+    dof : int
+        Length of a configuration.
+    requested : iterable of iterable of sequence of Movement or None
+        For each trial and goal the movements that were to be made (:func:`_with_targets`). The
+        kinds come from them.
+
+    Returns
+    -------
+    list of list of Movement
+        A list for each trial.
     """
     names = ("hand", "hit", "ticks", "corrections")
-    first = accounts[..., 0]
-    columns = [first[name].tolist() for name in names] + [accounts["moved"].tolist()]
+    goals = accounts[..., 0]
+    columns = [goals[name].tolist() for name in names] + [accounts["moved"].tolist()]
     targets, trials = accounts["target"][..., :dof], []
-    for n, of_trial in enumerate(given):
+    for n, of_trial in enumerate(requested):
         movements: list[Movement] = []
         of_goals = zip(of_trial, *[column[n] for column in columns], strict=True)
         for g, (of_goal, side, hit, total, corrections, moved) in enumerate(of_goals):
@@ -264,7 +295,7 @@ def movements_in(
                 movements.append(Movement(goal, hand, "corrective", corrected, ticks))
             if not hit:
                 break
-            if len(movements) == before:  # hit on the way: show the hand
+            if len(movements) == before:  # hit without a movement: record the hand
                 movements.append(
                     Movement(goal, hand, "corrective", accounts["q"][n, g, 0, :dof], 0)
                 )
@@ -272,51 +303,54 @@ def movements_in(
     return trials
 
 
-def _make_one_by_one(compiled: CompiledTask, plan: Plan) -> Execution:
-    """Execute a plan with paths, one movement after the other, and return the execution."""
+def _execute_with_paths(compiled: CompiledTask, plan: Plan) -> Execution:
+    """Execute a plan with paths, one movement after the other."""
     count_trials(1)
     task, q = compiled.task, compiled.starts[0]
     model = compiled.model.for_radius(task.radius)
-    made, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
+    executed, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
     for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
-        hand, before = movements[0].hand, len(made)
-        where, checks = (hand, goal, task.radius), movements[0].kind == "corrective"
+        hand, before = movements[0].hand, len(executed)
+        aim, checks = (hand, goal, task.radius), movements[0].kind == "corrective"
         iterations, evaluations = 0, int(checks)
-        hit = checks and move(task.robot, q, q, *where, model=model).hit
+        hit = checks and move(task.robot, q, q, *aim, model=model).hit
         for movement in [] if hit else [*movements, Movement(number, hand, "corrective")]:
             target, stops = movement.target, movement.kind != "corrective"
             if target is None:
                 locked = task.locked_base
-                found = correct(task.robot, q, hand, goal, locked_base=locked, model=model)
-                target, iterations = found.q, found.iterations
+                correction = correct(task.robot, q, hand, goal, locked_base=locked, model=model)
+                target, iterations = correction.q, correction.iterations
                 evaluations += iterations + 1
-                if not found.converged:
+                if not correction.converged:
                     break
             if movement.waypoints is None:
-                moved = move(task.robot, q, target, *where, stop_on_arrival=stops, model=model)
+                moved = move(task.robot, q, target, *aim, stop_on_arrival=stops, model=model)
             else:
-                moved = follow(task.robot, q, movement.waypoints, *where, model=model)
-            made.append(replace(movement, target=target, ticks=moved.ticks))
+                moved = follow(task.robot, q, movement.waypoints, *aim, model=model)
+            executed.append(replace(movement, target=target, ticks=moved.ticks))
             q, hit, evaluations = moved.q, moved.hit, evaluations + moved.evaluations
             if hit or movement.target is None:
                 break
-        if hit and len(made) == before:  # on the way: show the hand
-            made.append(Movement(number, hand, "corrective", q.copy(), 0))
+        if hit and len(executed) == before:  # hit without a movement: record the hand
+            executed.append(Movement(number, hand, "corrective", q.copy(), 0))
         account = goals[number - 1]
         account["q"][: len(q)], account["hand"], account["hit"] = q, HANDS.index(hand), hit
         account["iterations"], account["evaluations"] = iterations, evaluations
         if not hit:
             break
-    return _execution_of(compiled, plan, made, goals)
+    return _execution_of(compiled, plan, executed, goals)
 
 
 def _execution_of(
     compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
 ) -> Execution:
-    """Return the execution of a plan, the movements as given, from the ``movements`` as made, up to
-    the first goal missed, and the accounts of the ``goals``, shape ``(G,)``."""
+    """Return the execution of a plan from the movements and accounts of its trial.
+
+    ``movements`` are those that were made, up to the first goal missed; ``goals`` are the accounts,
+    shape ``(G,)``.
+    """
     hits = sum(goals["hit"].tolist())
-    # The place of the hand is known before the first movement, and where that leads.
+    # The position of the hand is evaluated before the first movement, and where that leads.
     checked = [2 - (of_goal[0].kind == "corrective") for of_goal in plan[: hits + 1]]
     return Execution(
         movements=tuple(movements),
@@ -330,15 +364,24 @@ def _execution_of(
 
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
-    """Return the joint travel of the idle arm, rad, summed over the goals: for each goal the
-    Euclidean distance of the joint angles of the arm that does not hit the goal from their values
-    at the hit before (for goal 1, at the start). ``hands`` has the hand for each goal, ``reached``
-    the configuration at each hit, ``(G, dof)``."""
+    """Compute the joint travel of the idle arm, rad, summed over the goals.
+
+    For each goal this is the Euclidean distance between the joint angles of the arm that does not
+    hit it, at this hit and at the hit before (for goal 1, at the start).
+
+    Parameters
+    ----------
+    task : Task
+    hands : iterable of {"left", "right"}
+        The hand for each goal.
+    reached : ndarray, shape (G, dof)
+        The configuration at each hit.
+    """
     travel, before = 0.0, task.q0
     for hand, q in zip(hands, reached, strict=True):
         joints = task.robot.joints("right" if hand == "left" else "left")
         square = 0.0
-        # In this order: a dot product of BLAS rounds as the processor's kernel happens to.
+        # Added in this order, because the rounding of a BLAS dot product depends on the processor.
         for difference in (q[joints] - before[joints]).tolist():
             square += difference * difference
         travel += math.sqrt(square)
@@ -347,12 +390,14 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
 
 
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
-    """Check a solution, and return a list of the movements for each goal, in the order of goals;
-    a path has its last waypoint as target, and locked base coordinates are as at the start.
-    Raises SolutionError for a solution that breaks the task's rules."""
+    """Check a solution, and return a list of the movements for each goal.
+
+    A path gets its last waypoint as target, and locked base coordinates their values at the start.
+    Raises SolutionError if the solution breaks the task's rules.
+    """
     if not isinstance(solution, Iterable):
         raise SolutionError(
-            f"task {task.name!r}: the solution is {brief_value(solution)}; needed is a list of "
+            f"task {task.name!r}: the solution is {brief_value(solution)}; it must be a list of "
             "movements"
         )
     plan: Plan = []
@@ -362,7 +407,7 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
         if not isinstance(movement.goal, (int, np.integer)):
             raise SolutionError(
                 f"task {task.name!r}: goal of a movement is {brief_value(movement.goal)}; it must "
-                "be a whole number"
+                "be an integer"
             )
         if not plan or plan[-1][0].goal != movement.goal:
             plan.append([])
@@ -370,36 +415,41 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
         try:
             of_goal.append(_check_movement(task, movement))
             if movement.hand != of_goal[0].hand:
-                raise SolutionError("two hands for one goal")
+                raise SolutionError("movements have different hands; a goal needs one hand")
         except (SolutionError, ValueError) as error:
-            where = f"task {task.name!r}, goal {movement.goal}"
-            raise SolutionError(f"{where}: {error}") from None
-    given, wanted = [each[0].goal for each in plan], list(range(1, len(task.goals) + 1))
-    if given != wanted:
-        raise SolutionError(f"task {task.name!r}: movements for goals {given}, wanted {wanted}")
+            raise SolutionError(f"task {task.name!r}, goal {movement.goal}: {error}") from None
+    numbers, expected = [movements[0].goal for movements in plan], [*range(1, len(task.goals) + 1)]
+    if numbers != expected:
+        raise SolutionError(
+            f"task {task.name!r}: the solution has movements for goals {numbers}; it must have "
+            f"movements for goals {expected}, in this order"
+        )
     return plan
 
 
 def _check_movement(task: Task, movement: Movement) -> Movement:
-    """Return the movement itself, or a copy with arrays as in :func:`movements_by_goal`. Raises
-    SolutionError or ValueError for a hand that the task does not have, for an unknown kind, and if
-    target or waypoints do not fit."""
+    """Check a movement's hand, kind, target and waypoints.
+
+    Return the movement itself, or a copy with arrays as in :func:`movements_by_goal`. Raises
+    SolutionError or ValueError if something does not fit.
+    """
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
     if not isinstance(movement.hand, str) or movement.hand not in task.hands:
-        known = " and ".join(map(repr, task.hands))
+        hands = " and ".join(map(repr, task.hands))
         hand = brief_value(movement.hand).strip("'")
-        raise SolutionError(f"task {task.name!r} has no {hand} hand; it has {known}")
+        raise SolutionError(f"task {task.name!r} has no {hand} hand; it has {hands}")
     if not isinstance(kind, str) or kind not in KINDS:
-        raise SolutionError(f"unknown kind {brief_value(kind)}; known: {KINDS}")
+        kinds = ", ".join(map(repr, KINDS))
+        raise SolutionError(f"kind of a movement is {brief_value(kind)}; it must be one of {kinds}")
     if kind == "path":
         if waypoints is None or not isinstance(waypoints, Iterable) or len([*waypoints]) == 0:
             raise SolutionError("a path needs waypoints, a list of configurations")
         path = np.array([_check_point(task, point) for point in waypoints], dtype=np.float64)
         if target is not None and not np.array_equal(target, waypoints[-1]):
-            raise SolutionError("a path's target is its last waypoint")
+            raise SolutionError("the target of a path must be None or its last waypoint")
         return replace(movement, target=path[-1], waypoints=path)
     if waypoints is not None:
-        raise SolutionError(f"a {kind} movement has no waypoints")
+        raise SolutionError(f"a {kind} movement cannot have waypoints; only a path can")
     if target is not None:
         held = _check_point(task, target)
         return movement if held is target else replace(movement, target=held)
@@ -409,11 +459,14 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
 
 
 def _check_point(task: Task, point: Any) -> Array:
-    """Return a configuration as an array ``(dof,)``: the array given, or a new array in which
-    locked base coordinates are as at the start. Raises ValueError if ``point`` is no configuration
-    of the robot, or moves a locked base coordinate by more than 1e-6."""
+    """Check a configuration, and return it as an array ``(dof,)``.
+
+    This is the array passed, or a new array if locked base coordinates have to be set to their
+    values at the start. Raises ValueError if ``point`` is not a configuration of the robot, or
+    moves a locked base coordinate by more than 1e-6.
+    """
     usual = type(point) is np.ndarray and point.dtype == np.float64
-    # A length is quick to compute, and not below a limit where an entry is NaN.
+    # The length is quick to compute; with a NaN entry it is not below any limit.
     if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
         point = configuration(task.robot, point)
     held: Array = point
@@ -424,9 +477,11 @@ def _check_point(task: Task, point: Any) -> Array:
 
 
 def _hold_base(task: Task, points: Array) -> Array:
-    """Set locked base coordinates of points, ``(..., dof)``, to their values at the start, in
-    place, and return ``points`` itself. Raises ValueError where one of them differs from the start
-    by more than :data:`HELD`, 1e-6 length units; NaN stays."""
+    """Set locked base coordinates of points to their values at the start, in place.
+
+    ``points`` has shape ``(..., dof)`` and is returned; NaN stays. Raises ValueError if a
+    coordinate differs from the start by more than :data:`HELD`, 1e-6 length units.
+    """
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)
         moved = np.abs(points[..., k] - task.q0[k])
@@ -440,16 +495,18 @@ def _hold_base(task: Task, points: Array) -> Array:
 
 
 def check_targets(task: Task, targets: Any) -> Configs:
-    """Return a copy of targets, shape ``(N, G, dof)``, length unit and rad, in which locked base
-    coordinates are as at the start; NaN passes. Raises ValueError for another shape, for infinite
-    entries and for targets that move a locked base by more than 1e-6."""
+    """Check targets, and return a copy with locked base coordinates as at the start.
+
+    The shape is ``(N, G, dof)``, length unit and rad; NaN is allowed. Raises ValueError for another
+    shape, for infinite entries, and for targets that move a locked base by more than 1e-6.
+    """
     copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
         raise ValueError(
-            f"targets have shape {copy.shape}; needed are (N, {len(task.goals)}, {task.robot.dof})"
+            f"targets has shape {copy.shape}; it must be (N, {len(task.goals)}, {task.robot.dof})"
         )
     if np.isinf(copy).any():
-        raise ValueError("targets have infinite entries; needed are finite ones")
+        raise ValueError("targets has infinite entries; each entry must be finite or NaN")
     return _hold_base(task, copy)
 
 
@@ -457,31 +514,31 @@ def check_targets(task: Task, targets: Any) -> Configs:
 
 
 def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
-    """Make a solution of hands and target configurations.
+    """Make a solution from hands and target configurations.
 
     Parameters
     ----------
     hands : str
         The hand for each goal, such as ``"RRLR"``.
     targets : array_like, shape (G, dof)
-        The configuration to move to for each goal, length unit (base) and rad (joints). Where a row
-        is NaN, the corrective process acts alone.
+        The configuration to move to for each goal, length unit (base) and rad (joints). For a row
+        of NaN only the corrective process acts.
 
     Returns
     -------
     tuple of Movement
-        A movement for each goal, of kind ``learned``, or ``corrective`` where the row is NaN, for
-        :func:`coartic.execute` and :func:`coartic.trajectory`.
+        A movement for each goal, of kind ``learned``, or ``corrective`` for a row of NaN.
+        :func:`coartic.execute` and :func:`coartic.trajectory` take it.
 
     Raises
     ------
     ValueError
-        The hands are not letters L and R, or there is not a row for each.
+        The hands are not letters L and R, or the number of rows is not the number of hands.
     """
     chosen, targets = hands_of(hands), real_array("targets", targets)
     if targets.ndim != 2 or len(targets) != len(chosen):
         raise ValueError(
-            f"targets have shape {targets.shape}; needed is a row for each of the "
+            f"targets has shape {targets.shape}; it must have a row for each of the "
             f"{len(chosen)} hands in {brief_value(hands)}"
         )
     return tuple(
@@ -493,7 +550,7 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
 
 
 def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) -> Execution:
-    """Make one trial by the corrective process alone.
+    """Make one trial in which only the corrective process acts.
 
     Parameters
     ----------
@@ -505,8 +562,8 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     Returns
     -------
     Execution
-        Movements, configurations at the hits, control ticks and reward. Where the corrective
-        process does not converge, ``completed`` is False and ``reason`` says so.
+        Movements, configurations at the hits, control ticks and reward. If the corrective process
+        does not converge, ``completed`` is False and ``reason`` says so.
 
     Raises
     ------
@@ -525,8 +582,10 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
 
 
 def corrective_movements(hands: str) -> list[Movement]:
-    """Return a list of one corrective movement, without a target, for each goal, with the hands of
-    a sequence such as ``"RRLR"``."""
+    """Return a corrective movement without a target for each goal.
+
+    ``hands`` is a hand sequence such as ``"RRLR"``.
+    """
     return [Movement(number, hand, "corrective") for number, hand in enumerate(hands_of(hands), 1)]
 
 
@@ -542,13 +601,13 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
     Returns
     -------
     list of str
-        The sequences in alphabetical order, such as ``"LLLR"``: one letter for each of G goals,
-        2^G sequences for two hands.
+        The sequences in alphabetical order, such as ``"LLLR"``: one letter for each of G goals, 2^G
+        sequences for two hands.
 
     Raises
     ------
     TaskError, TypeError
-        The task cannot be used, or is neither a Task nor a text nor a path.
+        The task cannot be used, or is not a Task, a string or a path.
     NotApplicableError
         There are more than 4096 sequences.
     ValueError
@@ -561,11 +620,11 @@ def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[
 def initial_hands(
     task: TaskLike, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
 ) -> str:
-    """Return the hand sequence of a task's first trial.
+    """Find the hand sequence of a task's first trial.
 
-    If the task names a sequence, it is this sequence. If the task names a policy, it is the
-    sequence with which the corrective process alone gets the highest reward: among sequences of one
-    hand (``"best-single-hand"``), or among all (``"best-of-all"``).
+    If the task names a sequence, this is the sequence. If the task names a policy, it is the
+    sequence for which the corrective process on its own gets the highest reward: among sequences of
+    one hand (``"best-single-hand"``), or among all (``"best-of-all"``).
 
     Parameters
     ----------
@@ -584,7 +643,7 @@ def initial_hands(
     TaskError, TypeError
         The task cannot be used, or ``task`` or ``model`` has another type.
     NotApplicableError
-        No candidate completes the task, or there are more than 4096.
+        No sequence that was tried completes the task, or there are more than 4096.
     ValueError
         ``hands`` is empty or names a hand that is not the task's, or a constant of the model is out
         of bounds.
@@ -598,9 +657,11 @@ def initial_hands(
 
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
-    """Return the reward, minus the ticks, of a trial by the corrective process alone with a task's
-    initial hands; None if the trial fails, or if a policy is to find the hands and finds none
-    (:func:`initial_hands`)."""
+    """Return the reward of a trial with only the corrective process and a task's initial hands.
+
+    None if the trial fails, or if a policy is to find the hands and finds none
+    (:func:`initial_hands`).
+    """
     try:
         hands = initial_hands(task, model=model)
     except NotApplicableError:

@@ -1,18 +1,19 @@
-"""Trials: the rule that every execution, learner and environment follows, goal by goal.
+"""Trials: the rule that executions, learners and environments follow, goal by goal.
 
-A goal has five phases. A run, one of many side by side,
+A run is one of many robots that make trials side by side. At each goal it passes through five
+phases (paper, sections *Generating Movement for Each Goal* and *The Corrective Process*):
 
-1. *begins*: its next goal is set;
-2. *aims*: a hand and, perhaps, a target are chosen, which is what callers differ in;
-3. *moves* to the target, or, without a target, checks whether its hand is in the goal already;
-4. *corrects*: where the goal is missed, the corrective process **A** looks for a configuration that
-   hits it, and the robot moves there;
-5. *accounts*: what happened is noted, and the trial goes on where the goal is hit
+1. *begin*: the run's next goal is set.
+2. *aim*: a hand and perhaps a target are chosen. Callers differ in how they choose.
+3. *move*: the robot moves to the target. Without a target it only checks whether its hand is in the
+   goal already.
+4. *correct*: if the goal is missed, the corrective process **A** looks for a configuration that
+   hits it, and the robot moves there.
+5. *account*: what happened is written down. The trial goes on if the goal is hit.
 
-(paper, sections *Generating Movement for Each Goal* and *The Corrective Process*). Two loops are
-made of these phases: :func:`reach_kernel` moves to given targets, and :mod:`coartic.learner.kernel`
-explores around learned targets. The result of a run depends neither on the others nor on their
-number.
+Two loops consist of these phases: :func:`reach_kernel` moves to given targets, and
+:mod:`coartic.learner.kernel` explores around learned targets. The result of a run depends neither
+on the other runs nor on their number.
 """
 
 from __future__ import annotations
@@ -59,13 +60,18 @@ from coartic.robot import HANDS, Array, Configs, Hand, Hands, Points, Robot
 from coartic.tasks.task import WITHOUT_REACH, Task, check_hands, hands_of, letters_of
 
 IDLE, CHECK, MOVE, REPEAT = range(4)
-"""Next action of a run: none; a check whether its hand is in the goal; a movement to its target,
-which ends on arrival, too; a corrective movement, which ends on a hit or at the target."""
+"""Next action of a run:
+
+- ``IDLE``: none;
+- ``CHECK``: check whether the hand is in the goal;
+- ``MOVE``: move to the target, and end on a hit or on arrival;
+- ``REPEAT``: make a corrective movement, which ends on a hit or at the target.
+"""
 COUNTED = (
     *("movement_ticks", "forward_kinematics", "corrective_iterations"),
     *("corrections", "failed_trials"),
 )
-"""Counters of :class:`~coartic.method.Meter` that the kernels keep: columns of counts."""
+"""Counters of :class:`~coartic.method.Meter` that the kernels update: the columns of counts."""
 TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
 GoalAccount = Any
 """Record of what happened at a goal (:func:`account_type`)."""
@@ -73,18 +79,20 @@ GoalAccount = Any
 
 @cache
 def account_type(width: int) -> np.dtype[np.void]:
-    """Return the NumPy type of the account of a goal in a trial; configurations have ``width``
-    entries. A goal with several movements to targets has a record for each, with its ``target`` and
-    ``moved``; the first record has all else."""
+    """Return the NumPy type of the account of a goal in a trial.
+
+    Configurations have ``width`` entries. If there are several movements to targets for a goal,
+    each has a record with its ``target`` and ``moved``; all other fields are in the first record.
+    """
     fields = {
-        "q": (np.float64, width),  # where the robot is in the end, length unit and rad
-        "target": (np.float64, width),  # of the movement; as given where it is not made
-        "corrected": (np.float64, width),  # target of the corrective movement, where one is made
-        "moved": np.int64,  # ticks of the movement to the target, 0 where it is not made
+        "q": (np.float64, width),  # where the robot is afterwards, length unit and rad
+        "target": (np.float64, width),  # of the movement; as requested if it is not made
+        "corrected": (np.float64, width),  # target of the corrective movement, if one is made
+        "moved": np.int64,  # ticks of the movement to the target, 0 if it is not made
         "hand": np.int64,
         "hit": np.bool_,
         "ticks": np.int64,  # of all movements
-        "corrections": np.int64,  # 1 where a corrective movement is made
+        "corrections": np.int64,  # 1 if a corrective movement is made
         "iterations": np.int64,  # of the corrective process
         "evaluations": np.int64,  # of forward kinematics
         "failed": np.bool_,  # True if the trial ends here because the goal is missed
@@ -97,18 +105,21 @@ def account_type(width: int) -> np.dtype[np.void]:
 
 @inlined
 def set_off(run: RunRecord, q: Any) -> None:
-    """Start the trial of a run, in place: the robot stands at configuration ``q``, shape
-    ``(dof,)``, the trial has not ended (``going``), and the count of evaluations is 0. Other fields
-    stay."""
+    """Start the trial of a run at configuration ``q``, shape ``(dof,)``, in place.
+
+    ``going`` becomes True and ``evaluations`` 0. Other fields stay.
+    """
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
 
 
 @inlined
 def begin(run: RunRecord, goal: Any) -> None:
-    """Set the next goal of a run, x and y, in place: phase 1, *begin*. Its target becomes where it
-    stands, ``hit`` False, ``corrects`` True, and the next ``action`` to check whether the hand is
-    in the goal, or none if the trial has ended."""
+    """Set the next goal of a run, x and y, in place: phase 1, *begin*.
+
+    The target becomes the present configuration, ``hit`` False and ``corrects`` True. The next
+    action is to check whether the hand is in the goal, or none if the trial has ended.
+    """
     fill_row(run.goal, goal)
     fill_row(run.target, run.q)
     run.action = CHECK if run.going else IDLE
@@ -117,8 +128,11 @@ def begin(run: RunRecord, goal: Any) -> None:
 
 @inlined
 def aim(run: RunRecord, target: Any) -> None:
-    """Set the target of a run, in place: phase 2, *aim*. Where an entry of ``target``, at least
-    ``dof`` entries, is NaN, base or joint stays; unless all are NaN, the next action is to move."""
+    """Set the target of a run, in place: phase 2, *aim*.
+
+    Where an entry of ``target`` is NaN, base or joint stays. Unless all entries are NaN, the next
+    action becomes to move. ``target`` has at least ``dof`` entries.
+    """
     for j in range(len(target)):
         if not math.isnan(target[j]):
             run.target[j] = target[j]
@@ -127,13 +141,15 @@ def aim(run: RunRecord, target: Any) -> None:
 
 @inlined
 def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Move each of the first ``count`` runs of a batch to its target, or check whether its hand is
-    in the goal, or neither, as its ``action`` says (:data:`IDLE`): phase 3, *move*. ``q``, ``hit``,
-    ``ticks``, ``evaluations`` and ``acting`` change in place; without a movement ticks are 0."""
+    """Let each of the first ``count`` runs of a batch do its ``action``: phase 3, *move*.
+
+    The actions are at :data:`IDLE`. ``q``, ``hit``, ``ticks``, ``evaluations`` and ``acting``
+    change in place. Ticks are 0 if there is no movement.
+    """
     for stops in (True, False):
         for i in range(count):
             run, action = batch.runs[i], batch.runs[i].action
-            # CHECK is a movement to where the arm is.
+            # CHECK is a movement to the present configuration.
             run.acting = action == MOVE if stops else action in (CHECK, REPEAT)
         _move_acting(count, stops, robot, batch)
     for i in range(count):
@@ -143,10 +159,12 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 
 @inlined
 def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Move each of the first ``count`` runs of a batch for which **A** converged
-    (:func:`find_corrections`), in place, towards its ``target``, the configuration that **A**
-    found: phase 4, *correct*. The movement ends as soon as the hand is in the goal, or at the
-    target. ``ticks`` of each run become the ticks of this movement, 0 if none is made."""
+    """Move each run for which **A** converged to the configuration found: phase 4, *correct*.
+
+    These are runs among the first ``count`` of a batch, after :func:`find_corrections`. The
+    movement ends as soon as the hand is in the goal, or at ``target``. ``ticks`` of each run become
+    the ticks of this movement, 0 if none is made.
+    """
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
     _move_acting(count, False, robot, batch)
@@ -154,9 +172,11 @@ def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
 
 @inlined
 def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
-    """Write the result of a run for its goal into the record ``goal``, in place: phase 5,
-    *account*. ``moved``: ticks of the run's movements to targets. If the run missed its goal, its
-    trial ends. The run's count of evaluations becomes 0."""
+    """Write the result of a run for its goal into an account, in place: phase 5, *account*.
+
+    ``moved`` is the number of ticks of the run's movements to targets. If the run missed its goal,
+    its trial ends. Its count of evaluations becomes 0.
+    """
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
     goal.ticks = moved + run.ticks
@@ -170,8 +190,10 @@ def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
 
 @inlined
 def count_goal(goal: GoalAccount, counts: Any) -> None:
-    """Add ticks, evaluations, iterations, corrections and failure in the account of a goal to the
-    counts of a trial, shape ``(5,)``, in place."""
+    """Add the numbers in the account of a goal to the counts of a trial, in place.
+
+    ``counts`` has shape ``(5,)``: ticks, evaluations, iterations, corrections and failures.
+    """
     counts[TICKS] += goal.ticks
     counts[EVALUATIONS] += goal.evaluations
     counts[ITERATIONS] += goal.iterations
@@ -181,13 +203,15 @@ def count_goal(goal: GoalAccount, counts: Any) -> None:
 
 @shared
 def _move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> None:
-    """Move each of the first ``count`` runs of ``batch`` whose ``acting`` is True to its target, in
-    place; a movement ends on a hit, at its target, or, with ``stops``, when the hand arrives near
-    the place to which the target brings it."""
-    at, slot = batch.at[0], 0
+    """Move each of the first ``count`` runs whose ``acting`` is True to its target, in place.
+
+    A movement ends on a hit or at its target. With ``stops`` it also ends when the hand is near the
+    position to which the target brings it.
+    """
+    slots, slot = batch.slots[0], 0
     for i in range(count):
         if batch.runs[i].acting:
-            start(at, slot, i, batch.runs[i], arm_of(robot, batch.runs[i].hand))
+            start(slots, slot, i, batch.runs[i], arm_of(robot, batch.runs[i].hand))
             slot += 1
     if slot > 0:
         move_slots(batch, slot, stops, robot)
@@ -195,32 +219,36 @@ def _move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> N
 
 @inlined
 def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
-    """Set ``target`` of each of the first ``count`` runs of ``batch`` that missed its goal, goes on
-    and may be corrected to where the corrective process **A**, kernel ``descend``, ends. In each of
-    the first ``count`` runs ``converged`` is True if **A** converged, and ``ticks`` become 0."""
-    at, slot = batch.at[0], 0
+    """Let a corrective process set the ``target`` of each run that it applies to.
+
+    It applies to the runs among the first ``count`` that missed the goal, go on and may be
+    corrected. ``descend`` is the kernel of the process **A**. In each of the first ``count`` runs
+    ``converged`` becomes True if **A** converged, and ``ticks`` becomes 0.
+    """
+    slots, slot = batch.slots[0], 0
     for i in range(count):
         run = batch.runs[i]
         run.acting, run.converged = run.corrects and run.going and not run.hit, False
         run.ticks, run.iterations = 0, 0
         if run.acting:
             fill_row(run.target, run.q)
-            load(at, slot, i, run, arm_of(robot, run.hand))
+            load(slots, slot, i, run, arm_of(robot, run.hand))
             slot += 1
     descend(batch, slot, robot)
 
 
 @shared
 def find_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Have the paper's corrective process **A** find targets: set ``target`` of each of the first
-    ``count`` runs of ``batch`` that missed its goal, goes on and may be corrected to where **A**
-    ends (:func:`_find_by`)."""
+    """Let the paper's corrective process **A** find a target for each run that it applies to.
+
+    :func:`_find_by` says which runs these are and what is set.
+    """
     _find_by(count, robot, batch, correct_slots)
 
 
 @shared
 def find_pulled_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Do as :func:`find_corrections` with **A** pulled to each run's preferred posture."""
+    """Find targets as :func:`find_corrections` does, with **A** pulled to preferred postures."""
     _find_by(count, robot, batch, pull_slots)
 
 
@@ -228,27 +256,29 @@ def find_pulled_corrections(count: int, robot: RobotRecord, batch: Batch) -> Non
 
 
 class Requests(NamedTuple):
-    """Requests to the kernel: N arms, each to G goals in turn by M movements each."""
+    """Movements that are asked of the kernel: N arms, G goals each, M movements per goal."""
 
     starts: Configs
-    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` for one start of all."""
+    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` if all arms start alike."""
     hands: Hands
     """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
     targets: Configs
     """Targets, shape ``(N, G, M, dof)``, length unit and rad; NaN for entries that stay. The first
-    movement for a goal is made, further ones where the goal is still missed."""
+    movement for a goal is always made, further ones only while the goal is missed."""
     stops: NDArray[np.bool_]
-    """True where the movement to a target ends on arrival, shape ``(N, G, M)``; empty if all do."""
+    """True where the movement to a target ends on arrival as well, shape ``(N, G, M)``; empty if
+    all movements do."""
     goals: Points
-    """Centres of the goals, shape ``(N, G, 2)``, or ``(1, G, 2)`` for the same goals of all."""
+    """Centres of the goals, shape ``(N, G, 2)``, or ``(1, G, 2)`` if all arms have the same
+    goals."""
 
 
 ALL_STOP = np.empty((0, 0, 0), dtype=np.bool_)
-"""Movements that all end on arrival, too; see :class:`Requests`."""
+"""Value of :attr:`Requests.stops` with which all movements end on arrival as well."""
 
 
 NO_REWARD = -(2**63 - 1)
-"""Reward of a trial that failed, where rewards are integers."""
+"""Reward of a failed trial where rewards are integers."""
 
 
 class Accounts(NamedTuple):
@@ -264,8 +294,11 @@ class Accounts(NamedTuple):
 
 @inlined
 def _are_within(targets: Any) -> bool:
-    """Return whether no entry of the targets ``(G, M, dof)`` of a trial has an absolute value
-    beyond 1e5 (:data:`LARGEST_ENTRY`); NaN, a joint that stays, counts as within."""
+    """Return whether no target of a trial has an entry beyond 1e5 in absolute value.
+
+    ``targets`` has shape ``(G, M, dof)``; NaN, a joint that stays, is within
+    (:data:`LARGEST_ENTRY`).
+    """
     far = 0
     for g in range(targets.shape[0]):
         for m in range(targets.shape[1]):
@@ -276,26 +309,29 @@ def _are_within(targets: Any) -> bool:
 
 @inlined
 def _reach_lot(
-    first: int, count: int, arms: Any, robot: Any, goals: Any, counts: Any, batch: Any
+    offset: int, count: int, arms: Any, robot: Any, goals: Any, counts: Any, batch: Any
 ) -> None:
-    """Let ``count`` arms from number ``first`` (from 0) on, at most as many as ``batch`` has runs,
-    reach for their goals; fill in ``goals``, accounts ``(N, G, M)``, and ``counts``, ``(N, 5)``,
-    given as 0, in place. ``arms`` are :class:`Requests`, ``robot`` is a :data:`RobotRecord`."""
+    """Let ``count`` arms from index ``offset`` on reach for their goals, in place.
+
+    At most as many arms as ``batch`` has runs. ``arms`` are :class:`Requests`, ``robot`` is a
+    :data:`RobotRecord`. Filled are ``goals``, the accounts ``(N, G, M)``, and ``counts``, shape
+    ``(N, 5)``, which the caller sets to 0.
+    """
     for i in range(count):
-        n, run = first + i, batch.runs[i]
+        n, run = offset + i, batch.runs[i]
         set_off(run, arms.starts[min(n, len(arms.starts) - 1)])
         run.going = _are_within(arms.targets[n])
         counts[n, FAILURES] = not run.going
     for g in range(arms.targets.shape[1]):
         for i in range(count):
-            n, run = first + i, batch.runs[i]
+            n, run = offset + i, batch.runs[i]
             begin(run, arms.goals[min(n, len(arms.goals) - 1), g])
             run.hand = arms.hands[n, g]
             if not robot.checks:
                 run.action = IDLE
         for m in range(arms.targets.shape[2]):
             for i in range(count):
-                n, run = first + i, batch.runs[i]
+                n, run = offset + i, batch.runs[i]
                 target, noted = arms.targets[n, g, m], goals[n, g, m].target
                 if m > 0:
                     fill_row(run.target, run.q)
@@ -310,11 +346,11 @@ def _reach_lot(
                     fill_row(noted, target)
             move_runs(count, robot, batch)
             for i in range(count):
-                goals[first + i, g, m].moved = batch.runs[i].ticks
+                goals[offset + i, g, m].moved = batch.runs[i].ticks
         find_corrections(count, robot, batch)
         make_corrections(count, robot, batch)
         for i in range(count):
-            n, moved = first + i, 0
+            n, moved = offset + i, 0
             for m in range(goals.shape[2]):
                 moved += goals[n, g, m].moved
             account(batch.runs[i], moved, goals[n, g, 0])
@@ -322,27 +358,33 @@ def _reach_lot(
 
 
 @entry
-def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *others: Any) -> None:
-    """Let every arm reach for its goals, as many arms at a time as a batch has runs; fill
-    ``goals``, ``counts`` (given as 0) and ``rewards``, the entries of :class:`Accounts`, in place.
-    ``others``: entries of :class:`Requests`, then of a batch."""
-    arms, batch = Requests(*others[:5]), Batch(*others[5:])
+def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any) -> None:
+    """Let every arm reach for its goals, as many at a time as a batch has runs.
+
+    ``goals``, ``counts`` and ``rewards`` are the entries of :class:`Accounts`, filled in place; the
+    caller sets ``counts`` to 0. ``arrays`` are the entries of :class:`Requests` and then those of a
+    batch.
+    """
+    arms, batch = Requests(*arrays[:5]), Batch(*arrays[5:])
     count, room = len(arms.targets), len(batch.runs)
-    for first in range(0, count, room):
-        _reach_lot(first, min(room, count - first), arms, robot[0], goals, counts, batch)
+    for offset in range(0, count, room):
+        _reach_lot(offset, min(room, count - offset), arms, robot[0], goals, counts, batch)
     for n in range(count):
         rewards[n] = -counts[n, TICKS] if counts[n, FAILURES] == 0 else NO_REWARD
 
 
 SHARE = 14 * SLOTS
-"""Least number of arms for a thread: its start takes as long as a hundred trials."""
+"""Smallest number of arms for a thread: starting a thread takes as long as a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Batches that no thread uses, by :attr:`Robot.max_links`."""
 
 
 def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
-    """Return new accounts of ``count`` trials with ``goals`` goals and ``moves`` movements to
-    targets for each goal. The counts of the trials are 0; the caller fills in all else."""
+    """Return new accounts of ``count`` trials.
+
+    They have ``goals`` goals, and ``moves`` movements to targets for each goal. The counts of the
+    trials are 0; the caller fills in everything else.
+    """
     return Accounts(
         np.empty((count, goals, moves), account_type(width_of(robot))),
         np.zeros((count, len(COUNTED)), dtype=np.int64),
@@ -351,25 +393,25 @@ def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Acco
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
-    """Let N arms reach for G goals each, in turn, and return their accounts; an arm that misses a
-    goal makes no movement for later goals. ``parameters`` come from :func:`robot_parameters`.
+    """Let N arms reach for G goals each, in turn, and return their accounts.
 
-    A trial with a target beyond :data:`LARGEST_ENTRY` fails without a movement; nothing else is
-    checked. Many arms are shared among threads.
+    An arm that misses a goal makes no movement for later goals. A trial with a target beyond
+    :data:`LARGEST_ENTRY` fails without a movement; nothing else is checked. ``parameters`` come
+    from :func:`robot_parameters`. Many arms are divided among threads.
     """
     count, goals, moves, _ = arms.targets.shape
     accounts, idle = empty_accounts(robot, count, goals, moves), _IDLE[robot.max_links]
 
     def work(part: slice) -> None:
-        some, results = arms, accounts
+        requests, results = arms, accounts
         if part.stop - part.start < count:
-            some = Requests._make(each[part] if len(each) == count else each for each in arms)
-            results = Accounts._make(each[part] for each in accounts)
+            requests = Requests._make(a[part] if len(a) == count else a for a in arms)
+            results = Accounts._make(array[part] for array in accounts)
         try:
             batch = idle.pop()  # no other thread gets it
         except IndexError:
             batch = batch_for(robot)
-        reach_kernel(parameters, *results, *some, *batch)
+        reach_kernel(parameters, *results, *requests, *batch)
         idle.append(batch)
 
     in_parts(work, count, SHARE)
@@ -380,19 +422,19 @@ class Reached(NamedTuple):
     """Results of N arms that reached for a goal each (:func:`reach_goals`)."""
 
     q: Configs
-    """Configuration in which each arm ended, or stayed, shape ``(N, dof)``, length unit and rad."""
+    """Configuration in which each arm ended, shape ``(N, dof)``, length unit and rad."""
     hit: NDArray[np.bool_]
     """True where the hand is in the goal, shape ``(N,)``."""
     ticks: NDArray[np.int64]
     """Control ticks of each arm's movements, shape ``(N,)``."""
     corrected: Configs
-    """Target of each arm's corrective movement, shape ``(N, dof)``; NaN where none was made."""
+    """Target of each arm's corrective movement, shape ``(N, dof)``; NaN if none was made."""
     corrections: NDArray[np.int64]
     """Corrective movements made, 0 or 1, shape ``(N,)``."""
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations, of a correction its iterations + 1, shape ``(N,)``."""
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes its iterations + 1."""
 
 
 @checked_arguments
@@ -408,7 +450,7 @@ def reach_goals(
     locked_base: Sequence[str] = (),
     model: MotionModel = PAPER,
 ) -> Reached:
-    """Let N arms reach for a goal each, side by side, from where they are.
+    """Let N arms reach for one goal each, side by side, from where they are.
 
     Parameters
     ----------
@@ -423,26 +465,26 @@ def reach_goals(
     radius : float
         Radius of all goals, length unit.
     targets : ndarray, shape (N, dof), optional
-        Targets of the first movements. An entry whose target is NaN keeps its value, and an arm
-        whose row is NaN has no target, as all arms by default: the corrective process acts alone.
+        Targets of the first movements. An entry that is NaN keeps its value. An arm whose row is
+        NaN has no target: only the corrective process acts. By default no arm has a target.
     checks : bool
-        True if an arm without a target stays if its hand is in its goal already; False if the
+        True if an arm without a target stays when its hand is in its goal already; False if the
         corrective process begins at once.
     locked_base : sequence of {"x", "y"}
-        Coordinates of the base that the corrective process leaves as they are.
+        Coordinates of the base that the corrective process does not change.
     model : MotionModel
 
     Returns
     -------
     Reached
-        Where the arms ended, and what that took.
+        Where the arms ended, and what that took. An arm with a target beyond 1e5 does not move or
+        hit.
 
     Raises
     ------
     ValueError
         A shape is wrong, a number outside ``targets`` is not finite or out of bounds, a hand is
-        neither 0 nor 1, or the model does not fit the radius. An arm with a target beyond 1e5 does
-        not move or hit.
+        neither 0 nor 1, or the model does not fit the radius.
 
     Notes
     -----
@@ -450,18 +492,18 @@ def reach_goals(
     """
     count = len(np.atleast_2d(q))
     starts = finite_array("q", q, (count, robot.dof))
-    given = np.full(starts.shape, np.nan) if targets is None else np.array(targets, order="C")
-    if given.shape != starts.shape:
-        raise ValueError(f"targets has shape {given.shape}; needed is {starts.shape}")
+    aims = np.full(starts.shape, np.nan) if targets is None else np.array(targets, order="C")
+    if aims.shape != starts.shape:
+        raise ValueError(f"targets has shape {aims.shape}; it must be {starts.shape}")
     codes = finite_array("hands", hands, (count,)).astype(np.int64)
     if not (np.isin(codes, range(len(HANDS))) & (codes == hands)).all():
-        raise ValueError(f"hands is {brief_value(hands)}; needed are 0 (left) and 1 (right)")
+        raise ValueError(f"hands is {brief_value(hands)}; each entry must be 0 (left) or 1 (right)")
     check_limits("radius", radius, 1e-9, LARGEST_ENTRY)
     check_model(model, radius=radius)
     arms = Requests(
         starts=starts,
         hands=codes[:, None],
-        targets=given[:, None, None],
+        targets=aims[:, None, None],
         stops=ALL_STOP,
         goals=finite_array("goals", goals, (count, 2))[:, None],
     )
@@ -469,13 +511,13 @@ def reach_goals(
     parameters = robot_parameters(robot, radius, locked_base=locked, model=model, checks=checks)
     ended = reach(robot, arms, parameters).goals[:, 0, 0]
     ended["corrected"][ended["corrections"] == 0] = np.nan
-    figures = [ended[name][..., : robot.dof] if name in ("q", "corrected") else ended[name]
+    columns = [ended[name][..., : robot.dof] if name in ("q", "corrected") else ended[name]
                for name in Reached._fields]  # fmt: skip
-    return Reached._make(map(np.ascontiguousarray, figures))
+    return Reached._make(map(np.ascontiguousarray, columns))
 
 
 class CompiledTask(NamedTuple):
-    """A task as the kernels read it (:func:`compiled_task`)."""
+    """A task in the form that the kernels read (:func:`compiled_task`)."""
 
     task: Task
     starts: Configs
@@ -491,14 +533,22 @@ _last_compiled: CompiledTask | None = None
 
 
 def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
-    """Return a task with a model as arrays for the kernels, which are cached: do not change them.
-    Raises ValueError for a model that is out of bounds or unfit for the radius, or an unchecked
-    copy of a task (``model_copy``) whose start or goals are wrong; TypeError if the model is no
-    MotionModel."""
+    """Return a task with a model as arrays for the kernels.
+
+    The arrays are cached: do not change them.
+
+    Raises
+    ------
+    ValueError
+        A constant of the model is out of bounds or does not fit the radius, or the task is an
+        unchecked copy (``model_copy``) whose start or goals are wrong.
+    TypeError
+        The model is not a MotionModel.
+    """
     global _last_compiled
-    last = _last_compiled  # another thread may replace it
-    if last is not None and last.task is task and last.model is model:
-        return last
+    latest = _last_compiled  # another thread may replace it
+    if latest is not None and latest.task is task and latest.model is model:
+        return latest
     check_model(model, radius=task.radius)
     goals = [check_goal(goal, task.radius) for goal in task.goals]
     _last_compiled = compiled = CompiledTask(
@@ -513,14 +563,16 @@ def compiled_task(task: Task, model: MotionModel) -> CompiledTask:
     return compiled
 
 
-# ---- Trials outside the session of a run, of which honest methods make none ----
+# ---- Trials outside the session of a run: honest methods make none ----
 
 _outside = 0
 
 
 def count_trials(count: int) -> None:
-    """Add ``count`` to the number of trials made outside the sessions of runs
-    (:func:`trials_outside`); the session of a run takes its trials off again."""
+    """Add ``count`` to the number of trials made outside the sessions of runs.
+
+    :func:`trials_outside` returns that number. The session of a run subtracts its own trials.
+    """
     global _outside
     _outside += count
 
@@ -536,16 +588,20 @@ def make_trials(
     targets: Configs,
     stops: NDArray[np.bool_] = ALL_STOP,
 ) -> Accounts:
-    """Make N trials of a task and return their accounts; ``hands``, ``targets`` and ``stops`` as in
-    :class:`Requests`. The trials are counted (:func:`count_trials`)."""
+    """Make N trials of a task, count them (:func:`count_trials`), and return their accounts.
+
+    ``hands``, ``targets`` and ``stops`` are as in :class:`Requests`.
+    """
     count_trials(len(targets))
     arms = Requests(compiled.starts, hands, targets, stops, compiled.goals)
     return reach(compiled.task.robot, arms, compiled.parameters)
 
 
 def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
-    """Return a sentence on the first goal that a trial missed, from the accounts of its goals,
-    shape ``(G,)``; empty if the trial hit every goal."""
+    """Return a sentence on the first goal that a trial missed, or an empty string.
+
+    ``goals`` are the accounts of the trial's goals, shape ``(G,)``.
+    """
     if goals["hit"][-1]:
         return ""
     number = int(goals["hit"].argmin())
@@ -568,24 +624,28 @@ class Trials(NamedTuple):
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations, of a correction its iterations + 1, shape ``(N,)``."""
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes its iterations + 1."""
     targets: Configs
-    """Targets as moved to, shape ``(N, G, dof)``, length unit and rad; a row of NaN where no target
-    was given, and in the goals after a failure what was given."""
+    """Targets of the movements made, shape ``(N, G, dof)``, length unit and rad. A row is NaN if no
+    target was passed. For goals after a failure the row is the target as it was passed."""
     reached: Configs
-    """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN where it was not hit."""
+    """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN if it was not hit."""
 
     @property
     def rewards(self) -> Array:
-        """Total reward of each trial, which is minus the number of its ticks, shape ``(N,)``; -inf
-        where the trial failed."""
+        """Total reward of each trial, minus its ticks, shape ``(N,)``.
+
+        It is -inf if the trial failed.
+        """
         return np.where(self.completed, -self.ticks, -np.inf)
 
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
-    """Return the results of trials from their accounts, with the first ``dof`` entries of each
-    configuration. Arrays other than ``completed`` share memory with ``accounts``, whose ``q``
-    becomes NaN where a goal is not hit."""
+    """Return the results of trials from their accounts.
+
+    ``dof`` is the number of entries of a configuration. Arrays other than ``completed`` share
+    memory with ``accounts``, whose ``q`` becomes NaN where a goal is not hit.
+    """
     goals, counts = accounts.goals[..., 0], accounts.counts
     reached = goals["q"][..., :dof]
     if counts[:, FAILURES].any():
@@ -606,37 +666,56 @@ HandSequences = str | Sequence[str]
 
 
 def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
-    """Return the hand for each goal of ``count`` trials, 0 left or 1 right, shape ``(count, G)``.
+    """Return the hand for each goal of ``count`` trials, 0 left or 1 right.
 
-    Raises ValueError if the sequences do not fit the task, or a list has not ``count`` of them.
+    The shape is ``(count, G)``. Raises ValueError if the sequences do not fit the task, or if a
+    list does not have ``count`` of them.
     """
-    several = isinstance(hands, Iterable) and not isinstance(hands, str)
-    each: list[Any] = list(hands) if several else [hands]
+    is_list = isinstance(hands, Iterable) and not isinstance(hands, str)
+    sequences: list[Any] = list(hands) if is_list else [hands]
     codes = dict[str, list[int]]()
-    for sequence in each:
+    for sequence in sequences:
         if not isinstance(sequence, str) or sequence not in codes:
             chosen = hands_of(check_hands(task, sequence))
             codes[sequence] = [HANDS.index(hand) for hand in chosen]
-    if several and len(each) != count:
-        raise ValueError(f"{counted(len(each), 'hand sequence')} for {counted(count, 'trial')}")
+    if is_list and len(sequences) != count:
+        raise ValueError(
+            f"hands has {counted(len(sequences), 'hand sequence')} for {counted(count, 'trial')}; "
+            "it must have one for each"
+        )
     rows = np.empty((count, len(task.goals)), dtype=np.int64)
-    rows[:] = np.reshape([codes[sequence] for sequence in each], (-1, len(task.goals)))
+    rows[:] = np.reshape([codes[sequence] for sequence in sequences], (-1, len(task.goals)))
     return rows
 
 
-# ---- Initial hands: those of trial 0 ----
+# ---- Initial hands: the hands of trial 0 ----
 
-MOST_SEQUENCES = 4096  # hand sequences that are tried one by one
+MOST_SEQUENCES = 4096  # largest number of hand sequences that are all tried
 
 
 def ranked_sequences(
     task: Task, sequences: Collection[str], *, model: MotionModel = PAPER
 ) -> list[tuple[str, int | None, str, dict[str, int]]]:
-    """Make a trial by the corrective process alone with each hand sequence; return a list, the
-    highest reward first and failed trials last, of equals the sequence with the fewest changes of
-    hand first, then the sequence given first. An entry has the sequence, the reward (None if the
-    trial failed), the reason of the failure (or an empty text), and the counts of the trial by name
-    (:data:`COUNTED`), with a further evaluation for each goal tried."""
+    """Make a trial with only the corrective process for each hand sequence, and rank them.
+
+    Parameters
+    ----------
+    task : Task
+    sequences : collection of str
+        Hand sequences, such as ``"RRLR"``.
+    model : MotionModel
+
+    Returns
+    -------
+    list of tuple
+        An entry for each sequence: the sequence, the reward (None if the trial failed), the reason
+        of the failure (or an empty string), and the counts of the trial by name (:data:`COUNTED`),
+        with one more evaluation for each goal tried. The order is
+
+        - by reward, the highest first and failed trials last;
+        - then by the number of changes of hand, the fewest first;
+        - then as in ``sequences``.
+    """
     compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets)
@@ -645,7 +724,7 @@ def ranked_sequences(
         sequences, accounts.goals[..., 0], accounts.counts, strict=True
     ):
         spent = dict(zip(COUNTED, counts.tolist(), strict=True))
-        # The place of the hand after each movement is known, as coartic.execute counts it.
+        # coartic.execute also evaluates the position of the hand at each goal that is tried.
         spent["forward_kinematics"] += int(goals["hit"].sum()) + spent["failed_trials"]
         reward = None if spent["failed_trials"] else -spent["movement_ticks"]
         trials.append((hands, reward, reason_of_failure(compiled, goals), spent))
@@ -659,14 +738,15 @@ def ranked_sequences(
 
 
 def changes_of_hand(sequence: str) -> int:
-    """Return how often the hand changes from one goal to the next in a hand sequence: 3 for
-    ``"LRLR"``."""
+    """Count how often the hand changes between successive goals: 3 for ``"LRLR"``."""
     return sum(a != b for a, b in itertools.pairwise(sequence))
 
 
 def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
-    """List all sequences of ``hands`` for a number of goals, such as ``"LRLR"``, in alphabetical
-    order. Raises NotApplicableError, which calls the task ``task``, if there are more than 4096.
+    """List all sequences of ``hands`` for a number of goals in alphabetical order.
+
+    The sequences are strings such as ``"LRLR"``. Raises NotApplicableError, which names ``task``,
+    if there are more than 4096.
     """
     ordered = [hand for hand in HANDS if hand in hands]
     if reason := too_many_sequences(task, goals, len(ordered)):
@@ -675,8 +755,11 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 
 
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
-    """Return a sentence that a task, called ``task``, has more than 4096 hand sequences, too many
-    to try; else None. ``goals`` and ``hands`` are numbers of goals and of hands."""
+    """Return a sentence if a task has more than 4096 hand sequences, too many to try.
+
+    Otherwise return None. ``task`` is its name, ``goals`` and ``hands`` are numbers of goals and
+    hands.
+    """
     count = hands**goals
     if count <= MOST_SEQUENCES:
         return None
@@ -684,15 +767,17 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Return ``hands`` as a tuple; for None return all hands of the task. Raises ValueError
-    for an empty ``hands`` and for a hand that the task does not have."""
+    """Return ``hands`` as a tuple, or all hands of the task for None.
+
+    Raises ValueError if ``hands`` is empty or names a hand that the task does not have.
+    """
     if hands is None:
         return task.hands
     chosen = tuple(hands) if isinstance(hands, Iterable) else ()
     if not chosen or not all(isinstance(hand, str) and hand in task.hands for hand in chosen):
         raise ValueError(
-            f"hands is {brief_value(hands)}; it must be a "
-            f"list of hands of task {task.name!r}: {' and '.join(map(repr, task.hands))}"
+            f"hands is {brief_value(hands)}; it must be a list of hands of task {task.name!r}, "
+            f"which are {' and '.join(map(repr, task.hands))}"
         )
     return chosen
 
@@ -703,17 +788,35 @@ def search_initial_hands(
     *,
     model: MotionModel = PAPER,
 ) -> tuple[str, Mapping[str, int]]:
-    """Return the hand sequence of trial 0, such as ``"RRRR"``, and the counts of the search for it,
-    by counters of :class:`~coartic.method.Meter`.
+    """Find the hand sequence of trial 0, such as ``"RRRR"``, and count what the search took.
 
-    If the task names a sequence, this is returned, and no counts. If it names a policy, the
-    corrective process alone tries sequences of ``hands`` (None: the task's): under
-    ``"best-single-hand"`` sequences of one hand, else all; the first of :func:`ranked_sequences` is
-    returned. Trials are counted (:func:`count_trials`), also where the result was kept, except
-    trials of a search that fails. The counts are cached: do not change them.
+    If the task names a sequence, it is returned with no counts. If the task names a policy, trials
+    with only the corrective process are made: with ``"best-single-hand"`` for sequences of one
+    hand, otherwise for all. The best of :func:`ranked_sequences` is returned.
 
-    Raises NotApplicableError if no sequence tried completes the task, or more than 4096 would have
-    to be tried, and ValueError for no hand or a hand that is not among the task's hands.
+    These trials are counted (:func:`count_trials`), even if the result comes from the cache, but
+    not if the search fails.
+
+    Parameters
+    ----------
+    task : Task
+    hands : tuple of {"left", "right"}, optional
+        Hands among which a policy chooses; the task's by default.
+    model : MotionModel
+
+    Returns
+    -------
+    sequence : str
+        The hand sequence.
+    counts : mapping
+        Counts by the names of :class:`~coartic.method.Meter`. They are cached: do not change them.
+
+    Raises
+    ------
+    NotApplicableError
+        No sequence tried completes the task, or there are more than 4096 to try.
+    ValueError
+        ``hands`` is empty or names a hand that the task does not have.
     """
     allowed = hands_among(task, hands)
     if not task.initial_is_policy:
@@ -728,8 +831,11 @@ def search_initial_hands(
 def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
-    """Return what :func:`search_initial_hands` returns for a task, given as JSON, with a policy and
-    for ``hands`` in order; the caller counts the trials. The 64 results used last are kept."""
+    """Search the initial hands of a task with a policy, and cache the last 64 results.
+
+    The task is given as JSON, and ``hands`` in order, so that they can be keys. The caller counts
+    the trials. The result is as in :func:`search_initial_hands`.
+    """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)
     if task.initial_hands == "best-single-hand":
@@ -741,8 +847,8 @@ def _search_by_policy(
     best, reward, reason, _ = ranked[0]
     if reward is None:
         raise NotApplicableError(
-            f"task {task.name!r}: the corrective process completes it with no hand sequence that "
-            f"initial_hands = {task.initial_hands!r} allows; with {best}, {reason}"
+            f"task {task.name!r}: the corrective process does not complete it with any hand "
+            f"sequence that initial_hands = {task.initial_hands!r} allows; with {best}, {reason}"
         )
     spent = {name: sum(counts[name] for *_, counts in ranked) for name in COUNTED[:FAILURES]}
     spent["jacobians"] = spent["corrective_iterations"]

@@ -1,13 +1,14 @@
-"""Cosine and sine for the compiled kernels, from IEEE arithmetic alone.
+"""Cosine and sine for the compiled kernels from IEEE arithmetic only.
 
-The C library's versions differ between systems in the last bit, and a last bit can
-end a movement one step earlier. These use only +, -, * and rounding, so kinematics
-in the kernels is the same wherever the code runs; :func:`near_cosine` and
-:func:`near_sine`, without a branch, also become vector instructions. Reduction by
-multiples of π/2 in three parts (Cody & Waite 1980, *Software Manual for the Elementary
-Functions*), then the Taylor series, whose truncation on [-π/4, π/4] is below 3e-18.
-Error against the exact value: below 2e-16 for |angle| < 1e5 rad (tested); from there on
-the C library answers.
+The C library's functions differ between systems in the last bit, and a last bit can end a movement
+one step earlier. The functions here use only +, -, * and rounding, so that kinematics in the
+kernels are the same wherever the code runs. :func:`near_cosine` and :func:`near_sine` have no
+branch and therefore become vector instructions.
+
+The angle is reduced by multiples of π/2 in three parts (Cody & Waite 1980, *Software Manual for the
+Elementary Functions*). The Taylor series follows; its truncation error on [-π/4, π/4] is below
+3e-18. The total error is below 2e-16 for |angle| < 1e5 rad (tested). For larger angles the C
+library's functions are called.
 """
 
 from __future__ import annotations
@@ -34,8 +35,11 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n
 
 @scalar
 def _reduced(angle: float) -> tuple[float, float, int]:
-    """Return sine and cosine of ``angle``, rad, less k quarter turns, and k modulo 4, where k is
-    the nearest whole number of quarter turns. Only for |angle| below 1e5 rad."""
+    """Return sine and cosine of the rest of an angle, and its quarter turn modulo 4.
+
+    The rest is ``angle``, rad, minus the nearest integer number of quarter turns. Only for |angle|
+    below 1e5 rad.
+    """
     quarters = np.rint(angle * _PER_QUARTER)
     x = ((angle - quarters * _HIGH) - quarters * _MIDDLE) - quarters * _LOW
     # Estrin's order: short chains of dependent operations.
@@ -69,11 +73,17 @@ def near_sine(angle: float) -> float:
 
 @scalar
 def cosine(angle: float) -> float:
-    """Return cos(angle), angle in rad; the same bits on every system for |angle| < 1e5 rad."""
+    """Return cos(angle), angle in rad.
+
+    The bits are the same on every system for |angle| < 1e5 rad.
+    """
     return near_cosine(angle) if abs(angle) < LARGEST else math.cos(angle)
 
 
 @scalar
 def sine(angle: float) -> float:
-    """Return sin(angle), angle in rad; the same bits on every system for |angle| < 1e5 rad."""
+    """Return sin(angle), angle in rad.
+
+    The bits are the same on every system for |angle| < 1e5 rad.
+    """
     return near_sine(angle) if abs(angle) < LARGEST else math.sin(angle)
