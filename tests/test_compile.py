@@ -126,20 +126,20 @@ from coartic.motion.compile import entry, inner
 from coartic.motion.batch import batch_for
 
 @inner
-def add_links(at):
-    for k in range(len(at.length)):
+def add_links(slots):
+    for k in range(len(slots.length)):
         for slot in range(72):
-            at.x[k + 1, slot] = at.x[k, slot] + at.length[k, slot]
+            slots.x[k + 1, slot] = slots.x[k, slot] + slots.length[k, slot]
 
 @entry
-def length(at):
-    add_links(at[0])
-    return at[0]["x"][-1, 0]
+def length(slots):
+    add_links(slots[0])
+    return slots[0]["x"][-1, 0]
 
 def reach_of(links):
-    at = batch_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).at
-    at["length"][:] = 1.0
-    return length(at)
+    slots = batch_for(Robot(left_links=(1.0,) * links, right_links=(1.0,) * links)).slots
+    slots["length"][:] = 1.0
+    return length(slots)
 """
 
 
