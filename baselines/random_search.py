@@ -130,7 +130,7 @@ class RandomSearchHands(Method):
     information = OPTIMISER_INFORMATION
     Parameters = RandomSearchHandsParameters
 
-    def most_together(self) -> int:
+    def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`: 72, or
         fewer if their runs have more than 4,000,000 trials together; at least 1. The runs are made
         one after the other."""

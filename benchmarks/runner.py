@@ -316,7 +316,7 @@ def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
     parts: list[Job] = []
     for job in jobs:
         method, parameters = job.cell.method, job.cell.parameters
-        most = method.configure(parameters).most_together() if method.is_ours else 1
+        most = method.configure(parameters).max_batch() if method.is_ours else 1
         few = max(_MOST_TRIALS // (trials_in(parameters) or 1), _LEAST_BATCH)
         parts += divide(job, min(most, share, few))
     even = len(parts) - len(parts) % workers

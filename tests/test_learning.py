@@ -354,10 +354,10 @@ def test_any_condition_is_a_setting_of_a_method(tmp_path):
 @pytest.mark.parametrize(
     ("fields", "sentence"),
     [
-        ('direction = "stay"', "nothing goes by: set drift or pull above 0"),
+        ('direction = "stay"', "has no effect unless drift or pull is above 0"),
         ('credit = "subtask"', "set learned to 'replay'"),
         ('counted = "all"', "set credit to 'subtask'"),
-        ("drift = -1", "drift is -1; it should be a number from 0 to 10"),
+        ("drift = -1", "drift is -1; it must be a number from 0 to 10"),
         ("drift = []", "list of finite numbers"),
         ('base = "EC9"', "'EC1', 'EC2', 'EC3' or 'EC4'"),
     ],
@@ -370,7 +370,7 @@ def test_conditions_that_cannot_be_are_refused_in_a_sentence(fields, sentence, t
 def test_parameters_of_an_informed_learner_are_refused_where_nothing_goes_by_them():
     (method,) = (each for each in METHODS if each.name == "dual-process/EC4-informed")
     assert method.Parameters(drift=0.0, pull=0.1, direction="stay").direction == "stay"
-    with pytest.raises(ValueError, match="direction is 'stay', which nothing goes by"):
+    with pytest.raises(ValueError, match="direction='stay' has no effect"):
         method.Parameters(drift=0.0, direction="stay")
 
 

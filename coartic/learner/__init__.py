@@ -1,1 +1,4 @@
-"""The dual-process learner. It imports tasks, motion and the base of methods, no other method."""
+"""The dual-process learner.
+
+This package imports tasks, motion and the base of methods, but no other method.
+"""

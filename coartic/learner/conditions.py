@@ -1,18 +1,27 @@
-"""The paper's exploration conditions, and ablations of the learner, as data.
+"""The paper's exploration conditions and ablations of the learner, as data.
 
-A condition says which hands the learner uses, which joints are perturbed (AModChosen:
-base and chosen arm; AModOther: the other arm) and how hands are explored (DASel).
+A condition says which hands the learner uses, which joints are perturbed (AModChosen: base and
+chosen arm; AModOther: the other arm), and how hands are explored (DASel).
 
-Informed conditions join informed and uninformed search, which the paper leaves to "future research"
-(section *Integrating Informed and Uninformed Search*). With the preferred posture p, fixed when a
-goal becomes current, the stored target t and the projection N(x) = I − J⁺J onto the null space of
-the chosen hand's Jacobian, exploration has the mean ``t + κ N(t) (p − t)``, and an iteration of the
-corrective process adds ``β N(x) (p − x)`` to base and chosen arm. N mixes lengths and angles, as
-the paper's distance does.
+Informed conditions combine informed and uninformed search, which the paper leaves to "future
+research" (section *Integrating Informed and Uninformed Search*). Exploration has the mean ::
 
-Ablations go beyond the paper, too. One does not correct movements to stored targets that miss, one
-learns from the reward of each subtask in place of the overall reward, which the paper calls
-crucial.
+    t + κ N(t) (p - t)
+
+and an iteration of the corrective process adds ::
+
+    β N(x) (p - x)
+
+to base and chosen arm, where
+
+- p is the preferred posture, fixed when a goal becomes current;
+- t is the stored target and x the present configuration;
+- N = I − J⁺J projects onto the null space of the chosen hand's Jacobian; like the paper's distance,
+  it mixes lengths and angles.
+
+Ablations go beyond the paper as well. One does not correct a movement to a stored target that
+misses. The other learns from the reward of each subtask instead of the overall reward, which the
+paper calls crucial.
 """
 
 from __future__ import annotations
@@ -40,40 +49,43 @@ if TYPE_CHECKING:
     from coartic.tasks.task import Task
 
 METHOD_PREFIX = "dual-process/"
-"""Beginning of the name of a method that is the learner under a condition; its id follows."""
+"""Beginning of the name of each method that is the learner under a condition; the id of the
+condition follows."""
 MOST_NOISE = 100.0
-"""Largest standard deviation of noise, length unit and rad, beyond what any arm can use."""
+"""Largest standard deviation of noise, length unit and rad; no arm can use more."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Drift = Annotated[float, Field(ge=0, le=10)]
 
 
-def _one_or_several(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
-    """Return a valid drift, a number, or drifts, a tuple of numbers. Raises one validation error
-    for any other value, not an error for each of these forms."""
+def _one_or_many(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
+    """Validate a drift: a number, or a tuple of numbers.
+
+    Raises one validation error for any other value, instead of an error for each form.
+    """
     try:
         return validate(value)
     except ValidationError:
         raise sentence_error(
-            f"drift is {brief_value(value)}; it should be a number from 0 to 10, or a list of such "
+            f"drift is {brief_value(value)}; it must be a number from 0 to 10, or a list of such "
             "numbers"
         ) from None
 
 
 Drifts = Annotated[
     Drift | Annotated[tuple[Drift, ...], Field(min_length=1, strict=False)],
-    WrapValidator(_one_or_several),
+    WrapValidator(_one_or_many),
 ]
 
 
 @in_sentences
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class ExplorationCondition:
-    """Exploration of the learner. Source: paper, section *Experiments*.
+    """How the learner explores, and what it learns from (paper, section *Experiments*).
 
-    ``CONDITIONS`` has the paper's four conditions, ``ABLATIONS`` conditions that change a part of
-    the learner, ``INFORMED`` conditions with more information; ``dataclasses.replace`` returns a
-    copy with other fields. Raises ValueError for fields that are out of range or contradict each
-    other.
+    ``CONDITIONS`` has the paper's four conditions, ``ABLATIONS`` has conditions that change a part
+    of the learner, and ``INFORMED`` has conditions with more information. To change fields of a
+    condition, use ``dataclasses.replace``. Raises ValueError for fields that are out of range or
+    contradict each other.
     """
 
     id: str
@@ -81,92 +93,107 @@ class ExplorationCondition:
     hands: Annotated[tuple[Hand, ...], Field(min_length=1)]
     """Hands that the learner uses."""
     modify_chosen: bool
-    """True if noise moves the targets of a free base and of the arm that is to hit (AModChosen)."""
+    """True if noise moves the targets of the free base and of the arm that is to hit
+    (AModChosen)."""
     modify_other: bool
-    """True if noise moves the targets of the other arm (AModOther); else this arm keeps still."""
+    """True if noise moves the targets of the other arm (AModOther); False if this arm keeps
+    still."""
     hand_exploration: Literal["none", "closest", "random", "nearest-posture"]
-    """Exploration of the hand for a goal: none (``"none"``), the hand closest to the goal
-    (``"closest"``), a random hand (``"random"``, DASel), or the hand whose corrective posture for
-    the goal is nearest in joint space (``"nearest-posture"``)."""
+    """How the hand for a goal is explored:
+
+    - ``"none"``: not at all;
+    - ``"closest"``: the hand closest to the goal;
+    - ``"random"``: a random hand (DASel);
+    - ``"nearest-posture"``: the hand whose corrective posture for the goal is nearest in joint
+      space.
+    """
     epsilon: Share = 0.2
-    """ε: the probability with which the hand for a goal is explored (published)."""
+    """ε: probability with which the hand for a goal is explored (published)."""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
     """Standard deviation of the noise η, length unit (base) and rad (joints) (published)."""
     corrects: bool = True
     """True if **A** corrects a goal that a movement to a stored target misses. If False, such a
-    trial fails, and **A** acts only in trial 0 and for states and hands without stored target."""
+    trial fails, and **A** acts only in trial 0 and for states and hands without a stored target."""
     learned: Literal["best", "replay"] = "best"
-    """Solution of a run: the best trial (``"best"``), or the noiseless greedy trial after the last
-    trial (``"replay"``)."""
+    """Solution of a run: its best trial (``"best"``), or the noiseless greedy trial after the last
+    one (``"replay"``)."""
     credit: Literal["overall", "subtask"] = "overall"
-    """Meaning of Q(s, a) of a goal: the reward R of the whole trial (``"overall"``), or the return
-    of that goal (``"subtask"``, see ``discount``)."""
+    """What Q(s, a) of a goal measures: the reward R of the whole trial (``"overall"``), or the
+    return of that goal (``"subtask"``, see ``discount``)."""
     discount: Share = 0.0
-    """γ: the return of goal g is Σ γ^|h − g| r_h, with r_h the reward of the movements to goal h. 0
-    is the reward of the subtask alone. Above 0 with credit "subtask" only."""
+    """γ: the return of goal g is Σ γ^|h − g| r_h, where r_h is the reward of the movements to goal
+    h. With 0 this is the reward of the subtask itself. A value above 0 needs credit ``"subtask"``.
+    """
     counted: Literal["later", "all"] = "later"
-    """Goals h in the sum of the return of goal g: g and later goals (``"later"``), or all goals
-    (``"all"``, with credit "subtask" only), with which γ = 1 makes every return R."""
+    """Goals h in the sum for the return of goal g: g and later goals (``"later"``), or all goals
+    (``"all"``, which needs credit ``"subtask"``). With ``"all"`` and γ = 1 every return is R."""
     drift: Drifts = 0.0
-    """κ of informed exploration: the share of the way to the preferred posture, in the null space
-    of the hand, by which the mean of exploration moves. Of several numbers each trial
-    after trial 0 draws one."""
+    """κ of informed exploration: by what share of the path to the preferred posture, in the null
+    space of the hand, the mean of exploration moves. If there are many numbers, each trial after
+    trial 0 draws one."""
     pull: Share = 0.0
-    """β of informed correction: the share of the way to the preferred posture, in the null space of
-    the hand, that each iteration of the corrective process adds after trial 0."""
+    """β of informed correction: the share of the path to the preferred posture, in the null space
+    of the hand, that each iteration of the corrective process adds after trial 0."""
     direction: Literal["next-goal", "stay", "start"] = "next-goal"
-    """The preferred posture: halfway to the stored target of the next goal, if any
-    (``"next-goal"``), where the robot is when the goal becomes current (``"stay"``), or where the
-    trial began (``"start"``, wrong information)."""
+    """The preferred posture:
+
+    - ``"next-goal"``: halfway to the stored target of the next goal, if there is one;
+    - ``"stay"``: where the robot is when the goal becomes current;
+    - ``"start"``: where the trial began, which is wrong information.
+    """
 
     def __post_init__(self) -> None:
         if len({*self.hands}) < len(self.hands):
             raise ValueError(f"hands names the same hand twice: {', '.join(self.hands)}")
         if self.discount and self.credit == "overall":
             raise ValueError(
-                f"discount is {self.discount}, but only rewards of subtasks can be discounted: set "
-                "credit to 'subtask'"
+                f"discount is {self.discount}, but only the rewards of subtasks can be discounted: "
+                "set credit to 'subtask'"
             )
         if self.counted == "all" and self.credit == "overall":
             raise ValueError(
-                "counted is 'all', but only returns of subtasks count rewards of goals: set credit "
-                "to 'subtask'"
+                "counted is 'all', but only the returns of subtasks add up rewards of goals: set "
+                "credit to 'subtask'"
             )
         if self.direction != "next-goal" and not self.is_informed:
             raise ValueError(
-                f"direction is {self.direction!r}, which nothing goes by: set drift or pull above 0"
+                f"direction={self.direction!r} has no effect unless drift or pull is above 0"
             )
         if self.credit == "subtask" and self.learned == "best":
             raise ValueError(
-                "a learner with credit 'subtask' has no information about the whole task, so that "
-                "its best trial is no solution that it knows: set learned to 'replay'"
+                "credit is 'subtask', so the learner does not compare whole trials and cannot know "
+                "its best one: set learned to 'replay'"
             )
 
     @property
     def drifts(self) -> tuple[float, ...]:
-        """The field ``drift``, κ, as a tuple: a single number becomes a tuple of one."""
+        """The field ``drift``, κ, as a tuple; a single number becomes a tuple of one."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     @property
     def is_informed(self) -> bool:
-        """True if a preferred posture informs exploration (a drift is not 0) or correction
-        (``pull`` is not 0)."""
+        """True if a preferred posture informs exploration or correction.
+
+        That is, if a drift or ``pull`` is not 0.
+        """
         return any(self.drifts) or self.pull > 0
 
     def why_not(self, task: Task | Outline) -> str | None:
-        """Return a sentence on the hands for which the condition does not apply to a task; None if
-        it applies."""
+        """Return a sentence on why the condition does not apply to a task's hands.
+
+        None if it applies.
+        """
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:
             return (
                 f"{self.id} uses the {' and '.join(self.hands)} hand, "
-                f"task {task.name!r} has no {' or '.join(missing)} hand"
+                f"but task {task.name!r} has no {' or '.join(missing)} hand"
             )
         letters = {hand[0].upper() for hand in self.hands}
         if not task.initial_is_policy and not set(task.initial_hands) <= letters:
             return (
                 f"{self.id} uses only the {self.hands[0]} hand, "
-                f"task {task.name!r} starts with {task.initial_hands}"
+                f"but task {task.name!r} starts with {task.initial_hands}"
             )
         return None
 
@@ -185,7 +212,7 @@ ABLATIONS = {
     for base in ("EC1", "EC4")
     for name, changes in {
         "uncorrected": {"corrects": False},
-        # The reward of the whole task must not pick what it has learned from that of subtasks.
+        # A learner of subtasks must not choose its solution by the reward of the whole task.
         "subtask": {"credit": "subtask", "learned": "replay"},
     }.items()
 }
@@ -195,19 +222,23 @@ INFORMED = {
     for base in ("EC1", "EC4")
 }
 """Informed conditions: EC1 and EC4 with a drift. The preferred posture is halfway to the posture
-for the next goal because the shortest path is straight: they use the form of the reward.
+for the next goal because the shortest path is straight. The conditions therefore use the formula of
+the reward.
 
 The drift was chosen among 0.1, 0.3 and 1 by the mean gap after 10,000 trials on development
-instances d000 to d009 of five families, three runs each (``studies/dial/development.toml``): 6.8,
-4.2 and 4.0 %."""
+instances d000 to d009 of five families, three runs each (``studies/dial/development.toml``). The
+gaps were 6.8, 4.2 and 4.0 %.
+"""
 EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 """All conditions by id."""
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """Return the exploration condition with an id such as ``"EC4"`` or ``"dual-process/EC4"``; a
-    condition is returned itself. Raises CoarticError for an unknown id, and TypeError for an object
-    that is neither a text nor a condition."""
+    """Return the exploration condition with an id such as ``"EC4"`` or ``"dual-process/EC4"``.
+
+    A condition is returned unchanged. Raises CoarticError for an unknown id, and TypeError for an
+    object that is neither a string nor a condition.
+    """
     if isinstance(condition, ExplorationCondition):
         return condition
     if not isinstance(condition, str):

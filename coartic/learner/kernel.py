@@ -1,18 +1,24 @@
-"""The dual-process learner: trial and error over the corrective process.
+"""The dual-process learner: trial and error on top of the corrective process.
 
-The paper's section *The Learning Process* and Figure 3. Per trial and goal: choose a
-hand, perturb the stored target configuration, move, and let the corrective process finish where the
-goal was missed (:mod:`coartic.motion.trial`). A trial better than any before it that passed through
-the same state and hand replaces what is stored there; better by its whole reward, or, in an
-ablation, by the return of that goal.
+This is the paper's section *The Learning Process* and Figure 3. At each goal of a trial the learner
+chooses a hand, perturbs the stored target configuration and moves there; the corrective process
+finishes where the goal was missed (:mod:`coartic.motion.trial`). If the trial is better than any
+earlier trial that passed through the same state and hand, it replaces what is stored there. Trials
+are compared by their total reward or, in an ablation, by the return of the goal.
 
-One call of a compiled kernel performs many runs side by side, goal by goal and trial by
-trial (:mod:`coartic.learner.learning` makes it). Each run draws from a NumPy generator of its own
-(``default_rng(seed)``, PCG64), per goal of each trial after trial 0, in this order: a uniform
-number against ε, where hands are explored; a second number that picks a hand, where the first fell
-below ε and the pick is random; one standard normal per explored joint, in the order of ``q``, where
-a target is stored. Of several drifts a trial draws its own before all else. Runs share nothing: the
-result of one depends neither on the others nor on their number.
+One call of a compiled kernel, by :mod:`coartic.learner.learning`, makes many runs side by side,
+goal by goal and trial by trial. Each run draws from its own NumPy generator (``default_rng(seed)``,
+PCG64), in this order:
+
+1. if there are many drifts, at the beginning of each trial after trial 0: a uniform number that
+   picks one;
+2. for each goal of each trial after trial 0, if hands are explored: a uniform number that is
+   compared with ε;
+3. if it is below ε and the pick is random: a uniform number that picks a hand;
+4. if a target is stored: a standard normal number per explored joint, in the order of ``q``.
+
+Runs share nothing, so that the result of a run depends neither on the other runs nor on their
+number.
 """
 
 from __future__ import annotations
@@ -68,20 +74,20 @@ from coartic.motion.trigonometry import cosine, sine
 from coartic.robot import HANDS, Array, Configs, Hands, Points
 from coartic.tasks.task import Task
 
-NO_HAND = 2  # ∅, the previous hand before goal 1
+NO_HAND = 2  # the paper's ∅, the previous hand before goal 1
 _RANDOM = 1
 _NEAREST_POSTURE = 3
 _EXPLORATION = {"none": 0, "random": _RANDOM, "closest": 2, "nearest-posture": _NEAREST_POSTURE}
 _NEXT_GOAL, _STAY = 0, 1
 _DIRECTION = {"next-goal": _NEXT_GOAL, "stay": _STAY, "start": 2}
-_EQUALLY_NEAR = 1e-9  # hands at the same place up to rounding, length unit
+_EQUALLY_NEAR = 1e-9  # difference of distances that counts as rounding, length unit
 TENTHS = 10
-"""Number of parts of the trials after trial 0, whose corrections are counted apart."""
+"""Number of parts of the trials after trial 0 for which corrections are counted separately."""
 Flags = NDArray[np.bool_]
 
 
 class LearnerParameters(NamedTuple):
-    """Learner parameters: a task and an exploration condition, as the kernel reads them."""
+    """A task and an exploration condition in the form that the kernel reads."""
 
     start: Configs
     """Configuration at the start of a trial, shape ``(dof,)``, length unit and rad."""
@@ -90,13 +96,15 @@ class LearnerParameters(NamedTuple):
     first_hands: Hands
     """Hands of trial 0, shape ``(G,)``."""
     first_targets: Configs
-    """Targets of trial 0, shape ``(G, width)``; NaN beyond ``dof``, and where **A** acts alone."""
+    """Targets of trial 0, shape ``(G, width)``; NaN beyond ``dof``, and for goals at which only
+    **A** acts."""
     hands: Hands
-    """Hands available, shape ``(1,)`` or ``(2,)``."""
+    """Hands that may be used, shape ``(1,)`` or ``(2,)``."""
     follows: Flags
-    """True where a joint takes its current value, shape ``(2, width)``, for each chosen hand."""
+    """True if the target of a joint becomes its current value, shape ``(2, width)``, for each
+    chosen hand."""
     explored: Flags
-    """True where a joint is perturbed, shape ``(2, width)``, for each chosen hand."""
+    """True if a joint is perturbed, shape ``(2, width)``, for each chosen hand."""
     exploration: int
     """Exploration of the hand: 0 none, 1 random, 2 closest, 3 nearest posture."""
     epsilon: float
@@ -106,15 +114,15 @@ class LearnerParameters(NamedTuple):
     corrects: bool
     """True if **A** corrects a goal that a movement to a stored target misses."""
     by_subtask: bool
-    """True if a goal is credited with its own return, not with the reward of the trial."""
+    """True if a goal is credited with its own return instead of the reward of the trial."""
     discount: float
     """γ of the return of a goal."""
     counts_earlier: bool
-    """True if earlier goals count in the return of a goal, too."""
+    """True if earlier goals count in the return of a goal as well."""
     drifts: Array
-    """Values of κ, shape ``(K,)``; of several each trial draws one."""
+    """Values of κ, shape ``(K,)``; if K > 1, each trial draws one."""
     pull: float
-    """β: share of the way to the preferred posture that an iteration of **A** adds."""
+    """β: share of the path to the preferred posture that an iteration of **A** adds."""
     direction: int
     """Preferred posture: 0 next goal, 1 stay, 2 start."""
 
@@ -123,27 +131,28 @@ class Results(NamedTuple):
     """Results of N runs of T trials on a task with G goals."""
 
     rewards: NDArray[np.int64]
-    """Minus the ticks of each trial, also of failed trials, shape ``(N, T)``."""
+    """Minus the ticks of each trial, failed trials included, shape ``(N, T)``."""
     completed: Flags
-    """True where a trial hit every goal, shape ``(N, T)``."""
+    """True if a trial hit every goal, shape ``(N, T)``."""
     best_trial: NDArray[np.int64]
-    """First completed trial, from 0, with the highest reward, shape ``(N,)``; -1 if none was
-    completed."""
+    """First of the completed trials with the highest reward, from 0, shape ``(N,)``; -1 if no trial
+    was completed."""
     counts: NDArray[np.int64]
-    """Counts of all trials without the replay, by :data:`coartic.motion.trial.COUNTED`, shape
-    ``(N, 5)``."""
+    """Counts of all trials without the replay, in the order of
+    :data:`coartic.motion.trial.COUNTED`, shape ``(N, 5)``."""
     corrections: NDArray[np.int64]
-    """Corrective movements in trial 0 and in each tenth of the rest, shape ``(N, 11)``."""
-    first: NDArray[np.void]
-    """Accounts of the goals in trial 0, where it was completed, shape ``(N, G)``."""
-    best: NDArray[np.void]
+    """Corrective movements in trial 0 and in each tenth of the later trials, shape ``(N, 11)``."""
+    initial_accounts: NDArray[np.void]
+    """Accounts of the goals in trial 0, if it was completed, shape ``(N, G)``."""
+    best_accounts: NDArray[np.void]
     """Accounts of the goals in the best trial, if there is one, shape ``(N, G)``."""
-    last: NDArray[np.void]
-    """Accounts of the goals in the last trial made, shape ``(N, G)``: in the end the replay."""
+    last_accounts: NDArray[np.void]
+    """Accounts of the goals in the latest trial, which in the end is the replay, shape ``(N,
+    G)``."""
 
 
 class _Workspace(NamedTuple):
-    """Work space of N runs, each now at the same goal of the same trial."""
+    """Work space of N runs, which are all at the same goal of the same trial."""
 
     batch: Batch
     counts: NDArray[np.int64]
@@ -151,34 +160,37 @@ class _Workspace(NamedTuple):
     returns: Array
     """Returns of the goals of a trial, shape ``(G,)``."""
     xs: Array
-    """Places of joints from shoulder to hand, shape ``(n + 1,)`` for the longer arm."""
+    """x of shoulder, joints and hand, shape ``(n + 1,)`` for the longer arm."""
     ys: Array
     jacobian: Array
-    """Rows x and y of a Jacobian, and joint changes, shape ``(3, width)``."""
+    """Rows x and y of a Jacobian, and changes of joints, shape ``(3, width)``."""
 
 
 def learner_parameters(
-    compiled: CompiledTask, condition: ExplorationCondition, first: Sequence[Movement]
+    compiled: CompiledTask, condition: ExplorationCondition, initial: Sequence[Movement]
 ) -> LearnerParameters:
-    """Return a task and a condition as the learner's kernel reads them; ``first`` has the movement
-    of trial 0 for each goal; a movement without a target is corrective."""
+    """Return a task and a condition in the form that the learner's kernel reads.
+
+    ``initial`` has the movement of trial 0 for each goal; a movement without a target is
+    corrective.
+    """
     task, width = compiled.task, width_of(compiled.task.robot)
-    first_targets = np.full((len(first), width), np.nan)
-    for target, movement in zip(first_targets, first, strict=True):
+    first_targets = np.full((len(initial), width), np.nan)
+    for target, movement in zip(first_targets, initial, strict=True):
         if movement.target is not None:
             target[: task.robot.dof] = movement.target
     follows, explored = np.zeros((2, 2, width), dtype=np.bool_)
     base = np.array(["x" not in task.locked_base, "y" not in task.locked_base])
     for chosen, hand in enumerate(HANDS):
-        of_arm, others = task.robot.joints(hand), task.robot.joints(HANDS[1 - chosen])
+        joints, idle_joints = task.robot.joints(hand), task.robot.joints(HANDS[1 - chosen])
         explored[chosen, :2] = condition.modify_chosen & base
-        explored[chosen, of_arm] = condition.modify_chosen
-        explored[chosen, others] = condition.modify_other
-        follows[chosen, others] = not condition.modify_other
+        explored[chosen, joints] = condition.modify_chosen
+        explored[chosen, idle_joints] = condition.modify_other
+        follows[chosen, idle_joints] = not condition.modify_other
     return LearnerParameters(
         start=compiled.starts[0],
         goals=compiled.goals[0],
-        first_hands=np.array([HANDS.index(movement.hand) for movement in first], dtype=np.int64),
+        first_hands=np.array([HANDS.index(movement.hand) for movement in initial], dtype=np.int64),
         first_targets=first_targets,
         hands=np.array(sorted(HANDS.index(hand) for hand in condition.hands), dtype=np.int64),
         follows=follows,
@@ -197,9 +209,12 @@ def learner_parameters(
 
 
 def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
-    """Return tables in which nothing is learned, shape ``(runs, G, 3, 2)``: by run, goal, previous
-    hand (left, right, none) and hand a record of ``value``, Q (-inf), and ``target``, q*, ``dof``
-    entries of NaN and then zeros up to the width of kernel records."""
+    """Return tables in which nothing is learned, shape ``(runs, G, 3, 2)``.
+
+    The axes are run, goal, previous hand (left, right, none) and hand. An entry is a record of
+    ``value``, Q (-inf), and ``target``, q*: ``dof`` entries of NaN, then zeros up to the width of
+    kernel records.
+    """
     learned = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
     tables = np.zeros((runs, len(task.goals), 3, 2), learned)
     tables["value"], tables["target"][..., : task.robot.dof] = -np.inf, np.nan
@@ -207,7 +222,7 @@ def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
 
 
 def workspace_for(runs: int, task: Task) -> _Workspace:
-    """Return new arrays in which the kernel works on ``runs`` runs, at most 72, of a task."""
+    """Return new arrays in which the kernel makes at most 72 runs of a task."""
     return _Workspace(
         batch=batch_for(task.robot, runs),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
@@ -220,8 +235,10 @@ def workspace_for(runs: int, task: Task) -> _Workspace:
 
 @inlined
 def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _Workspace) -> float:
-    """Return the distance of a hand (0 left, 1 right) of a run from the centre of its goal, length
-    unit; add 1 to the run's ``evaluations``."""
+    """Return the distance of a run's hand (0 left, 1 right) from its goal's centre.
+
+    It is in length units. The run's ``evaluations`` grow by 1.
+    """
     arm = arm_of(robot, hand)
     chain_by(run.q, arm, workspace.xs, workspace.ys, cosine, sine)
     run.evaluations += 1
@@ -235,10 +252,13 @@ def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _
 def _nearest_posture(
     n: int, robot: RobotRecord, learner: LearnerParameters, workspace: _Workspace
 ) -> int:
-    """Return the hand, 0 left or 1 right, with which the posture that the corrective process **A**
-    finds for the goal of run ``n`` is nearest in joint space to the present posture; of equal
-    hands, and if **A** fails with all, the first. Iterations and evaluations are counted; the run
-    does not move, but its ``hand``, ``converged`` and ``iterations`` change in place."""
+    """Return the hand whose corrective posture for the goal is nearest to the present posture.
+
+    Distances are in joint space; the posture is what the corrective process **A** finds for the
+    goal of run ``n``. At a tie, and if **A** fails with all hands, it is the first hand. Iterations
+    and evaluations are counted. The run does not move, but its ``hand``, ``converged`` and
+    ``iterations`` change in place.
+    """
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
     for hand in learner.hands:
@@ -256,8 +276,10 @@ def _nearest_posture(
 
 @inlined
 def _best_hand(entries: Any, hands: Any) -> int:
-    """Return the hand, 0 left or 1 right, among ``hands`` whose record in ``entries``, an array of
-    two by hand, has the highest ``value``, Q; of equal hands the first."""
+    """Return the hand among ``hands`` with the highest Q; at a tie the first.
+
+    ``entries`` has a record for each hand, 0 left and 1 right.
+    """
     best = hands[0]
     for hand in hands[1:]:
         if entries[hand].value > entries[best].value:
@@ -269,35 +291,48 @@ def _best_hand(entries: Any, hands: Any) -> int:
 def choose_hand(
     n: int, entries: Any, explore: bool, robot: Any, learner: Any, rng: Any, workspace: Any
 ) -> int:
-    """Return the hand (0 left, 1 right) of run ``n`` for its present goal: the hand of highest
-    value Q in ``entries``, a record for each hand, the left hand at a tie. With ``explore``, with
-    probability ε, return the hand that the condition explores instead, if it explores hands: a
-    random hand, the hand closest to the goal (a random one if both are), or the hand whose
-    posture at the goal is nearest."""
+    """Choose the hand (0 left, 1 right) of run ``n`` for its present goal.
+
+    The choice is the hand with the highest value Q in ``entries``, a record for each hand; at a tie
+    the left hand. If ``explore`` is True and the condition explores hands, it is with probability ε
+    instead one of
+
+    - a random hand;
+    - the hand closest to the goal, or a random hand if both are equally close;
+    - the hand whose posture at the goal is nearest.
+    """
     hands, run = learner.hands, workspace.batch.runs[n]
     if explore and learner.exploration != 0 and rng.random() < learner.epsilon:
         if learner.exploration == _NEAREST_POSTURE:
             return _nearest_posture(n, robot, learner, workspace)
-        nearest, draws = hands[0], learner.exploration == _RANDOM
-        if not draws:
+        nearest, is_random = hands[0], learner.exploration == _RANDOM
+        if not is_random:
             least = distance_to_goal(run, nearest, robot, workspace)
             for hand in hands[1:]:
                 distance = distance_to_goal(run, hand, robot, workspace)
-                draws = abs(distance - least) <= _EQUALLY_NEAR
+                is_random = abs(distance - least) <= _EQUALLY_NEAR
                 if distance < least:
                     nearest, least = hand, distance
-        return int(hands[int(rng.random() * len(hands))]) if draws else int(nearest)
+        return int(hands[int(rng.random() * len(hands))]) if is_random else int(nearest)
     return _best_hand(entries, hands)
 
 
 @inner
 def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) -> None:
-    """Set the preferred posture p of a run, once its hand for goal ``number`` (from 0) is chosen,
-    by the learner's ``direction``. *stay*: the present posture q. *start*: the start of the trial.
-    *next goal*: (q + t') / 2, where t' is the target that is stored for the next goal and its hand
-    of highest value; q without a next goal or such a target, and for joints that this hand's
-    movements do not explore. ``table`` has, for goal, last hand (0 left, 1 right, 2 none) and hand,
-    ``(G, 3, 2)``, records of the value and the target. Nothing changes if drift and pull are 0."""
+    """Set the preferred posture p of a run after its hand for a goal is chosen, in place.
+
+    The learner's ``direction`` decides what p is:
+
+    - *stay*: the present posture q;
+    - *start*: the posture at the start of the trial;
+    - *next goal*: (q + t') / 2, where t' is the target stored for the next goal and its hand with
+      the highest value. p is q if there is no next goal or no such target, and for joints that this
+      hand's movements do not explore.
+
+    ``number`` is the index of the goal, from 0. ``table`` has records of value and target, shape
+    ``(G, 3, 2)``: by goal, previous hand (0 left, 1 right, 2 none) and hand. Nothing changes if
+    drift and pull are 0.
+    """
     if run.drift == 0.0 and run.pull == 0.0:
         return
     fill_row(run.preferred, run.q)
@@ -317,10 +352,12 @@ def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) 
 def drift(
     run: RunRecord, robot: RobotRecord, learner: LearnerParameters, workspace: _Workspace
 ) -> None:
-    """Move the mean t of exploration, the run's ``target``, in place, by κ N(t) (p − t), and an
-    idle arm that is explored by κ (p − t); p is the preferred posture, N projects onto the null
-    space of the hand's Jacobian. Entries that are not explored do not change, and no entry changes
-    if the run's drift κ is 0."""
+    """Move the mean of exploration, the run's ``target`` t, in place.
+
+    It moves by κ N(t) (p − t), and by κ (p − t) for an idle arm that is explored. κ is the run's
+    drift, p the preferred posture, and N projects onto the null space of the hand's Jacobian.
+    Entries that are not explored do not change; nothing changes if κ is 0.
+    """
     if run.drift == 0.0:
         return
     x, y, v = workspace.jacobian
@@ -331,16 +368,16 @@ def drift(
         x[j], y[j], v[j] = 0.0, 0.0, 0.0
         k = j - arm.first_joint
         if learner.explored[run.hand, j]:
-            away = run.preferred[j] - run.target[j]
+            change = run.preferred[j] - run.target[j]
             if j == 0:
-                x[j], v[j] = 1.0, away
+                x[j], v[j] = 1.0, change
             elif j == 1:
-                y[j], v[j] = 1.0, away
+                y[j], v[j] = 1.0, change
             elif 0 <= k < tip:
                 x[j], y[j] = joint_lever(workspace.xs, workspace.ys, k, tip)
-                v[j] = away
+                v[j] = change
             else:
-                run.target[j] += run.drift * away
+                run.target[j] += run.drift * change
     project(v, x, y)
     for j in range(len(run.q)):
         run.target[j] += run.drift * v[j]
@@ -358,13 +395,15 @@ def aim(
     rng: np.random.Generator,
     workspace: _Workspace,
 ) -> None:
-    """Choose and set, in ``workspace.batch.runs[n]``, the hand for goal ``number`` (from 0) after
-    hand ``before`` (0 left, 1 right, 2 none), and its target: phase 2, *aim*.
+    """Choose the hand for a goal and set its target: phase 2, *aim*.
 
-    The target is the stored target q*(s, a), but for an idle arm that the condition does not
-    modify, which keeps its posture; without a stored target there is none, and the corrective
-    process acts. With ``explore`` the hand is explored (:func:`choose_hand`), and drift and noise η
-    are added to the target. ``table`` is that of :func:`prefer`.
+    The target is the stored target q*(s, a); an idle arm that the condition does not modify keeps
+    its posture. Without a stored target there is no target, and the corrective process acts. If
+    ``explore`` is True, the hand is explored (:func:`choose_hand`), and drift and noise η are added
+    to the target.
+
+    ``n`` is the index of the run in ``workspace.batch.runs``, ``number`` that of the goal,
+    ``before`` the previous hand (0 left, 1 right, 2 none), and ``table`` as in :func:`prefer`.
     """
     run, entries = workspace.batch.runs[n], table[number, before]
     run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
@@ -383,25 +422,27 @@ def aim(
 
 @inlined
 def make_trial(
-    first: bool,
+    initial: bool,
     explore: bool,
     robot: RobotRecord,
     learner: LearnerParameters,
     tables: Any,
-    trial: Any,
+    accounts: Any,
     rngs: Any,
     workspace: _Workspace,
 ) -> None:
-    """Make one trial in each of N runs, up to the first goal missed; fill in ``trial``, the
-    accounts of the goals, shape ``(N, G)``, and the counts in ``workspace``. ``first`` makes trial
-    0, with hands and targets of ``learner``; without ``explore`` a trial is greedy, without drift
-    and noise. Other arguments as in :func:`learn_kernel`."""
+    """Make one trial in each of N runs, up to the first goal missed.
+
+    This fills ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. If ``initial`` is
+    True, it is trial 0 with the hands and targets of ``learner``. If ``explore`` is False, the
+    trial is greedy, without drift and noise. Other arguments are as in :func:`learn_kernel`.
+    """
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):
         set_off(batch.runs[n], learner.start)
-        if explore and not first:
-            several, rng = len(learner.drifts), generator_at(rngs, n)
-            kappa = learner.drifts[int(rng.random() * several) if several > 1 else 0]
+        if explore and not initial:
+            choices, rng = len(learner.drifts), generator_at(rngs, n)
+            kappa = learner.drifts[int(rng.random() * choices) if choices > 1 else 0]
             batch.runs[n].drift, batch.runs[n].pull = kappa, learner.pull
         for k in range(counts.shape[1]):
             counts[n, k] = 0
@@ -409,34 +450,36 @@ def make_trial(
         for n in range(runs):
             run = batch.runs[n]
             begin(run, learner.goals[number])
-            if first:
+            if initial:
                 run.hand = learner.first_hands[number]
                 if run.going:
                     aim_at(run, learner.first_targets[number])
             elif run.going:
-                before = trial[n, number - 1].hand if number > 0 else NO_HAND
+                before = accounts[n, number - 1].hand if number > 0 else NO_HAND
                 rng = generator_at(rngs, n)
                 aim(n, number, before, tables[n], explore, robot, learner, rng, workspace)
         move_runs(runs, robot, batch)
         for n in range(runs):
-            trial[n, number].moved = batch.runs[n].ticks
+            accounts[n, number].moved = batch.runs[n].ticks
             if batch.runs[n].action == MOVE:
-                fill_row(trial[n, number].target, batch.runs[n].target)
-        if first or learner.pull == 0.0:
+                fill_row(accounts[n, number].target, batch.runs[n].target)
+        if initial or learner.pull == 0.0:
             find_corrections(runs, robot, batch)
         else:
             find_pulled_corrections(runs, robot, batch)
         make_corrections(runs, robot, batch)
         for n in range(runs):
-            account(batch.runs[n], trial[n, number].moved, trial[n, number])
-            count_goal(trial[n, number], counts[n])
+            account(batch.runs[n], accounts[n, number].moved, accounts[n, number])
+            count_goal(accounts[n, number], counts[n])
 
 
 @inlined
 def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
-    """Fill ``returns``, ``(G,)``, in place, with the return of each goal g of a completed trial: Σ
-    γ^|h − g| r_h over goals h from g on, or, if earlier goals count, over all; r_h is minus the
-    ticks of goal h."""
+    """Compute the return of each goal of a completed trial, in place.
+
+    ``returns``, shape ``(G,)``, becomes Σ γ^|h − g| r_h for each goal g, where r_h is minus the
+    ticks of goal h. The sum is over goals h from g on, or over all goals if earlier goals count.
+    """
     earlier, later = 0.0, 0.0
     for number in range(len(trial)):
         returns[number] = earlier
@@ -449,24 +492,29 @@ def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
 
 @inlined
 def _copy_accounts(source: Any, destination: Any) -> None:
-    """Copy the accounts of the goals of a trial, shape ``(G,)``, over accounts ``destination``, in
-    place, word by word: LLVM copies records byte by byte, which takes long to compile."""
-    words, given = destination.view(np.int64), source.view(np.int64)
-    for k in range(len(given)):
-        words[k] = given[k]
+    """Copy the accounts of a trial's goals, shape ``(G,)``, in place.
+
+    It copies word by word: LLVM would copy records byte by byte, which takes long to compile.
+    """
+    copies, words = destination.view(np.int64), source.view(np.int64)
+    for k in range(len(words)):
+        copies[k] = words[k]
 
 
 @inlined
 def _learn_from(
     number: int, learner: LearnerParameters, tables: Any, results: Results, workspace: _Workspace
 ) -> None:
-    """Add trial ``number`` (from 0) of each run to ``results``; in runs that completed it, credit
-    each visited state and hand with the reward of the trial, or the return of its goal: a credit
-    above Q replaces Q in ``tables``, and the configuration at the hit replaces q*."""
-    others = max(1, results.rewards.shape[1] - 1)
-    part = 0 if number == 0 else 1 + (number - 1) * TENTHS // others
+    """Add trial ``number`` (from 0) of each run to ``results``, and learn from completed trials.
+
+    In a run that completed the trial, each visited state and hand is credited with the reward of
+    the trial, or with the return of its goal. If the credit is above Q, it replaces Q in
+    ``tables``, and the configuration at the hit replaces q*.
+    """
+    later_trials = max(1, results.rewards.shape[1] - 1)
+    part = 0 if number == 0 else 1 + (number - 1) * TENTHS // later_trials
     for n in range(len(tables)):
-        trial, counts = results.last[n], workspace.counts[n]
+        trial, counts = results.last_accounts[n], workspace.counts[n]
         completed = workspace.batch.runs[n].going
         for k in range(len(counts)):
             results.counts[n, k] += counts[k]
@@ -477,7 +525,7 @@ def _learn_from(
         if not completed:
             continue
         if number == 0:
-            _copy_accounts(trial, results.first[n])
+            _copy_accounts(trial, results.initial_accounts[n])
         if learner.by_subtask:
             _find_returns(trial, learner, workspace.returns)
         for goal in range(len(trial)):
@@ -490,21 +538,35 @@ def _learn_from(
         best = results.best_trial[n]
         if best < 0 or reward > results.rewards[n, best]:
             results.best_trial[n] = number
-            _copy_accounts(trial, results.best[n])
+            _copy_accounts(trial, results.best_accounts[n])
 
 
 @entry
 def learn_kernel(
     robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, workspace: Any
 ) -> None:
-    """Make all trials of N runs, each with its own generator (``rngs``, :func:`addresses`), and
-    then in each a greedy trial without noise, the replay (of 0 trials: trial 0); fill in
-    new :func:`empty_tables` and ``results`` (:class:`Results`: zeros, ``best_trial`` -1).
-    ``robot``, ``learner`` and ``workspace`` come from :func:`robot_parameters`,
-    :func:`learner_parameters` and :func:`workspace_for`."""
+    """Make all trials of N runs, and then in each the replay, a greedy trial without noise.
+
+    If there are 0 trials, trial 0 takes the place of the replay.
+
+    Parameters
+    ----------
+    robot
+        From :func:`robot_parameters`.
+    learner
+        From :func:`learner_parameters`.
+    tables
+        New :func:`empty_tables`, filled in place.
+    results
+        :class:`Results` of zeros with ``best_trial`` -1, filled in place.
+    rngs
+        The runs' own generators (:func:`addresses`).
+    workspace
+        From :func:`workspace_for`.
+    """
     trials = results.rewards.shape[1]
-    for number in range(trials + 1):  # the last is the replay, which is not part of the runs
-        first, explore, made = number == 0, number < trials, results.last
-        make_trial(first, explore, robot[0], learner, tables, made, rngs, workspace)
+    for number in range(trials + 1):  # the last trial is the replay, which is not part of the runs
+        initial, explore, accounts = number == 0, number < trials, results.last_accounts
+        make_trial(initial, explore, robot[0], learner, tables, accounts, rngs, workspace)
         if number < trials:
             _learn_from(number, learner, tables, results, workspace)

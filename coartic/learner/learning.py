@@ -55,14 +55,16 @@ from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, letters_of
 
 TRIALS = 10_000  # trials of one run (published)
-_MOST_KEPT = 200_000_000  # trials of one call, whose rewards take 9 bytes each
-_MOST_TOGETHER = 4_000_000  # trials of runs whose rewards fit into one answer of a worker
+_MOST_STORED = 200_000_000  # trials of one call; each takes 9 bytes
+_MOST_IN_BATCH = 4_000_000  # trials of runs whose rewards fit into one answer of a worker
 
 
 def runs_at_once(trials: int) -> int:
-    """Return the largest number of runs of ``trials`` trials for one job of a worker: 72, or fewer
-    if 72 runs have more than 4,000,000 trials in all; at least 1."""
-    return max(1, min(SLOTS, _MOST_TOGETHER // trials))
+    """Return the largest number of runs of ``trials`` trials for one job of a worker.
+
+    It is 72, or fewer if 72 runs have more than 4,000,000 trials in total, but at least 1.
+    """
+    return max(1, min(SLOTS, _MOST_IN_BATCH // trials))
 
 
 def learn(
@@ -82,17 +84,18 @@ def learn(
     ----------
     task : Task, str or pathlib.Path
     condition : str or ExplorationCondition
-        The condition, or the id of one in ``CONDITIONS``, ``ABLATIONS`` or ``INFORMED``: ``"EC4"``.
+        The condition, or its id in ``CONDITIONS``, ``ABLATIONS`` or ``INFORMED``, such as
+        ``"EC4"``.
     seed : int
         Seed of the random numbers.
     trials : int
-        Number of trials, the initial one included.
+        Number of trials, including trial 0.
     model : MotionModel
     start : sequence of Movement
-        A first solution, such as a planner's or an earlier run's. Trial 0 moves straight to the
-        target of the first of these movements for each goal, with its hand, length unit (base) and
-        rad (joints); the corrective process acts where that misses the goal, or there is no target.
-        Without a first solution that process acts alone.
+        A first solution, such as a planner's or an earlier run's. For each goal trial 0 uses the
+        first of its movements: it moves straight to the target with that hand, length unit (base)
+        and rad (joints). The corrective process acts if that misses the goal, or if there is no
+        target. Without a first solution only the corrective process acts in trial 0.
 
     Returns
     -------
@@ -112,7 +115,7 @@ def learn(
     SolutionError
         The first solution breaks the task's rules.
     ValueError
-        The seed is no whole number from 0 to 2^128 - 1, ``trials`` is not from 1 to 10,000,000, a
+        The seed is not an integer from 0 to 2^128 - 1, ``trials`` is not from 1 to 10,000,000, a
         constant of the model is out of bounds, or the task was changed so that it contradicts
         itself.
 
@@ -124,10 +127,10 @@ def learn(
     --------
     >>> from coartic import learn
     >>> first = learn("ascending", "EC1", seed=0, trials=500)
-    >>> more = learn("ascending", "EC1", seed=1, trials=500, start=first.solution)
-    >>> more.initial_reward == first.reward
+    >>> second = learn("ascending", "EC1", seed=1, trials=500, start=first.solution)
+    >>> second.initial_reward == first.reward
     True
-    >>> more.reward >= first.reward
+    >>> second.reward >= first.reward
     True
     """
     (run,) = learn_many(
@@ -148,7 +151,7 @@ def learn_many(
 ) -> list[LearningRun]:
     """Run the learner once for each of many seeds, as :func:`learn` does.
 
-    Runs go on side by side, which changes only the time.
+    Runs are made side by side, which changes only the time that they take.
 
     Parameters
     ----------
@@ -161,7 +164,7 @@ def learn_many(
     start : sequence of Movement
         Arguments of :func:`learn`, the same for every run.
     jobs : int
-        Most threads; -1 for one a core.
+        Largest number of threads; -1 for one per core.
 
     Returns
     -------
@@ -173,9 +176,13 @@ def learn_many(
     TaskError, NotApplicableError, CoarticError, SolutionError
         Task, condition or first solution cannot be used, as in :func:`learn`.
     TypeError, ValueError
-        An argument is refused by :func:`learn`, seeds are a text, not iterable, equal or too many
-        (the rewards of at most 1,000,000 runs and 200,000,000 trials are kept), or ``jobs`` is
-        neither -1 nor from 1 to 10,000.
+        An argument cannot be used:
+
+        - :func:`learn` refuses it;
+        - ``seeds`` is a string or not iterable, or has equal seeds;
+        - there are too many seeds: the rewards of all runs are stored, at most 1,000,000 runs and
+          200,000,000 trials;
+        - ``jobs`` is neither -1 nor from 1 to 10,000.
     """
     task = as_task(task)
     condition = load_condition(condition)
@@ -183,38 +190,38 @@ def learn_many(
         raise NotApplicableError(reason)
     check_limits("trials", trials, 1, MOST_TRIALS)
     if isinstance(seeds, str | bytes) or not isinstance(seeds, Iterable):
-        raise TypeError(f"seeds is {brief_value(seeds)}; it must be a list of whole numbers")
-    trials, most = int(trials), min(MOST_RUNS, _MOST_KEPT // trials)
-    ordered = [*islice(seeds, most + 1)]
-    if len(ordered) > most:
+        raise TypeError(f"seeds is {brief_value(seeds)}; it must be a list of integers")
+    trials, limit = int(trials), min(MOST_RUNS, _MOST_STORED // trials)
+    ordered = [*islice(seeds, limit + 1)]
+    if len(ordered) > limit:
         raise ValueError(
-            f"seeds has more than {most:,} entries, which are the most for runs of {trials:,} "
-            "trials: the rewards of all are kept. Run some seeds after the others"
+            f"seeds has more than {limit:,} entries, the limit for runs of {trials:,} trials, "
+            "because all rewards are stored. Run some seeds in another call"
         )
     for seed in ordered:
         check_limits("seed", seed, 0, MOST_RUN_SEED)
     ordered = [int(seed) for seed in ordered]
     if len({*ordered}) < len(ordered):
-        twice = next(seed for seed in ordered if ordered.count(seed) > 1)
-        raise ValueError(f"seeds has {twice} more than once; each run needs a seed of its own")
+        duplicate = next(seed for seed in ordered if ordered.count(seed) > 1)
+        raise ValueError(f"seeds has {duplicate} more than once; each run needs its own seed")
     if start:
-        first = [movements[0] for movements in movements_by_goal(task, start)]
-        for movement in first:
+        initial = [movements[0] for movements in movements_by_goal(task, start)]
+        for movement in initial:
             if movement.hand not in condition.hands:
                 raise NotApplicableError(
-                    f"{condition.id} uses only the {condition.hands[0]} hand, the first solution "
-                    f"uses the {movement.hand} hand"
+                    f"{condition.id} uses only the {condition.hands[0]} hand, but the first "
+                    f"solution uses the {movement.hand} hand"
                 )
     else:
         hands = check_hands(task, initial_hands(task, condition.hands, model=model))
-        first = corrective_movements(hands)
+        initial = corrective_movements(hands)
     threads = threads_for(jobs)
-    together = max(min(SLOTS, math.ceil(len(ordered) / threads)), 1)
-    batches = [ordered[begin : begin + together] for begin in range(0, len(ordered), together)]
-    _learn_together(task, condition, model, first, [0], 0)  # compiles, on no run's time
+    size = max(min(SLOTS, math.ceil(len(ordered) / threads)), 1)
+    batches = [ordered[begin : begin + size] for begin in range(0, len(ordered), size)]
+    _learn_together(task, condition, model, initial, [0], 0)  # compile before time is taken
 
     def perform(batch: Sequence[int]) -> list[LearningRun]:
-        return _learn_together(task, condition, model, first, batch, trials)
+        return _learn_together(task, condition, model, initial, batch, trials)
 
     if threads == 1:
         return [run for batch in batches for run in perform(batch)]
@@ -226,13 +233,15 @@ def _learn_together(
     task: Task,
     condition: ExplorationCondition,
     model: MotionModel,
-    first: Sequence[Movement],
+    initial: Sequence[Movement],
     seeds: Sequence[int],
     trials: int,
 ) -> list[LearningRun]:
-    """Run the learner side by side, once for each of at most 72 seeds, unchecked; return the runs
-    in the order of seeds. ``first`` has the movement of trial 0 for each goal, without a target for
-    the corrective process. 0 trials compile the kernels: rewards are empty, the replay is trial 0.
+    """Run the learner side by side, once for each of at most 72 seeds, unchecked.
+
+    Return the runs in the order of seeds. ``initial`` has the movement of trial 0 for each goal; it
+    has no target if the corrective process is to act. With 0 trials the kernels are compiled, the
+    rewards are empty, and the replay is trial 0.
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
@@ -243,39 +252,40 @@ def _learn_together(
         best_trial=np.full(runs, -1),
         counts=np.zeros((runs, len(COUNTED)), dtype=np.int64),
         corrections=np.zeros((runs, 1 + TENTHS), dtype=np.int64),
-        first=empty,
-        best=empty.copy(),
-        last=empty.copy(),
+        initial_accounts=empty,
+        best_accounts=empty.copy(),
+        last_accounts=empty.copy(),
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
-    learner, rngs = learner_parameters(compiled, condition, first), addresses(generators)
+    learner, rngs = learner_parameters(compiled, condition, initial), addresses(generators)
     workspace = workspace_for(runs, task)
     count_trials(runs * trials)
     clock = time.perf_counter()
     learn_kernel(compiled.parameters, learner, tables, results, rngs, workspace)
     wall = time.perf_counter() - clock
 
-    given = [[[Movement(1, "right", "learned")]] * len(task.goals)] * runs
+    requested = [[[Movement(1, "right", "learned")]] * len(task.goals)] * runs
 
     def movements(accounts: NDArray[np.void]) -> list[tuple[Movement, ...]]:
-        each = movements_in(accounts[..., None], dof, given)
-        completed = accounts["hit"][:, -1]
-        return [tuple(some) if whole else () for some, whole in zip(each, completed, strict=True)]
+        trials = zip(movements_in(accounts[..., None], dof, requested), accounts, strict=True)
+        return [tuple(trial) if goals["hit"][-1] else () for trial, goals in trials]
 
-    initial, best, replay = map(movements, (results.first, results.best, results.last))
+    initial_trials = movements(results.initial_accounts)
+    best_trials = movements(results.best_accounts)
+    replays = movements(results.last_accounts)
     return [
         LearningRun(
             task=task,
             condition=condition,
             model=model,
             seed=seed,
-            first_hands=hands_in(first),
+            first_hands=hands_in(initial),
             rewards=np.ma.array(results.rewards[n], mask=~results.completed[n]),
             best_trial=int(results.best_trial[n]) if results.best_trial[n] >= 0 else None,
-            initial=initial[n],
-            solution=best[n],
-            replay=replay[n],
-            replay_reward=-int(results.last["ticks"][n].sum()) if replay[n] else None,
+            initial=initial_trials[n],
+            solution=best_trials[n],
+            replay=replays[n],
+            replay_reward=-int(results.last_accounts["ticks"][n].sum()) if replays[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
             corrections=results.corrections[n],
@@ -291,16 +301,20 @@ Kernels = Literal["learner", "motion", "trials"]
 
 
 def warm_up(task: Task, *parts: Kernels) -> None:
-    """Compile the kernels for the number of links of the task's robot, or load their machine code,
-    which later runs need not do. ``parts`` names the kernels, by default all three:
-    ``"learner"``, ``"motion"`` (single movements and corrections), ``"trials"`` (trials and
-    executions without paths).
+    """Compile a task's kernels, or load their machine code, so that later runs need not.
+
+    They are compiled for the number of links of the task's robot. ``parts`` names the kernels, by
+    default all three:
+
+    - ``"learner"``: the learner;
+    - ``"motion"``: single movements and corrections;
+    - ``"trials"``: trials, and executions without paths.
     """
     hand, goal = task.hands[0], task.goals[0]
     if not parts or "learner" in parts:
         condition = ExplorationCondition("warm-up", task.hands, True, False, "none")
-        first = corrective_movements(letters_of([hand] * len(task.goals)))
-        _learn_together(task, condition, PAPER, first, [0], 0)
+        initial = corrective_movements(letters_of([hand] * len(task.goals)))
+        _learn_together(task, condition, PAPER, initial, [0], 0)
     if not parts or "trials" in parts:
         targets = np.empty((0, len(task.goals), 1, task.robot.dof))
         make_trials(compiled_task(task, PAPER), np.empty(targets.shape[:2], np.int64), targets)

@@ -1,4 +1,4 @@
-"""Results of one run of the learner."""
+"""The results of one run of the learner."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ from coartic.robot import Array
 from coartic.tasks.task import Task
 
 CORRECTIONS_BY_TENTH = "corrections"
-"""Detail of a stored run: corrective movements in trial 0 and in each tenth of later trials."""
+"""Detail of a stored run: the corrective movements in trial 0 and in each tenth of the later
+trials."""
 
 
 @dataclass(frozen=True, eq=False)
 class LearningRun:
-    """Run of the learner, with everything that was learned (:func:`learn`)."""
+    """A run of the learner with everything that it learned (:func:`learn`)."""
 
     task: Task
     """The task."""
@@ -40,7 +41,8 @@ class LearningRun:
     """Total reward of each trial, shape ``(trials,)``: minus its control ticks; masked where the
     trial failed."""
     best_trial: int | None
-    """First completed trial, from 0, with the highest total reward; None without such a trial."""
+    """First of the completed trials with the highest total reward, from 0; None if no trial was
+    completed."""
     initial: tuple[Movement, ...]
     """Movements of trial 0; empty if it failed."""
     solution: tuple[Movement, ...]
@@ -50,30 +52,33 @@ class LearningRun:
     replay_reward: int | None
     """Total reward of the replay; None if it failed."""
     values: Array
-    """Q, shape ``(goals, 3, 2)``: goal, previous hand (left, right, none), hand. Highest total
-    reward, or return of the goal where the condition credits subtasks; -inf where nothing was
-    learned."""
+    """Q, shape ``(goals, 3, 2)``, by goal, previous hand (left, right, none) and hand. It is the
+    highest total reward, or the highest return of the goal if the condition credits subtasks; -inf
+    if nothing was learned."""
     targets: Array
-    """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN where Q is
-    -inf."""
+    """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN if Q is -inf."""
     corrections: NDArray[np.int64]
-    """Corrective movements made in trial 0 and in each tenth of later trials, shape ``(11,)``."""
+    """Corrective movements in trial 0 and in each tenth of the later trials, shape ``(11,)``."""
     counters: Meter
-    """Counts of the trials of the run, without its replay."""
+    """Counts of the trials of the run; the replay is not counted."""
     wall_s: float = field(compare=False)
-    """Share of this run in the time of the runs made together, s."""
+    """Time of the runs that were made together, divided by their number, s."""
     __eq__ = equal_contents
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """True for the trials that hit every goal, bool, shape ``(trials,)``. Other trials failed,
-        and changed neither ``values`` nor ``targets``."""
+        """True for the trials that hit every goal, bool, shape ``(trials,)``.
+
+        All other trials failed, and changed neither ``values`` nor ``targets``.
+        """
         return ~np.ma.getmaskarray(self.rewards)
 
     @property
     def learned(self) -> tuple[Movement, ...]:
-        """Movements of the learned solution: of the best trial, or, if the condition has
-        ``learned="replay"``, of the replay; empty if no such trial hit every goal."""
+        """Movements of the learned solution; empty if its trial did not hit every goal.
+
+        This is the best trial, or the replay if the condition has ``learned="replay"``.
+        """
         if self.condition.learned == "best":
             return self.solution
         return self.replay
@@ -92,8 +97,11 @@ class LearningRun:
 
     @property
     def reward(self) -> int | None:
-        """Total reward of the learned solution: the highest reward of any trial, or, if the
-        condition has ``learned="replay"``, the reward of the replay; None without a solution."""
+        """Total reward of the learned solution; None without a solution.
+
+        This is the highest reward of all trials, or the reward of the replay if the condition has
+        ``learned="replay"``.
+        """
         if self.condition.learned == "replay":
             return self.replay_reward
         return None if self.best_trial is None else int(self.rewards[self.best_trial])
@@ -109,8 +117,11 @@ class LearningRun:
         return int(self.rewards[0]) if self.completed[0] else None
 
     def execute(self) -> Execution:
-        """Execute the learned solution again, without the learner; return the execution, whose
-        reward is :attr:`reward`. Raises CoarticError if there is no learned solution."""
+        """Execute the learned solution again, without the learner.
+
+        The execution has the reward :attr:`reward`. Raises CoarticError if there is no learned
+        solution.
+        """
         if not self.learned:
             raise CoarticError(f"nothing to execute: {self.reason}")
         return execute(self.task, self.learned, model=self.model)

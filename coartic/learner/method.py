@@ -1,7 +1,7 @@
-"""The dual-process learner as methods, one per exploration condition and one for any.
+"""The dual-process learner as methods: one per exploration condition, and one for any.
 
-Variants that use more information than the paper's learner are methods of their own, so that what a
-method declares holds under all its parameters.
+Variants that use more information than the paper's learner are separate methods. A method's
+declaration therefore holds under all its parameters.
 """
 
 from __future__ import annotations
@@ -32,39 +32,43 @@ from coartic.method import (
 )
 
 _FIELDS: dict[str, Any] = get_type_hints(ExplorationCondition, include_extras=True)
-del _FIELDS["id"], _FIELDS["hands"]  # which parameters do not change
+del _FIELDS["id"], _FIELDS["hands"]  # parameters cannot change these
 
 
 class DualProcessParameters(Parameters):
     """Parameters of every learner."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run, fewer if the budget has fewer left."""
+    """Number of trials of a run; fewer if the budget has fewer left."""
 
 
 class CustomParameters(DualProcessParameters):
-    """Parameters of an exploration condition: a condition of the paper, ``base``, with other values
-    of some fields."""
+    """Parameters of a condition of the paper in which some fields are changed."""
 
     base: Literal["EC1", "EC2", "EC3", "EC4"] = "EC4"
-    """The paper's condition that is changed."""
+    """The condition of the paper that is changed."""
 
     @model_validator(mode="after")
     def check_condition(self) -> Self:
-        """Return the parameters themselves. Raise ValueError if the condition that they describe
-        contradicts itself, such as a discount without credit for subtasks."""
+        """Check the condition that the parameters describe, and return the parameters.
+
+        Raises ValueError if the condition contradicts itself, such as a discount without credit for
+        subtasks.
+        """
         _condition_of(CONDITIONS[self.base], self)
         return self
 
 
 def _condition_of(base: ExplorationCondition, parameters: Parameters) -> ExplorationCondition:
-    """Return a copy of condition ``base`` with the values of fields of a condition among
-    ``parameters`` that are not None. Raises ValueError for values that contradict each other."""
+    """Return a copy of condition ``base`` with the parameters that are not None.
+
+    Raises ValueError if the values contradict each other.
+    """
     return replace(base, **parameters.model_dump(include={*_FIELDS}, exclude_none=True))
 
 
 class DualProcess(Method):
-    """Trial and error over the corrective process (paper, Figure 3)."""
+    """Trial and error on top of the corrective process (paper, Figure 3)."""
 
     condition: ClassVar[ExplorationCondition]
     citation = (
@@ -74,38 +78,52 @@ class DualProcess(Method):
     tuned_on = "nothing: the paper's values"
 
     def rules(self) -> ExplorationCondition:
-        """Return the method's exploration condition, with the values of its parameters."""
+        """Return the method's exploration condition with the values of its parameters."""
         return _condition_of(self.condition, self.parameters)
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence on the hands for which the learner's exploration condition does not
-        apply to a task; None if it applies."""
+        """Return a sentence on why the learner's condition does not apply to a task's hands.
+
+        None if it applies.
+        """
         return self.rules().why_not(task)
 
     def solve(self, session: Session) -> Result:
-        """Run the learner; return the movements of its best trial, or, if the condition has
-        ``learned="replay"``, of the replay, the noiseless trial after learning. Raises MethodError
-        if no such trial hit every goal, or the budget has no trial left, and NotApplicableError if
-        no initial hands are found."""
+        """Run the learner, and return the movements of its learned solution.
+
+        This is the best trial or, if the condition has ``learned="replay"``, the noiseless trial
+        after learning.
+
+        Raises
+        ------
+        MethodError
+            That trial did not hit every goal, or the budget has no trial left.
+        NotApplicableError
+            No initial hands are found.
+        """
         (result,) = self.solve_together([session])
         if isinstance(result, MethodError):
             raise result
         return result
 
-    def most_together(self) -> int:
-        """Return the largest number of sessions for one call of :meth:`solve_together`: 72, or
-        fewer if their runs have more than 4,000,000 trials together by parameter ``trials``; at
-        least 1."""
+    def max_batch(self) -> int:
+        """Return the largest number of sessions for one call of :meth:`solve_together`.
+
+        It is 72, or fewer if their runs have more than 4,000,000 trials in total, but at least 1.
+        """
         return runs_at_once(self.parameters.trials)
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
-        """Run the learner in sessions that differ in their seeds alone; return for each, in order,
-        the result of :meth:`solve`, or the MethodError that it would raise, as an object."""
+        """Run the learner in sessions that differ only in their seeds.
+
+        Return for each session, in order, the result of :meth:`solve` or the MethodError that it
+        would raise, as an object.
+        """
         parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
         task, model = tasks[0], sessions[0].model
         for session in sessions:
-            session.find_initial_hands(condition.hands)  # counts what that takes
+            session.find_initial_hands(condition.hands)  # so that its trials are counted
         left = sessions[0].trials_left
         trials = parameters.trials if left is None else min(parameters.trials, left)
         if trials < 1:
@@ -132,9 +150,11 @@ class DualProcess(Method):
 
 
 def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
-    """Return a new subclass of :class:`DualProcess`: the learner under a condition. Parameters are
-    trials, noise and ε; of an informed condition also drift, pull and direction; with credit for
-    subtasks also discount and counted."""
+    """Return a new subclass of :class:`DualProcess`, the learner under a condition.
+
+    Its parameters are trials, noise and ε. An informed condition also has drift, pull and
+    direction; a condition with credit for subtasks also has discount and counted.
+    """
     names, citation = ["epsilon", "noise_sd"], DualProcess.citation
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     if condition.is_informed:  # to move in the null space of a hand, where paths are short
@@ -190,7 +210,7 @@ _optional: Any = {name: (kind | None, None) for name, kind in _FIELDS.items()}
 
 
 class CustomDualProcess(DualProcess):
-    """The learner under any exploration condition, with all information that a condition may use.
+    """The learner under any exploration condition, with all information that one may use.
 
     Its parameters are ``trials``, ``base`` and the fields of a condition except ``id`` and
     ``hands``.
@@ -198,15 +218,16 @@ class CustomDualProcess(DualProcess):
 
     name = f"{METHOD_PREFIX}custom"
     title = "Dual-process learner, any exploration condition"
-    information = frozenset[Information]().union(*(each.information for each in _LEARNERS))
+    information = frozenset[Information]().union(*(learner.information for learner in _LEARNERS))
     Parameters: ClassVar[type[Parameters]] = create_model(
         "CustomParameters", __base__=CustomParameters, **_optional
     )
 
     def rules(self) -> ExplorationCondition:
-        """Return a copy of the paper's condition that parameter ``base`` names, with the values of
-        the fields of a condition among the parameters that are not None, and an id such as ``EC4,
-        changed,``."""
+        """Return the paper's condition that ``base`` names with the fields that are not None.
+
+        Its id is such as ``EC4, changed,``.
+        """
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
         return _condition_of(base, self.parameters)
 

@@ -110,7 +110,7 @@ class Method(ABC):
         """Find a solution of the session's task; return the movements, in a :class:`Result`. Raises
         MethodError if none is found, or NotApplicableError if no initial hands are."""
 
-    def most_together(self) -> int:
+    def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`; a suite
         gives methods that are not this project's own one session, whatever they return."""
         return 1
