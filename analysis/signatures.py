@@ -35,7 +35,7 @@ from coartic.estimates import RESAMPLES, SEED, Resamples, centred, slices
 from coartic.internal.arguments import Numbers
 from coartic.motion.trial import reach_goals
 from coartic.robot import HANDS, Array
-from coartic.tasks.optima import KEPT
+from coartic.tasks.optima import HASHED_FIELDS
 from coartic.tasks.task import hands_of
 
 
@@ -488,7 +488,7 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
     """
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
-        others_differ = any(getattr(first, key) != getattr(second, key) for key in KEPT)
+        others_differ = any(getattr(first, key) != getattr(second, key) for key in HASHED_FIELDS)
         if not others_differ and first.goals != second.goals:
             same = (one == other for one, other in zip(first.goals, second.goals, strict=False))
             shared = len(list(takewhile(bool, same)))

@@ -61,7 +61,7 @@ def test_a_saved_task_is_read_as_it_was(task, tmp_path):
     with pytest.raises(CoarticError, match="replace=True"):
         task.save(path)
     task.save(str(path), replace=True)
-    with pytest.raises(CoarticError, match=r"the name of a task's file ends in \.toml"):
+    with pytest.raises(CoarticError, match=r"the name of a task file must end in \.toml"):
         task.save(tmp_path / "saved.json")
 
 

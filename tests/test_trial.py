@@ -214,7 +214,7 @@ def test_kernels_end_whatever_they_get(bad, where):
         *(("goals", goals, "^goals ") for goals in ([[1.0, 2.0]], [[1.0, np.inf]] * 2)),
         ("targets", np.zeros((2, 9)), "^targets "),
         ("radius", 0.0, "radius"),
-        ("locked_base", ("z",), "may name 'x' and 'y'"),
+        ("locked_base", ("z",), "may only have 'x' and 'y'"),
     ],
 )
 def test_many_arms_are_checked_before_a_kernel_gets_them(name, wrong, words):

@@ -1,2 +1,4 @@
-"""Tasks, the names under which they are found, and families of random tasks. They import the robot
-and its motion, and no method."""
+"""Tasks, the names under which they are found, and families of random tasks.
+
+This package imports the robot and its motion, but no method.
+"""

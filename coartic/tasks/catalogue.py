@@ -1,4 +1,4 @@
-"""Tasks by name: shipped ones, instances of a family, files."""
+"""Tasks by name: shipped tasks, instances of families, and task files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def builtin_tasks() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Their names, in the paper's order. :func:`load_task` takes each of them.
+        Their names, in the paper's order. :func:`load_task` accepts each of them.
     """
     return tuple(shipped_tasks())
 
@@ -31,9 +31,12 @@ def load_task(name_or_path: str | Path) -> Task:
     Parameters
     ----------
     name_or_path : str or pathlib.Path
-        The name of a task that comes with the package (``"ascending"``) or of an instance of a
-        family (``"two-armed/v1/i017"``, ``"mine.v1.toml/i017"`` of the family of a file), or the
-        path of a task file. A text that ends in ``.toml`` is a path.
+        One of
+
+        - the name of a task that comes with the package, such as ``"ascending"``;
+        - the name of an instance of a family, such as ``"two-armed/v1/i017"``, or
+          ``"mine.v1.toml/i017"`` for the family of a file;
+        - the path of a task file; a string that ends in ``.toml`` is a path.
 
     Returns
     -------
@@ -43,17 +46,17 @@ def load_task(name_or_path: str | Path) -> Task:
     Raises
     ------
     TaskError
-        There is no such task, or the file cannot be used: the message names the file.
+        The task does not exist, or the file cannot be used: the message names the file.
     TypeError
-        The argument is neither a text nor a path.
+        The argument is neither a string nor a path.
     """
     if not isinstance(name_or_path, str | Path):
         raise TypeError(
             f"task is {brief_value(name_or_path)}; it must be a task, the name of one, such as "
             "'ascending', or the path of a task file"
         )
-    if words := foreign_file(str(name_or_path)):
-        raise TaskError(words)
+    if problem := foreign_file(str(name_or_path)):
+        raise TaskError(problem)
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
         if is_family(str(name_or_path)):
             raise TaskError(
@@ -63,8 +66,8 @@ def load_task(name_or_path: str | Path) -> Task:
         is_own = task.family not in (None, *shipped_families())
         if "/" in task.name and not is_own and task != instance(task.name):
             raise TaskError(
-                f"{name_or_path}: the task is called {task.name!r}, but it is not the instance of "
-                "that name. Give it another name, or write the instance again: "
+                f"{name_or_path}: the task is called {task.name!r}, but it differs from the "
+                "instance with this name. Give it another name, or write the instance again: "
                 f"coartic draw {task.name} --out FOLDER"
             )
         return task
@@ -79,6 +82,8 @@ def load_task(name_or_path: str | Path) -> Task:
 
 
 def as_task(task: TaskLike) -> Task:
-    """Return the task itself, or load it by its name or from its file (:func:`load_task`). Raises
-    TaskError for a task that cannot be loaded, and TypeError for anything else."""
+    """Return a task itself, or load it by its name or from its file (:func:`load_task`).
+
+    Raises TaskError if the task cannot be loaded, and TypeError for another type.
+    """
     return task if isinstance(task, Task) else load_task(task)

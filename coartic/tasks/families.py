@@ -1,17 +1,20 @@
 """Families of random tasks: distributions as data, and instances that never change.
 
-A family is a file, ``families/NAME.vN.toml``: how many goals, where, for which hands, arms and
-base, from which start; once released, it is not changed, and a change is a new version. An
-instance is a task by the name ``two-armed/v1/i017``, and a function of file and name alone: numbers
-come from a counter-based generator (:mod:`coartic.tasks.philox`) whose key is the hash of family,
-version and stream and whose counter has the number of the instance. Streams are ``d`` (development:
-to tune on), ``i`` (test: to report on) and years (``2027-``: fresh ones).
+A family is a file, ``families/NAME.vN.toml``. It says how many goals there are, where they are, for
+which hands, arms and base, and from which start. A family that was released is not changed; a
+change is a new version.
 
-What is drawn once is the structure: how many goals and links, the base, the kind of start. Places
-and angles are drawn again until :func:`broken_rule` finds none, so that rejection leaves the shares
-of structures alone. They are whole thousandths from the start. Geometric rules compare integers;
-the others ask the compiled kernels, which use IEEE arithmetic alone
-(:mod:`coartic.motion.trigonometry`): no rejection depends on a machine's library.
+An instance is a task with a name such as ``two-armed/v1/i017``. It depends only on the file and the
+name: numbers come from a counter-based generator (:mod:`coartic.tasks.philox`). Its key is the hash
+of family, version and stream, and its counter has the number of the instance. Streams are ``d``
+(development, to tune on), ``i`` (test, to report on) and years (``2027-``, fresh instances).
+
+The structure is drawn once: how many goals and links, the base, the kind of start. Positions and
+angles are drawn again until they break no rule (:func:`broken_rule`). Rejection therefore does not
+change the shares of structures. Positions and angles are integers of thousandths from the
+beginning. Geometric rules compare integers; the other rules use the compiled kernels, which need
+only IEEE arithmetic (:mod:`coartic.motion.trigonometry`). No rejection depends on a machine's
+library.
 """
 
 from __future__ import annotations
@@ -53,9 +56,9 @@ from coartic.tasks.task import (
 
 FAMILY_FOLDER = Path(__file__).parent / "families"
 COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
-"""Number of instances of each split that are named by default, from instance 0."""
+"""Default number of instances of each split, counted from instance 0."""
 MOST_ATTEMPTS = 10_000
-"""Most drafts of one instance; a family that needs more cannot be used."""
+"""Largest number of drafts of one instance; a family that needs more cannot be used."""
 Base = Literal["free", "rail", "locked"]
 LOCKED: dict[Base, tuple[Literal["x", "y"], ...]] = {
     "free": (),
@@ -63,14 +66,16 @@ LOCKED: dict[Base, tuple[Literal["x", "y"], ...]] = {
     "locked": ("x", "y"),
 }
 """Base coordinates that cannot move, by kind of base."""
-_PARTS = 1000  # of a unit of length, of a rad, of 1
-_STRUCTURE, _GEOMETRY = 0, 1  # what a block of the generator is for
+_PARTS = 1000  # parts of a length unit, of a rad, of 1
+_STRUCTURE, _GEOMETRY = 0, 1  # word of the counter, by what is drawn
 _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
 
 
 def _in_thousandths(value: float) -> int:
-    """Return a number in thousandths, 300 for 0.3. Raises a validation error for what is no
-    finite number with at most three decimals."""
+    """Return a number in thousandths: 300 for 0.3.
+
+    Raises a validation error unless it is a finite number with at most three decimals.
+    """
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not is_number or not abs(value * _PARTS) <= sys.float_info.max:
         raise PydanticCustomError("finite", "should be a finite number")
@@ -80,57 +85,60 @@ def _in_thousandths(value: float) -> int:
 
 
 Thousandths = Annotated[int, BeforeValidator(_in_thousandths)]
-"""A length, an angle or a share: given with up to three decimals, kept in thousandths."""
+"""A length, an angle or a share: written with up to three decimals, stored in thousandths."""
 
 
-def _in_order(span: tuple[int, int]) -> tuple[int, int]:
-    """Return the span itself. Raises a validation error if its first number is the larger."""
-    if span[0] > span[1]:
+def _in_order(limits: tuple[int, int]) -> tuple[int, int]:
+    """Check that the lower number of a range comes first, and return the range."""
+    if limits[0] > limits[1]:
         raise PydanticCustomError("order", "should have the lower number first")
-    return span
+    return limits
 
 
-def _as_share(span: tuple[int, int]) -> tuple[int, int]:
-    """Return the span itself. Raises a validation error if it is not within 0 to 1."""
-    if not 0 <= span[0] <= span[1] <= _PARTS:
+def _as_share(limits: tuple[int, int]) -> tuple[int, int]:
+    """Check that a range is within 0 to 1, and return it."""
+    if not 0 <= limits[0] <= limits[1] <= _PARTS:
         raise PydanticCustomError("share", "should be from 0 to 1")
-    return span
+    return limits
 
 
 _ordered = AfterValidator(_in_order)
-Span = Annotated[tuple[Thousandths, Thousandths], _ordered]
-"""Lowest and highest value; every thousandth from one to the other is equally likely."""
+Range = Annotated[tuple[Thousandths, Thousandths], _ordered]
+"""Lowest and highest value; every thousandth between them is equally likely."""
 _GoalsCount = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
 _PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
 _Bases = tuple[Base, ...]
 
 
 class _Region(FileData):
-    """Region of the goals: a box, in which a box with a drawn share of the sides is placed."""
+    """Region of the goals: a box in which each instance has its own, possibly smaller box."""
 
-    x: Span
-    """From, to, length unit; at the start the base is at the origin."""
-    y: Span
+    x: Range
+    """From, to, length unit; the base is at the origin at the start."""
+    y: Range
     """From, to, length unit."""
-    scale: Annotated[Span, AfterValidator(_as_share)] = (_PARTS, _PARTS)
-    """Length of the sides of an instance's own box, as a share of the region's, from, to."""
+    scale: Annotated[Range, AfterValidator(_as_share)] = (_PARTS, _PARTS)
+    """Sides of an instance's own box as a share of the region's sides, from, to."""
 
 
 class _Alignment(FileData):
-    """Goals on a horizontal or vertical line, except one, not first or last, of three or more."""
+    """Goals on a horizontal or vertical line, except one goal if there are three or more.
 
-    steps: Span
+    The goal off the line is neither the first nor the last.
+    """
+
+    steps: Range
     """Distance from goal to goal along the line, length unit, from, to."""
-    off: Span
-    """Distance of that goal from the line, to either side, length unit, from, to."""
+    off: Range
+    """Distance of the goal off the line from the line, to either side, length unit, from, to."""
 
 
 class Posture(FileData):
-    """An arm at the start."""
+    """Posture of an arm at the start."""
 
-    first: Span
+    first: Range
     """Angle of the first joint from +x, rad, from, to."""
-    others: Span
+    others: Range
     """Angle of each other joint from the link before it, rad, from, to."""
 
 
@@ -138,7 +146,7 @@ _PARKED = Posture(first=(0, 0), others=(0, 0))
 
 
 class Postures(FileData):
-    """Both arms at the start; an arm without an entry is straight along +x."""
+    """Postures of both arms at the start; an arm without an entry is straight along +x."""
 
     left: Posture = _PARKED
     """The left arm."""
@@ -147,9 +155,9 @@ class Postures(FileData):
 
 
 class Family(FileData):
-    """Distributions of tasks, and rules that each instance keeps.
+    """Distributions from which tasks are drawn, and rules that each instance obeys.
 
-    Lengths, angles and shares of the file are kept as whole thousandths: 300 for 0.3.
+    Lengths, angles and shares of the file are stored as integers of thousandths: 300 for 0.3.
     """
 
     name: str
@@ -157,47 +165,57 @@ class Family(FileData):
     title: Line
     """Name in figures and tables."""
     description: Line
-    """A sentence for lists."""
+    """One sentence for lists."""
     hands: tuple[Hand, ...] = HANDS
     """Hands that may hit goals."""
     goals: Annotated[tuple[_GoalsCount, _GoalsCount], _ordered]
-    """Least and largest number of goals; each number is equally likely."""
+    """Smallest and largest number of goals; each number is equally likely."""
     links: Annotated[tuple[_PerArm, _PerArm], _ordered]
-    """Least and largest number of links of each arm; all links have one length (to a
+    """Smallest and largest number of links of each arm. All links have the same length (to a
     thousandth)."""
     reach: Thousandths = 4 * _PARTS
     """Sum of the links of each arm, length unit; by default the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
-    """Bases; each instance has one: free, on a rail (it cannot move in y), or locked."""
+    """Bases, of which each instance has one: free, on a rail (it cannot move in y), or locked."""
     restrictions: _Bases = ()
-    """Bases, in addition to the instance's own, with which every instance can be completed."""
+    """Further bases with which every instance can be completed, in addition to its own."""
     radius: Thousandths = 100
     """Radius of every goal, length unit."""
     region: _Region
     """Region of the goals: table ``[region]``."""
     line: _Alignment | None = None
-    """Goals on a line: table ``[line]``; scattered in the region where left out."""
+    """Goals on a line: table ``[line]``. Without this table goals are scattered in the region."""
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
-    """Starting postures; each instance has one: tables ``[[start]]``."""
+    """Starting postures, of which each instance has one: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
-    """Policy that finds the hands of trial 0, ``"best-single-hand"`` or ``"best-of-all"``; an
-    instance names the hands that the policy found for it."""
+    """Policy that finds the hands of trial 0, ``"best-single-hand"`` or ``"best-of-all"``. An
+    instance has the hands that the policy found for it."""
     apart: Thousandths = 300
-    """Least distance between the centres of two goals, length unit."""
+    """Smallest distance between the centres of two goals, length unit."""
     clear: Thousandths = 200
-    """Least distance of a hand at the start from a goal's rim, length unit."""
+    """Smallest distance of a hand at the start from the rim of a goal, length unit."""
     within: Thousandths = 950
-    """Largest distance of a goal from a shoulder, as a share of the reach, measured along the base
+    """Largest distance of a goal from a shoulder as a share of the reach, measured along the base
     coordinates that are locked."""
     bent: Thousandths = 200
-    """Angle, rad, by which a joint of each arm with one of ``hands`` is bent at least at the
-    start."""
+    """Angle, rad. At the start each arm with one of ``hands`` has a joint after its first that is
+    bent at least by this angle."""
 
 
 def draft(family: Family, address: Address, attempt: int) -> Task:
-    """Return the task drawn for the instance at ``address`` in attempt ``attempt`` (from 0); equal
-    arguments give equal tasks. No rule of the family is checked (:func:`broken_rule`): goals may be
-    out of reach. ``initial_hands`` of the task is a policy, not yet a hand sequence.
+    """Return the task drawn for an instance in one attempt, unchecked.
+
+    No rule of the family is checked (:func:`broken_rule`), and goals may be out of reach.
+    ``initial_hands`` of the task is still a policy instead of a hand sequence. Equal arguments give
+    equal tasks.
+
+    Parameters
+    ----------
+    family : Family
+    address : Address
+        The instance.
+    attempt : int
+        Number of the attempt, from 0.
     """
     key = hash_key(f"coartic {family.name}/{address.stream}")
     structure = Draws(key, address.number, 0, _STRUCTURE)
@@ -206,13 +224,13 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
     vertical = structure.one_of((False, True))
     draws = Draws(key, address.number, attempt, _GEOMETRY)
     goals = draw_goals(draws, family, count, vertical)
-    # Links of one length, where that can be, else the first ones a thousandth longer.
+    # Links have the same length; if that is impossible, the first ones are a thousandth longer.
     length, longer = divmod(family.reach, links)
     lengths = [(length + (k < longer)) / _PARTS for k in range(links)]
     start: dict[str, Any] = {}
     for hand, posture in (("left", postures.left), ("right", postures.right)):
-        spans = [posture.first, *[posture.others] * (links - 1)]
-        start[hand] = [draws.integer(*span) / _PARTS for span in spans]
+        ranges = [posture.first, *[posture.others] * (links - 1)]
+        start[hand] = [draws.integer(*limits) / _PARTS for limits in ranges]
     content = {
         "name": str(address),
         "hands": list(family.hands),
@@ -227,10 +245,21 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
 
 
 def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list[tuple[int, int]]:
-    """Draw ``count`` goals and return their x and y, thousandths of a length unit: in a box with a
-    drawn share of the region's sides, or, if the family has a line, on a line (``vertical`` or
-    horizontal) except, if there are more than two, one goal, neither first nor last, which ``off``
-    of the line moves off it. Goals on a line may be outside the region."""
+    """Draw goals, and return their x and y in thousandths of a length unit.
+
+    Without a line in the family they are in a box with a drawn share of the region's sides. With a
+    line they are on a line, possibly outside the region. If there are more than two goals, one of
+    them, neither the first nor the last, is moved off the line by ``off``.
+
+    Parameters
+    ----------
+    draws : Draws
+    family : Family
+    count : int
+        Number of goals.
+    vertical : bool
+        True if the line is vertical, False if it is horizontal.
+    """
     region, line = family.region, family.line
     share, sides = draws.integer(*region.scale), []
     for low, high in (region.x, region.y):
@@ -241,28 +270,30 @@ def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list
     if line is None:
         return scattered
     along, across = (region.y, region.x) if vertical else (region.x, region.y)
-    at, level = draws.integer(*along), draws.integer(*across)
-    forward = draws.one_of((-1, 1))
-    places = [at]
+    start, level = draws.integer(*along), draws.integer(*across)
+    direction = draws.one_of((-1, 1))
+    steps = [start]
     for _ in range(count - 1):
-        places.append(places[-1] + forward * draws.integer(*line.steps))
+        steps.append(steps[-1] + direction * draws.integer(*line.steps))
     levels = [level] * count
     if count > 2:
-        odd = draws.integer(1, count - 2)
-        levels[odd] += draws.one_of((-1, 1)) * draws.integer(*line.off)
-    return [*(zip(levels, places, strict=True) if vertical else zip(places, levels, strict=True))]
+        moved_goal = draws.integer(1, count - 2)
+        levels[moved_goal] += draws.one_of((-1, 1)) * draws.integer(*line.off)
+    return [*(zip(levels, steps, strict=True) if vertical else zip(steps, levels, strict=True))]
 
 
 def broken_rule(family: Family, task: Task) -> str | None:
-    """Return the name of the first rule of the family that a draft, a task drawn for it, breaks;
-    None if it breaks no rule.
+    """Return the name of the first rule that a draft of the family breaks, or None.
 
-    ``outside``: a goal is outside the region. ``overlap``: two goals are too near to each other.
-    With hands of the family, ``reach``: a goal is too far from a shoulder, with the base of the
-    draft or of a restriction; ``straight``: an arm is straight at the start, or nearly;
-    ``start-hit``: a hand is in a goal at the start, or close by; ``corrective``: the corrective
-    process alone does not complete the task, with the base of the draft or of a restriction, or has
-    more than 4096 hand sequences to try.
+    - ``outside``: a goal is outside the region.
+    - ``overlap``: two goals are too close to each other.
+    - ``reach``: a goal is too far from a shoulder, with the base of the draft or of a restriction.
+    - ``straight``: an arm is straight at the start, or nearly.
+    - ``start-hit``: a hand is in a goal at the start, or close to one.
+    - ``corrective``: the corrective process on its own does not complete the task, with the base of
+      the draft or of a restriction, or has more than 4096 hand sequences to try.
+
+    The last four rules only look at hands of the family.
     """
     goals = [(_in_thousandths(x), _in_thousandths(y)) for x, y in task.goals]
     (left, right), (low, high) = family.region.x, family.region.y
@@ -292,15 +323,20 @@ def broken_rule(family: Family, task: Task) -> str | None:
         hands, _ = search_initial_hands(task)
     except NotApplicableError:
         return "corrective"
-    others = (task.model_copy(update={"locked_base": locked}) for locked in restricted)
-    rewards = (reward for other in others for _, reward, *_ in ranked_sequences(other, [hands]))
-    return "corrective" if None in rewards else None
+    for locked in restricted:
+        restricted_task = task.model_copy(update={"locked_base": locked})
+        ((_, reward, *_),) = ranked_sequences(restricted_task, [hands])
+        if reward is None:
+            return "corrective"
+    return None
 
 
 def instance_of(family: Family, address: Address) -> Task:
-    """Return the instance of a family at an address, the first draft (task drawn for it) that
-    breaks no rule, as a task with a title, initial hands and provenance. Raises TaskError if each
-    of the first 10,000 drafts breaks a rule of the family."""
+    """Return the instance of a family at an address: the first draft that breaks no rule.
+
+    The task has a title, initial hands and provenance. Raises TaskError if each of the first 10,000
+    drafts breaks a rule of the family.
+    """
     broken = Counter[str]()
     for attempt in range(MOST_ATTEMPTS):
         task = draft(family, address, attempt)
@@ -333,71 +369,80 @@ def instance_of(family: Family, address: Address) -> Task:
 
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
-    """Return an instance of a family, a task, by its name, such as ``two-armed/v1/i017``, or
-    ``mine.v1.toml/i017`` of the family of a file; the last 4096 are kept. Raises TaskError if
-    there is no such instance."""
-    place, _, short = name.rpartition("/")
-    address = address_of(f"{load_family(place).name}/{short}" if is_file(place) else name)
+    """Return an instance of a family, a task, by its name; the last 4096 are cached.
+
+    The name is such as ``two-armed/v1/i017``, or ``mine.v1.toml/i017`` for the family of a file.
+    Raises TaskError if the instance does not exist.
+    """
+    family, _, short = name.rpartition("/")
+    address = address_of(f"{load_family(family).name}/{short}" if is_file(family) else name)
     if address is None:
         raise TaskError(
             f"{name!r} is not an instance of a family. Write for example two-armed/v1/i017 (test), "
             "two-armed/v1/d017 (development) or two-armed/v1/2027-017 (fresh, of the year 2027)."
         )
-    return instance_of(load_family(place), address)
+    return instance_of(load_family(family), address)
 
 
 def is_file(family: str) -> bool:
-    """Return whether a family is named by a file: whether its name ends in ``.toml``."""
+    """Return whether the name of a family is that of a file, which ends in ``.toml``."""
     return family.endswith(".toml")
 
 
 def named_by(text: str) -> list[str]:
-    """List the names of the instances of a range such as ``two-armed/v1/i000..i039``, both ends
-    included; for a text that is no range, such as a task's name or its file, list this text alone,
-    unchecked. Raises TaskError for a range that is malformed, goes backwards or has more than
-    10,000 instances. Whether a shipped family exists is not checked."""
+    """List the names of the instances of a range such as ``two-armed/v1/i000..i039``.
+
+    Both ends are included. If ``text`` is not a range, it is the only entry, unchecked; it may be a
+    task's name or file. Raises TaskError for a range that is malformed, goes backwards or has more
+    than 10,000 instances. Whether a shipped family exists is not checked.
+    """
     if "/" not in text or ".." not in text.rpartition("/")[2] or text.endswith(".toml"):
         return [text]
     written = _RANGE.fullmatch(text)
     start = written[1] if written else ""
-    known = f"{load_family(start[:-1]).name}/" if is_file(start[:-1]) else start
-    ends = [address_of(known + end) for end in written.groups()[1:]] if written else [None]
-    first, last = ends[0], ends[-1]
-    if first is None or last is None or first.stream != last.stream:
+    family = f"{load_family(start[:-1]).name}/" if is_file(start[:-1]) else start
+    ends = [address_of(family + end) for end in written.groups()[1:]] if written else [None]
+    low, high = ends[0], ends[-1]
+    if low is None or high is None or low.stream != high.stream:
         raise TaskError(
             f"{text!r} is not a range of instances. Write for example two-armed/v1/i000..i039, "
             "or the path of a task file of your own, which ends in .toml."
         )
-    if last.number < first.number:
+    if high.number < low.number:
         raise TaskError(f"{text!r} goes backwards; put the lower number first")
-    if last.number - first.number >= MOST_CELLS:
+    if high.number - low.number >= MOST_CELLS:
         raise TaskError(f"{text!r} names more than {MOST_CELLS:,} instances")
-    numbers = range(first.number, last.number + 1)
-    return [str(first._replace(family=start[:-1], number=number)) for number in numbers]
+    numbers = range(low.number, high.number + 1)
+    return [str(low._replace(family=start[:-1], number=number)) for number in numbers]
 
 
 def shipped_families() -> dict[str, Family]:
-    """Return a new dictionary of the shipped families by name with version, ``two-armed/v1``."""
+    """Return a new dictionary of the shipped families by name, such as ``two-armed/v1``."""
     families = map(read_family, sorted(FAMILY_FOLDER.glob("*.v*.toml")))
     return {family.name: family for family in families}
 
 
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
-    """Return the families read from files, by name. Raises TaskError for a file that cannot be
-    used, and for a name that another of the files or a shipped family has."""
+    """Return the families of files by name.
+
+    Raises TaskError for a file that cannot be used, and for a name that another of the files or a
+    shipped family has.
+    """
     families: dict[str, Family] = {}
     for path in paths:
         family = read_family(path)
         if family.name in families or family.name in shipped_families():
-            raise TaskError(f"{path}: there is a family {family.name!r} already; rename the file")
+            raise TaskError(f"{path}: family {family.name!r} exists already; rename the file")
         families[family.name] = family
     return families
 
 
 def load_family(name: str) -> Family:
-    """Return a shipped family by its name with version, such as ``two-armed/v1``, or a family of
-    your own by the path of its file. A file is read once per process. Raises TaskError if
-    it does not exist or cannot be used."""
+    """Return a shipped family by its name, or a family by the path of its file.
+
+    The name includes the version, such as ``two-armed/v1``. A file is read once per process. Raises
+    TaskError if the family does not exist or cannot be used.
+    """
     if is_file(name):
         return read_family(Path(name))
     shipped = shipped_families()
@@ -407,8 +452,10 @@ def load_family(name: str) -> Family:
 
 
 def is_family(name: str) -> bool:
-    """Return whether a text is the name of a shipped family, or of a ``.toml`` file that can be
-    read and has the key ``region``."""
+    """Return whether a string is the name of a shipped family, or the path of a family's file.
+
+    A ``.toml`` file is a family's if it can be read and has the key ``region``.
+    """
     with suppress(TaskError):
         return name in shipped_families() or (
             is_file(name) and "region" in read_toml(name, error=TaskError)
@@ -418,21 +465,21 @@ def is_family(name: str) -> bool:
 
 @cache
 def read_family(path: Path) -> Family:
-    """Read a family from its TOML file, which names it: ``two-armed.v1.toml`` has family
-    ``two-armed/v1``. The family of a path is cached.
+    """Read a family from its TOML file, and cache it.
 
-    Raises TaskError for a file that is no family.
+    The file names the family: ``two-armed.v1.toml`` has family ``two-armed/v1``. Raises TaskError
+    if the file is not a family.
     """
     content, name = read_toml(path, error=TaskError), "/".join(path.stem.rsplit(".", 1))
     if "name" in content:
-        raise TaskError(f"{path}: name: is an unknown key; a family is named by its file")
+        raise TaskError(f"{path}: name is an unknown key; the name of the file names a family")
     try:
         family = Family.model_validate(content | {"name": name})
     except ValidationError as error:
         keys = [*Family.model_fields, *_Region.model_fields, *_Alignment.model_fields]
         raise TaskError(f"{plain(str(path))}: {explain(error, keys)}") from None
     if address_of(f"{name}/i000") is None:
-        raise TaskError(f"{path}: the name of a family's file is NAME.v1.toml")
+        raise TaskError(f"{path}: the name of a family's file must have the form NAME.v1.toml")
     return family
 
 
@@ -440,17 +487,30 @@ def read_family(path: Path) -> Family:
 def instance_names(
     family: str, split: Split, count: int | None = None, year: int | None = None
 ) -> list[str]:
-    """List the names of instances 0 to ``count`` - 1 of a split (``"development"``, ``"test"``,
-    ``"fresh"``) of a family, by its name or its file; by default ``count`` is 1000 for development,
-    else 10.
+    """List the names of instances 0 to ``count`` - 1 of a split of a family.
 
-    Raises ValueError for another split, for a count that is not from 1 to 10,000, for fresh
-    instances without a year from 1000 to 9999, and for others with a year; TaskError for a family
-    that is unknown or cannot be used.
+    Parameters
+    ----------
+    family : str
+        Name of a shipped family, or path of a family's file.
+    split : {"development", "test", "fresh"}
+    count : int, optional
+        Number of instances, by default 1000 for development and 10 otherwise.
+    year : int, optional
+        Year of fresh instances, from 1000 to 9999; None for the other splits.
+
+    Raises
+    ------
+    ValueError
+        The split is unknown, ``count`` is not from 1 to 10,000, or ``year`` does not fit the split.
+    TaskError
+        The family is unknown or cannot be used.
     """
     load_family(family)
     if (year is None) == (split == "fresh"):
-        raise ValueError(f"year is {year!r}; fresh instances need one, such as 2027, others none")
+        raise ValueError(
+            f"year is {year!r}; fresh instances need a year, such as 2027, and other instances None"
+        )
     if year is not None:
         check_limits("year", year, 1000, 9999)
     count = COUNTS[split] if count is None else count

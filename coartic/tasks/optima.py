@@ -1,8 +1,8 @@
-"""The best rewards known, as they are shipped, with what is proven about them.
+"""The best known rewards that come with the package, and what is proven about them.
 
-``optima.json`` has the best reward that any method found for the paper's tasks, with run ids and
-solutions, ``best_known.csv`` the best reward for test instances of families. ``studies/optima``
-takes over better rewards from results folders, and proves the bounds.
+``optima.json`` has the best reward that any method found for each of the paper's tasks, with run
+ids and solutions. ``best_known.csv`` has the best reward for test instances of families.
+``studies/optima`` takes over better rewards from results folders, and proves the bounds.
 """
 
 from __future__ import annotations
@@ -18,53 +18,59 @@ from typing import Any
 from coartic.tasks.task import Task
 
 BASE = "task"
-"""Base locked as the task has it: the case that rewards compare with."""
+"""Entry of a task with its base locked as in the task itself; rewards are compared with this
+entry."""
 DATA = Path(__file__).with_name("optima.json")
 """Entries of the paper's tasks (:func:`entries`)."""
 BEST_KNOWN = Path(__file__).with_name("best_known.csv")
-"""Columns ``instance``, ``reward``, ``bound`` (empty where nothing is proven), ``nodes`` (of the
-search that proved the bound), ``hands`` and ``essence``."""
+"""Columns ``instance``, ``reward``, ``bound`` (empty if nothing is proven), ``nodes`` (of the
+search that proved the bound), ``hands`` and ``essence`` (:func:`task_hash`)."""
 
-KEPT = ("start", "radius", "hands", "locked_base", "robot")
+HASHED_FIELDS = ("start", "radius", "hands", "locked_base", "robot")
 """Fields that, with the goals, define a task."""
 
 
 @dataclass(frozen=True)
 class KnownOptimum:
-    """The best reward known of a task, with both arms free and under the paper's model."""
+    """The best known reward of a task with both arms free, for the paper's model."""
 
     reward: int
     """Total reward, minus the ticks."""
     bound: int | None
-    """Reward that no solution exceeds; None where nothing is proven."""
+    """Reward that no solution exceeds; None if nothing is proven."""
     hands: str = ""
-    """Hand sequence of a solution that has the reward."""
+    """Hand sequence of a solution with this reward."""
 
     @property
     def proven(self) -> bool:
-        """True if it is proven that no solution can have a better reward."""
+        """True if it is proven that no solution has a better reward."""
         return self.bound == self.reward
 
 
-def essence(task: Task) -> str:
-    """Return a hash, 16 hex digits, of what defines a task: start, goals, radius, hands, locked
-    base, robot; not its name and initial hands."""
+def task_hash(task: Task) -> str:
+    """Return a hash of what defines a task, 16 hex digits.
+
+    Start, goals, radius, hands, locked base and robot count; the task's name and initial hands do
+    not.
+    """
     content = task.model_dump(mode="json")
-    text = json.dumps({key: content[key] for key in ("goals", *KEPT)}, sort_keys=True)
+    text = json.dumps({key: content[key] for key in ("goals", *HASHED_FIELDS)}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def best_shipped(task: Task) -> KnownOptimum | None:
-    """Return the best reward known of a task, and its bound, from the shipped files; the task is
-    recognised by :func:`essence`, whatever its name. Return None for a task that is not there, such
-    as instances of a shipped family except the first 40 of its test split."""
-    return _by_essence().get(essence(task))
+    """Return the best known reward of a task and its bound, from the shipped files.
+
+    The task is recognised by :func:`task_hash`, whatever its name. None if the files do not have
+    the task. Of a shipped family they only have the first 40 instances of the test split.
+    """
+    return _by_task_hash().get(task_hash(task))
 
 
 @cache
-def _by_essence() -> dict[str, KnownOptimum]:
+def _by_task_hash() -> dict[str, KnownOptimum]:
     with BEST_KNOWN.open(encoding="ascii", newline="") as lines:
-        known = {
+        optima = {
             row["essence"]: KnownOptimum(
                 int(row["reward"]), int(row["bound"]) if row["bound"] else None, row["hands"]
             )
@@ -73,21 +79,32 @@ def _by_essence() -> dict[str, KnownOptimum]:
     for entry in entries():
         if (entry["base"], entry["other_arm"]) == (BASE, "free") and "reward" in entry:
             best = KnownOptimum(entry["reward"], entry["bound"], entry["hands"])
-            known[entry["essence"]] = best
-    return known
+            optima[entry["essence"]] = best
+    return optima
 
 
 def entries() -> list[dict[str, Any]]:
-    """Read ``optima.json``; return a new list with a dictionary for each task of the paper and each
-    restriction (base and other arm); a task that locks y itself has none for ``y``.
+    """Read ``optima.json``, and return a new list of its entries.
 
-    Keys: ``task``, ``essence`` (:func:`essence`, without the restriction), ``base`` (coordinates
-    that are locked: ``y``, ``xy``, or ``task``, as the task locks them), ``other_arm`` (the idle
-    arm: ``free`` or ``still``), ``run_ids`` and ``made_by`` (versions, and the date); then
-    ``reward``, ``hands``, ``bound`` (reward that no solution exceeds), ``searches`` (best reward of
-    each search, by its id at the time), ``solution`` (a list ``[goal, hand, kind, target,
-    waypoints]`` for each movement) and, in one entry, ``nodes`` (number of nodes of the search that
-    proved the bound); or instead ``infeasible``, the reason why no search has a solution.
+    There is an entry for each task of the paper and each restriction of base and other arm. (A task
+    that locks y itself has no entry for ``y``.) An entry is a dictionary with the keys
+
+    - ``task``: name of the task;
+    - ``essence``: :func:`task_hash`, without the restriction;
+    - ``base``: coordinates that are locked, ``y`` or ``xy``, or ``task`` for those that the task
+      locks;
+    - ``other_arm``: whether the idle arm is ``free`` or ``still``;
+    - ``run_ids`` and ``made_by``: the runs; versions and the date.
+
+    If a solution is known, there are also
+
+    - ``reward`` and ``hands``: of the best solution;
+    - ``bound``: reward that no solution exceeds;
+    - ``searches``: best reward of each search, by its id at the time;
+    - ``solution``: a list ``[goal, hand, kind, target, waypoints]`` for each movement;
+    - ``nodes``, in one entry: number of nodes of the search that proved the bound.
+
+    Otherwise there is ``infeasible``, the reason why no search has a solution.
     """
     content: dict[str, list[dict[str, Any]]] = json.loads(DATA.read_text(encoding="utf-8"))
     return content["optima"]

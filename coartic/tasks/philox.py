@@ -1,8 +1,8 @@
-"""Random numbers that stay the same: a counter-based generator in integers alone.
+"""Random numbers that stay the same: a counter-based generator that uses only integers.
 
 Philox4x32-10 (Salmon, Moraes, Dror & Shaw 2011, *Parallel random numbers: as easy as 1, 2, 3*)
-turns a counter of four words and a key of two into four words. Nothing is carried from one draw to
-the next, so that what is drawn depends on counter and key alone, and on no library.
+turns a counter of four words and a key of two words into four random words. No state is carried
+from one draw to the next. A draw therefore depends only on counter and key, and not on a library.
 """
 
 from __future__ import annotations
@@ -21,45 +21,52 @@ _WEYL = 0x9E3779B9, 0xBB67AE85  # golden ratio, sqrt(3) - 1
 
 
 def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
-    """Return four random words, integers of 32 bits, for a counter of four words and a key of two;
-    equal arguments give equal words."""
+    """Return four random words of 32 bits for a counter and a key.
+
+    The counter has four words, the key two. Equal arguments give equal words.
+    """
     a, b, c, d = counter
     left, right = key
     for _ in range(_ROUNDS):
-        first, second = a * _FACTORS[0], c * _FACTORS[1]
+        product_a, product_c = a * _FACTORS[0], c * _FACTORS[1]
         a, b, c, d = (
-            second >> 32 ^ b ^ left,
-            second & _WORD,
-            first >> 32 ^ d ^ right,
-            first & _WORD,
+            product_c >> 32 ^ b ^ left,
+            product_c & _WORD,
+            product_a >> 32 ^ d ^ right,
+            product_a & _WORD,
         )
         left, right = left + _WEYL[0] & _WORD, right + _WEYL[1] & _WORD
     return a, b, c, d
 
 
 def hash_key(name: str) -> tuple[int, int]:
-    """Return the key of a name: the first two words, 32 bits each, little-endian, of the SHA-256 of
-    its UTF-8."""
-    first, second = struct.unpack("<2I", hashlib.sha256(name.encode()).digest()[:8])
-    return first, second
+    """Return the key of a name: the first two words of the SHA-256 of its UTF-8.
+
+    The words have 32 bits each, little-endian.
+    """
+    left, right = struct.unpack("<2I", hashlib.sha256(name.encode()).digest()[:8])
+    return left, right
 
 
 class Draws:
-    """Integers drawn one after the other; equal keys and places give equal integers.
+    """Integers drawn one after the other; equal keys and counters give equal integers.
 
-    ``place`` is three words of the counter; the other word counts the blocks of four words used.
+    ``counter`` is three words of the generator's counter. The remaining word counts the blocks of
+    four random words used.
     """
 
-    def __init__(self, key: tuple[int, int], *place: int) -> None:
-        first, second, third = place
-        blocks = (philox4x32((block, first, second, third), key) for block in range(_WORD))
+    def __init__(self, key: tuple[int, int], *counter: int) -> None:
+        b, c, d = counter
+        blocks = (philox4x32((block, b, c, d), key) for block in range(_WORD))
         self._pairs = (pair for a, b, c, d in blocks for pair in (a << 32 | b, c << 32 | d))
 
-    def integer(self, least: int, most: int) -> int:
-        """Return an integer from ``least`` to ``most``, both included, drawn with equal
-        probabilities to within 2^-64."""
-        return least + (next(self._pairs) * (most - least + 1) >> 64)
+    def integer(self, least: int, largest: int) -> int:
+        """Return an integer from ``least`` to ``largest``, both included.
+
+        The probabilities are equal to within 2^-64.
+        """
+        return least + (next(self._pairs) * (largest - least + 1) >> 64)
 
     def one_of(self, choices: Sequence[Choice]) -> Choice:
-        """Return one of ``choices``, drawn with probabilities as in :meth:`integer`."""
+        """Return one of ``choices``, drawn as :meth:`integer` draws."""
         return choices[self.integer(0, len(choices) - 1)]

@@ -1,6 +1,7 @@
-"""Tasks: a start, a sequence of goals, and what is known about each figure.
+"""Tasks: a start, a sequence of goals, and where their numbers come from.
 
-A task is read from a TOML file, shipped in ``paper`` or the user's own in the same form.
+A task is read from a TOML file. The shipped files are in ``paper``; users' files have the same
+form.
 """
 
 from __future__ import annotations
@@ -36,10 +37,10 @@ TASK_FOLDER = Path(__file__).parent / "paper"
 MOST_GOALS = 256
 LONGEST_NAME = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
-"""Form of names of tasks and suites, which become names of files and parts of commands."""
+"""Form of the names of tasks and suites, which become file names and parts of commands."""
 _IN_FAMILY = r"^([a-z][a-z0-9-]*/v[1-9][0-9]?/)?"
 TASK_PATTERN = _IN_FAMILY + NAME_PATTERN.removeprefix("^")
-"""Form of names of tasks, also of instances of a family."""
+"""Form of the names of tasks, including instances of a family."""
 _ADDRESS = re.compile(_IN_FAMILY.removesuffix("?") + r"([di]|[0-9]{4}-)([0-9]{3,6})")
 WITHOUT_REACH = "without reach"
 
@@ -47,8 +48,10 @@ Point = tuple[Finite, Finite]
 
 
 def hands_of(letters: str) -> tuple[Hand, ...]:
-    """Return the names of hands from their letters: ``("right", "left")`` for ``"RL"``. Raises
-    ValueError for any other letter."""
+    """Return the names of hands from their letters: ``("right", "left")`` for ``"RL"``.
+
+    Raises ValueError for any other letter.
+    """
     try:
         return tuple(LETTERS[letter] for letter in letters)
     except (KeyError, TypeError):
@@ -59,8 +62,10 @@ def hands_of(letters: str) -> tuple[Hand, ...]:
 
 
 def letters_of(hands: tuple[Hand, ...] | list[Hand]) -> str:
-    """Return the first letters of hands, as the paper writes a hand sequence: ``"RL"`` for
-    ``("right", "left")``."""
+    """Return the first letters of hands: ``"RL"`` for ``("right", "left")``.
+
+    The paper writes hand sequences in this form.
+    """
     return "".join(hand[0].upper() for hand in hands)
 
 
@@ -74,15 +79,19 @@ class Address(NamedTuple):
     family: str
     """Name of the family with its version, such as ``two-armed/v1``."""
     stream: str
-    """``d`` (development), ``i`` (test) or a year as ``2027-`` (fresh); in the name the number of
-    the instance follows it."""
+    """``d`` (development), ``i`` (test) or a year such as ``2027-`` (fresh). In a task's name the
+    number of the instance follows it."""
     number: int
     """Number of the instance, from 0."""
 
     @property
     def split(self) -> Split:
-        """Split of the instance: ``"development"`` (to tune on), ``"test"`` (to report on), or
-        ``"fresh"`` (drawn after both were done)."""
+        """Split of the instance.
+
+        - ``"development"``: to tune on;
+        - ``"test"``: to report on;
+        - ``"fresh"``: drawn after both were done.
+        """
         return SPLITS.get(self.stream, "fresh")
 
     def __str__(self) -> str:
@@ -90,46 +99,48 @@ class Address(NamedTuple):
 
 
 def address_of(name: str) -> Address | None:
-    """Return the address that a task's name spells: ``two-armed/v1/i017`` is family
-    ``two-armed/v1``, stream ``i``, number 17. None for a name of another form, such as number
-    ``0017``; whether the family exists is not checked."""
+    """Return the address that a task's name stands for, or None for another form.
+
+    ``two-armed/v1/i017`` is family ``two-armed/v1``, stream ``i``, number 17; ``i0017`` has another
+    form. Whether the family exists is not checked.
+    """
     parts = _ADDRESS.fullmatch(name)
     if parts is None:
         return None
     address = Address(parts[1].removesuffix("/"), parts[2], int(parts[3]))
-    return address if str(address) == name else None  # i0017 would be i017 again
+    return address if str(address) == name else None  # i0017 would be the same as i017
 
 
 class Provenance(FileData):
-    """Source of a figure of a task: the entry of a key in ``Task.provenance``."""
+    """Source of a number of a task: the entry of a key in ``Task.provenance``."""
 
     status: Literal["published", "inferred", "chosen"]
-    """Published in the paper, inferred from it, or chosen by the task's author."""
+    """Whether it is published in the paper, inferred from it, or chosen by the task's author."""
     source: Line
-    """Place in the paper, or the person who chose it, in one line."""
+    """Section or figure of the paper, or the person who chose it, in one line."""
 
 
 class Start(FileData):
-    """The starting configuration q_0 as a task file states it; ``Task.q0`` is the array."""
+    """The starting configuration q_0 as a task file has it; ``Task.q0`` is the array."""
 
     base: Point = (0.0, 0.0)
     """Centre of the base, length unit."""
     left: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
-    """Angle of each joint of the left arm, rad, one for each link; the first is measured from
+    """Angles of the joints of the left arm, rad, one for each link; the first is measured from
     +x."""
     right: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
-    """Angles of the right arm."""
+    """Angles of the joints of the right arm, in the same form."""
 
 
 class Task(FileData):
-    """A sequence of spatial goals to be hit in turn, each with one of the robot's hands.
+    """A sequence of goals to be hit in turn, each with a hand of the robot.
 
     :func:`load_task` reads a task from a file, or finds it by its name. Fields cannot be set. In
-    Python ``q0=``, a configuration ``(dof,)``, can stand for ``start``:
+    Python a configuration ``q0=``, shape ``(dof,)``, can be passed instead of ``start``:
     ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
 
-    Source of the shipped tasks: paper, section *Experiments*; ``provenance`` says where each
-    figure comes from.
+    Source of the shipped tasks: paper, section *Experiments*. ``provenance`` says where each number
+    comes from.
     """
 
     name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)] = "unnamed"
@@ -137,9 +148,9 @@ class Task(FileData):
     title: Line = ""
     """Name in figures and tables; ``name`` if it is empty."""
     description: Line = ""
-    """A sentence for lists."""
+    """One sentence for lists."""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1, max_length=len(HANDS))] = HANDS
-    """Hands that may hit goals; the robot has both arms anyway."""
+    """Hands that may hit goals. The robot has both arms in any case."""
     goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
     """Goal centres x_g in the order in which they are to be hit, length unit."""
     radius: Length = PAPER_RADIUS
@@ -147,16 +158,16 @@ class Task(FileData):
     locked_base: Annotated[tuple[Literal["x", "y"], ...], Field(max_length=2)] = ()
     """Base coordinates that cannot move."""
     initial_hands: str = "best-single-hand"
-    """Hand sequence of trial 0, such as ``"RRRR"``, or a policy that finds one with
-    the corrective process alone: ``"best-single-hand"`` or ``"best-of-all"``."""
+    """Hand sequence of trial 0, such as ``"RRRR"``, or a policy that finds one by trials with only
+    the corrective process: ``"best-single-hand"`` or ``"best-of-all"``."""
     start: Start
     """Configuration in which every trial begins: table ``[start]``. By default the base is at
     (0, 0) and the arms are straight along +x."""
     robot: Robot = Robot()
-    """Geometry of the robot, if it is not the paper's: table ``[robot]``."""
+    """Geometry of the robot if it differs from the paper's: table ``[robot]``."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
-    """Source and status of the figures, by key. The task's author chose figures without an
-    entry."""
+    """Source and status of the numbers, by key. A number without an entry was chosen by the task's
+    author."""
 
     @cached_property
     def q0(self) -> Array:
@@ -173,8 +184,11 @@ class Task(FileData):
         return goals
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Task:
-        """Return a copy with the fields in ``update`` changed, which are not checked (with ``deep``
-        a deep copy); the copy's arrays ``q0`` and ``goal_array`` follow from the changed fields."""
+        """Return a copy with the fields in ``update`` changed, which are not checked.
+
+        With ``deep`` it is a deep copy. The arrays ``q0`` and ``goal_array`` of the copy follow
+        from the changed fields.
+        """
         copied = super().model_copy(update=update, deep=deep)
         for name in ("q0", "goal_array"):
             copied.__dict__.pop(name, None)
@@ -187,47 +201,55 @@ class Task(FileData):
 
     @property
     def label(self) -> str:
-        """Title of the task; its name if the title is empty."""
+        """Title of the task, or its name if the title is empty."""
         return self.title or self.name
 
     @property
     def family(self) -> str | None:
-        """Name of the family, with its version, if the task's name has the form of an instance's;
-        else None."""
+        """Name of the family with its version, if the task's name is that of an instance.
+
+        Otherwise None.
+        """
         address = address_of(self.name)
         return address and address.family
 
     @property
     def split(self) -> Split | None:
-        """Split of an instance of a family, by the form of the task's name: ``"development"``,
-        ``"test"`` or ``"fresh"``; None for names of another form."""
+        """Split of an instance of a family: ``"development"``, ``"test"`` or ``"fresh"``.
+
+        It follows from the form of the task's name; None for names of another form.
+        """
         address = address_of(self.name)
         return address and address.split
 
     @property
     def reconstructed(self) -> tuple[str, ...]:
-        """Keys in ``provenance``, such as ``"goals"``, whose figures were inferred from the paper,
-        not published."""
+        """Keys in ``provenance`` whose numbers were inferred from the paper, such as
+        ``"goals"``."""
         return tuple(k for k, entry in self.provenance.items() if entry.status == "inferred")
 
     @model_validator(mode="before")
     @classmethod
     def _with_start(cls, content: Any) -> Any:
-        """Return the content of a task, with a ``start`` made of ``q0``, ``(dof,)``, or, without
-        either, of the base at (0, 0) and both arms along +x; content with a ``start``, or that is
-        no dictionary, is returned unchanged. Raises a validation error for both keys and a wrong
-        ``q0``."""
+        """Return the content of a task with a ``start``.
+
+        - Content that has a ``start``, or is not a dictionary, is returned unchanged.
+        - If it has ``q0``, shape ``(dof,)``, ``start`` is made of it.
+        - Otherwise the base is at (0, 0), and both arms are straight along +x.
+
+        Raises a validation error if the content has both keys or if ``q0`` is wrong.
+        """
         if not isinstance(content, dict):
             return content
         if {"start", "q0"} <= content.keys():
-            raise sentence_error("q0 and start both say where a trial begins: give one of them")
+            raise sentence_error("q0 and start both say where a trial begins: pass only one")
         if "start" in content:
             return content
         robot = content.get("robot", Robot())
         try:
             robot = robot if isinstance(robot, Robot) else Robot(**robot)
         except (TypeError, ValueError):
-            robot = Robot()  # the table [robot] is wrong, and is said to be
+            robot = Robot()  # the wrong table [robot] has its own error
         content = dict(content)
         try:
             q = real_array("q0", content.pop("q0", np.zeros(robot.dof)))
@@ -236,7 +258,7 @@ class Task(FileData):
         if q.shape != (robot.dof,):
             raise sentence_error(f"q0 has shape {q.shape}; it must be ({robot.dof},)")
         if not np.isfinite(q).all():
-            raise sentence_error(f"q0 is {brief_value(q.tolist())}; needed are finite numbers")
+            raise sentence_error(f"q0 is {brief_value(q.tolist())}; all entries must be finite")
         left, right = (tuple(q[robot.joints(hand)].tolist()) for hand in HANDS)
         content["start"] = Start(base=tuple(q[:2].tolist()), left=left, right=right)
         return content
@@ -245,19 +267,19 @@ class Task(FileData):
     def _is_consistent(self, info: ValidationInfo) -> Task:
         for key, values in (("hands", self.hands), ("locked_base", self.locked_base)):
             if len(set(values)) < len(values):
-                raise sentence_error(f"{key} names the same entry twice: {', '.join(values)}")
+                raise sentence_error(f"{key} has a duplicate entry: {', '.join(values)}")
         for hand in HANDS:
             angles, joints = getattr(self.start, hand), len(self.robot.arm(hand).links)
             if len(angles) != joints:
                 raise sentence_error(
-                    f"start.{hand} has {len(angles)} joint angles; the {hand} arm has {joints} "
+                    f"start.{hand} has {len(angles)} joint angles, but the {hand} arm has {joints} "
                     "joints"
                 )
-            most = max(angles, key=abs)
-            if abs(most) > 2 * math.pi:
+            largest = max(angles, key=abs)
+            if abs(largest) > 2 * math.pi:
                 raise sentence_error(
-                    f"start.{hand} has the angle {most:g}; angles are in rad, from -2π to 2π. Did "
-                    f"you mean {most:g}° = {math.radians(most):.3f}?"
+                    f"start.{hand} has the angle {largest:g}; angles must be in rad, from -2π to "
+                    f"2π. Did you mean {largest:g}° = {math.radians(largest):.3f}?"
                 )
         for key in self.provenance:
             if key not in Task.model_fields:
@@ -267,21 +289,23 @@ class Task(FileData):
             try:
                 check_hands(self, self.initial_hands)
             except ValueError as error:
-                others = ", ".join(INITIAL_POLICIES)
-                raise sentence_error(f"initial_hands: {error}, or one of {others}") from None
-        # No model's corrective process ends farther from a goal than its rim (check_task).
+                policies = ", ".join(INITIAL_POLICIES)
+                raise sentence_error(f"initial_hands: {error}, or be one of {policies}") from None
+        # With any model the corrective process ends within the radius; check_task is stricter.
         if info.context != WITHOUT_REACH and (far := _out_of_reach(self, self.radius)) is not None:
             raise sentence_error(far)
         return self
 
     @checked_arguments
     def save(self, path: str | Path, *, replace: bool = False) -> None:
-        """Write the task as a task file, ``.toml``. With ``replace`` a file of that name is written
-        over. Raises CoarticError if its name does not end in ``.toml``, if the file cannot be
-        written, or if it is there and ``replace`` is False."""
+        """Write the task as a task file, ``.toml``.
+
+        With ``replace`` an existing file is overwritten. Raises CoarticError if the name does not
+        end in ``.toml``, if the file exists and ``replace`` is False, or if it cannot be written.
+        """
         file = folder_named(path, "the name of a task's file")
         if file.suffix != ".toml":
-            raise CoarticError(f"cannot write {file}: the name of a task's file ends in .toml")
+            raise CoarticError(f"cannot write {file}: the name of a task file must end in .toml")
         write_output(file, task_text(self).encode(), replace=replace)
 
     def _repr_html_(self) -> str:
@@ -293,81 +317,91 @@ class Task(FileData):
         around = np.concatenate([self.goal_array, *(points for points, _ in lines)])
         (left, low), (right, high) = around.min(axis=0) - 0.5, around.max(axis=0) + 0.5
 
-        def places(points: Array) -> str:
+        def coordinates(points: Array) -> str:
             return " ".join(f"{x:.3f},{high - y:.3f}" for x, y in points - [left, 0.0])
 
         marks = [
-            f'<polyline points="{places(points)}" fill="none" stroke="{colour}" '
+            f'<polyline points="{coordinates(points)}" fill="none" stroke="{colour}" '
             'stroke-width="0.06"/>'
             for points, colour in lines
         ]
         for number, goal in enumerate(self.goal_array, 1):
-            (x, y), radius = places(goal[None]).split(","), self.radius
+            (x, y), radius = coordinates(goal[None]).split(","), self.radius
             marks.append(
                 f'<circle cx="{x}" cy="{y}" r="{radius:g}" fill="none" stroke="#009e73" '
                 f'stroke-width="0.04"/><text x="{x}" y="{y}" dy="-0.2" font-size="0.35" '
                 f'text-anchor="middle" fill="currentColor">{number}</text>'
             )
-        words = html.escape(repr(self))
+        caption = html.escape(repr(self))
         return (
             f'<figure><svg viewBox="0 0 {right - left:.3f} {high - low:.3f}" width="420" '
-            f'role="img" aria-label="{words}">{"".join(marks)}</svg>'
-            f"<figcaption>{words}</figcaption></figure>"
+            f'role="img" aria-label="{caption}">{"".join(marks)}</svg>'
+            f"<figcaption>{caption}</figcaption></figure>"
         )
 
 
 def check_hands(task: Task, hands: str) -> str:
-    """Return the hand sequence itself, such as ``"RRLR"``. Raises ValueError unless it is a text
-    with the letter of one of the task's hands for each goal."""
+    """Check a hand sequence, such as ``"RRLR"``, and return it unchanged.
+
+    Raises ValueError unless it is a string with the letter of one of the task's hands for each
+    goal.
+    """
     allowed = letters_of(sorted(task.hands))
     fits = isinstance(hands, str) and len(hands) == len(task.goals)
     if not fits or not set(hands) <= set(allowed):
         raise ValueError(
-            f"hands {brief_value(hands)} do not fit task {task.name!r}: needed is a text with "
+            f"hands {brief_value(hands)} do not fit task {task.name!r}: they must be a string with "
             f"{' or '.join(allowed)} for each of {counted(len(task.goals), 'goal')}"
         )
     return hands
 
 
 def _out_of_reach(task: Task, tolerance: float) -> str | None:
-    """Return a sentence on the first goal that no hand of the task, or not the hand that
-    ``initial_hands`` gives it, can reach to ``tolerance``, a distance from its centre, length unit;
-    None if all can be reached."""
+    """Return a sentence on the first goal that is out of reach, or None.
+
+    A goal is out of reach if neither hand of the task, or not the hand that ``initial_hands``
+    names, can come within ``tolerance`` of its centre, length unit.
+    """
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
         excess = {hand: beyond_reach(task, hand, goal, tolerance) for hand in task.hands}
-        where = (
+        problem = (
             f"goals[{index}] ({goal[0]:g}, {goal[1]:g}) is out of reach with the base locked "
             f"in {' and '.join(task.locked_base)}"
         )
         if all(value > 0 for value in excess.values()):
-            return f"{where}: {min(excess.values()):.3g} too far"
+            return f"{problem}: {min(excess.values()):.3g} too far"
         if named is not None and excess[named[index]] > 0:
             return (
-                f"{where} for the {named[index]} hand that initial_hands "
+                f"{problem} for the {named[index]} hand that initial_hands "
                 f"{task.initial_hands!r} gives it: {excess[named[index]]:.3g} too far"
             )
     return None
 
 
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
-    """Return by how much a goal's centre lies outside the distances that a hand can have from its
-    shoulder, less ``tolerance``, length unit: above 0 if the goal is out of reach, else at most 0.
-    Base coordinates that are not locked can take any value."""
+    """Return by how much a goal is out of a hand's reach, length unit.
+
+    This is how far the goal's centre lies outside the distances that a hand can have from its
+    shoulder, minus ``tolerance``: above 0 if the goal is out of reach, otherwise at most 0. Base
+    coordinates that are not locked can take any value.
+    """
     arm = task.robot.arm(hand)
     near, far = task.robot.reach(hand)
     dx = goal[0] - task.start.base[0] - arm.shoulder_x if "x" in task.locked_base else 0.0
     dy = goal[1] - task.start.base[1] - arm.shoulder_y if "y" in task.locked_base else 0.0
     distance = math.hypot(dx, dy)
-    # A base that is free in one coordinate can always back away.
+    # A base that is free in a coordinate can always move away from the goal.
     inside = near - distance if len(task.locked_base) == 2 else 0.0
     return max(distance - far, inside) - tolerance
 
 
 def check_task(task: Task) -> Task:
-    """Return the task itself. Raises TaskError if a goal is out of reach: no hand of the task, or
-    not the hand that ``initial_hands`` gives the goal, can come as near to its centre as a tenth of
-    the radius, where the paper's corrective process ends."""
+    """Check that all goals of a task can be reached, and return the task.
+
+    Raises TaskError if no hand of the task, or not the hand that ``initial_hands`` names, can come
+    as near to a goal's centre as a tenth of the radius, where the paper's corrective process ends.
+    """
     _, tolerance = PAPER.tolerances(task.radius)
     if (problem := _out_of_reach(task, tolerance)) is not None:
         raise TaskError(f"task {task.name!r}: {problem}")
@@ -375,15 +409,20 @@ def check_task(task: Task) -> Task:
 
 
 def read_task(path: Path) -> Task:
-    """Read a task from its TOML file; a task without the key ``name`` has the file's name, without
-    the ending. Raises TaskError, which names the file, for a file that is no task."""
+    """Read a task from its TOML file.
+
+    A task without the key ``name`` has the name of the file without its suffix. Raises TaskError,
+    which names the file, if the file is not a task.
+    """
     return parse_task({"name": path.stem, **read_toml(path, error=TaskError)}, str(path))
 
 
 @cache
 def shipped_tasks() -> dict[str, Task]:
-    """Return the tasks that come with the package by name, in the paper's order. The dictionary is
-    cached: do not change it."""
+    """Return the tasks that come with the package by name, in the paper's order.
+
+    The dictionary is cached: do not change it.
+    """
     return {task.name: task for task in map(read_task, sorted(TASK_FOLDER.glob("*.toml")))}
 
 
@@ -408,7 +447,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     Raises
     ------
     TaskError
-        The content is no task.
+        The content is not a task.
     """
     try:
         return Task.model_validate(content, context=None if reach else WITHOUT_REACH)
@@ -417,15 +456,13 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
 
 
 def _all_keys() -> list[str]:
-    """Return the names of the keys of a task file in all its tables, without ``q0``, which can
-    stand for ``start``."""
+    """Return the keys of a task file in all its tables, without ``q0``."""
     robot = [field.name for field in fields(Robot)]
-    others = (*Start.model_fields, *robot, *Provenance.model_fields)
-    return [*Task.model_fields, *others]
+    return [*Task.model_fields, *Start.model_fields, *robot, *Provenance.model_fields]
 
 
 def task_text(task: Task) -> str:
-    """Return the task as the text of a task file, TOML."""
+    """Return a task in the form of a task file, TOML."""
     content = task.model_dump(mode="json")
     tables = {key: content.pop(key, {}) for key in ("start", "robot", "provenance")}
     if task.robot == Robot():
@@ -442,9 +479,11 @@ def task_text(task: Task) -> str:
 
 
 def _toml_value(value: Any) -> str:
-    """Return a string of printable characters, a number, a list of these (lists, too), or a
-    dictionary, as TOML text: as JSON writes it, except a dictionary, which becomes an inline table
-    with keys written bare."""
+    """Return a value in the notation of TOML.
+
+    The value is a string of printable characters, a number, a list or a dictionary of such values.
+    It is written as in JSON, except that a dictionary becomes an inline table with bare keys.
+    """
     if isinstance(value, dict):
         return (
             "{ " + ", ".join(f"{key} = {_toml_value(item)}" for key, item in value.items()) + " }"

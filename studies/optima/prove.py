@@ -25,7 +25,7 @@ from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.benchmarks.pool import process_pool
 from coartic.method import Session, run_method
 from coartic.tasks.families import named_by
-from coartic.tasks.optima import essence
+from coartic.tasks.optima import task_hash
 
 SECONDS = 100
 """CPU time for each task, some 500 cone programmes a second with five goals."""
@@ -36,8 +36,8 @@ CHAINS = 20
 def entries_of(name, known, pool):
     """Return the entries of a task that have a reward, one for each restriction; of a task that
     does not ship, the entry of the best solution that a search finds, in a process of ``pool``."""
-    same = essence(load_task(name))
-    entries = [each for each in known.values() if each["essence"] == same and "reward" in each]
+    same = task_hash(load_task(name))
+    entries = [entry for entry in known.values() if entry["essence"] == same and "reward" in entry]
     if entries:
         return entries
     base, other_arm = shipped.FREE

@@ -16,7 +16,7 @@ from coartic import CoarticError, builtin_tasks, load_task
 from coartic.analysis import load
 from coartic.analysis.optima import restrictions
 from coartic.tasks.families import shipped_families
-from coartic.tasks.optima import essence
+from coartic.tasks.optima import task_hash
 
 MOST = 40
 """Instances of each family."""
@@ -50,7 +50,7 @@ def take_over(study, known):
         task, made_with = load_task(name), study.made_with
         known[name, base, other_arm] = {
             "task": name,
-            "essence": essence(task),
+            "essence": task_hash(task),
             "base": base,
             "other_arm": other_arm,
             "run_ids": [best.run_id],

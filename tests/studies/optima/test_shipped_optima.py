@@ -17,7 +17,7 @@ from coartic.baselines.optimum import with_locks
 from coartic.motion.solution import corrective_trial, other_arm_travel
 from coartic.tasks import optima
 from coartic.tasks.families import shipped_families
-from coartic.tasks.optima import best_shipped, essence
+from coartic.tasks.optima import best_shipped, task_hash
 from coartic.tasks.task import hands_of
 from tests.support.processes import ROOT, programs
 from tests.support.strategies import tiny_task
@@ -41,7 +41,7 @@ def test_the_first_forty_test_instances_of_every_family_have_one():
 def held(entry):
     """The task of an entry, and the execution of the solution, which is what the entry says."""
     task = load_task(entry["task"])
-    assert entry["essence"] == essence(task)
+    assert entry["essence"] == task_hash(task)
     execution = execute(task, SHIPPED.movements_of(entry["solution"]))
     assert (execution.reward, execution.hands) == (entry["reward"], entry["hands"])
     assert entry["bound"] >= entry["reward"]
