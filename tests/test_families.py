@@ -173,7 +173,7 @@ def test_a_file_by_an_instances_name_is_that_instance(tmp_path):
     path.write_text(text, encoding="utf-8")
     assert load_task(path) == GOOD
     path.write_text(text.replace("5.063", "5.064"), encoding="utf-8")
-    with pytest.raises(TaskError, match="not the instance of that name"):
+    with pytest.raises(TaskError, match="differs from the instance with this name"):
         load_task(path)
     path.write_text(text.replace("two-armed/v1/i016", "two-armed/v1/mine"), encoding="utf-8")
     with pytest.raises(TaskError, match="is not an instance of a family"):

@@ -75,7 +75,7 @@ def test_a_trial_that_fails_costs_more_than_any_that_succeeds():
     with pytest.raises(MethodError, match="completes no hand sequence"):
         objective("ascending", model=MotionModel(max_iterations=2))
     many = tiny_task(goals=[[5.0, 1.0]] * 13)
-    with pytest.raises(MethodError, match="hand sequences; .* say which hands"):
+    with pytest.raises(MethodError, match="hand sequences; .* pass the hands"):
         objective(many)
     with pytest.raises(coartic.NotApplicableError, match="8192 hand sequences"):
         _ = objective(many, "R" * 13).hand_sequences
@@ -95,13 +95,13 @@ def with_width(half_width):
 @pytest.mark.parametrize(
     ("call", "wrong", "words"),
     [
-        (COST, np.zeros(5), r"x has shape \(5,\); needed is \(18,\) or \(18, N\)"),
+        (COST, np.zeros(5), r"x has shape \(5,\); it must be \(18,\) or \(18, N\)"),
         (COST, np.zeros((18, 18)), r"use many\(x\) for rows, many\(x.T\) for columns"),
         *((COST, wrong, "it should be real numbers")
           for wrong in ("abc", COST.x0 + 1j, np.zeros(18, bool))),
         (COST.many, [[1, 2], [3]], "in rows of one length"),
         (COST.many, np.where(np.arange(18) == 7, np.nan, np.zeros((2, 18))),
-         "point 0: of goal 2 some entries are NaN"),
+         "point 0: some entries of goal 2 are NaN"),
         (COST, np.where(GOALS == 1, np.inf, COST.x0), "infinite"),
         *((call, wrong, "it should have no masked entries")
           for call, wrong in ((COST, MASKED), (COST.evaluations_to, MASKED))),

@@ -24,39 +24,40 @@ from coartic.tasks.task import INITIAL_POLICIES, Task
 
 @in_sentences
 class Parameters(BaseModel):
-    """Base of every method's parameters: typed, validated, immutable, plain data."""
+    """Base class of the parameters of methods: typed, validated, immutable, plain data."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 @dataclass(frozen=True)
 class Result:
-    """A solution, with further data that a method returns."""
+    """A solution, and further data that a method returns with it."""
 
     solution: tuple[Movement, ...]
     """Movements, at least one for each goal, in the order of the goals."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Plain data to be stored with the solution. Never its score."""
+    """Plain data to be stored with the solution, but never its score."""
     initial: tuple[Movement, ...] = ()
-    """Movements of a learner's first trial; empty if it failed, and for other methods."""
+    """Movements of a learner's first trial; empty if that trial failed, and for other methods."""
     replay: tuple[Movement, ...] = ()
     """Movements of a learner's noiseless greedy trial after learning; empty if that trial failed,
     and for other methods."""
 
 
 class Outline(NamedTuple):
-    """The properties of a task by which a method says whether it applies."""
+    """The properties of a task by which a method decides whether it applies."""
 
     name: str
-    """Name of the task, for the sentence."""
+    """Name of the task, for the sentence of :meth:`Method.why_not`."""
     goals_count: int
     """Number of goals."""
     dof: int
     """Number of degrees of freedom of the robot."""
     hands: tuple[Hand, ...]
-    """Hands that may hit goals, of ``"left"`` and ``"right"``."""
+    """Hands that may hit goals: ``"left"``, ``"right"`` or both."""
     initial_hands: str
-    """Hand sequence, such as ``"RRRR"``, or policy that the task names for a first solution."""
+    """Hand sequence of the task for a first solution, such as ``"RRRR"``, or the policy that finds
+    one."""
 
     @property
     def initial_is_policy(self) -> bool:
@@ -65,59 +66,74 @@ class Outline(NamedTuple):
 
     @property
     def too_many_sequences(self) -> str | None:
-        """A sentence that the task has more than 4096 hand sequences, too many to try one by one;
-        else None."""
+        """A sentence if the task has more than 4096 hand sequences, too many to try.
+
+        Otherwise None.
+        """
         return too_many_sequences(self.name, self.goals_count, len(self.hands))
 
 
 def outline_of(task: Task) -> Outline:
-    """Return the properties of a task by which a method says whether it applies."""
+    """Return the properties of a task by which a method decides whether it applies."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
 class Method(ABC):
-    """Base of every method. A subclass declares itself in its class attributes."""
+    """Base class of methods; a subclass declares itself in its class attributes."""
 
     name: ClassVar[str]
-    """Id, such as ``"random-search"``; another form of the method adds ``/form``."""
+    """Id, such as ``"random-search"``; another form of the same method adds ``/form``."""
     title: ClassVar[str]
     citation: ClassVar[str]
     information: ClassVar[frozenset[Information]]
     tuned_on: ClassVar[str] = ""
-    """Tasks on which its parameters were chosen, and among how many; empty: not said. Readers judge
-    by it whether results are of new tasks; the identity of a run leaves it out."""
+    """Tasks on which its parameters were chosen, and among how many; empty if that is not known. It
+    tells readers whether results are of new tasks, and is not a part of a run's identity."""
     stochastic: ClassVar[bool] = True
-    """True if the seed matters; other methods are run once."""
+    """True if the seed matters. If False, the method is run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
     version: ClassVar[int] = 1
-    """Version of the method's results, raised with every change of them, a default's as well: runs
-    of two versions are not compared."""
+    """Version of the method's results. Raise it with every change of them, a change of a default
+    included: runs of two versions are not compared."""
     files: ClassVar[tuple[str, ...]] = ()
-    """Names of data files in the folder of the method's file. They count as its code."""
+    """Names of data files in the folder of the method's file. They count as a part of its code."""
     quick: ClassVar[Mapping[str, Any]] = {}
-    """Parameters for a check in seconds, where the defaults take longer than that."""
+    """Parameters for a check that takes seconds, if the defaults take longer."""
 
     def __init__(self, parameters: Any = None) -> None:
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence on why the method does not apply to a task; None if it applies, as
-        every method does unless its class or a base overrides this."""
+        """Return a sentence on why the method does not apply to a task; None if it applies.
+
+        By default a method applies to every task.
+        """
         return None
 
     @abstractmethod
     def solve(self, session: Session) -> Result:
-        """Find a solution of the session's task; return the movements, in a :class:`Result`. Raises
-        MethodError if none is found, or NotApplicableError if no initial hands are."""
+        """Find a solution of the session's task, and return it.
+
+        Raises
+        ------
+        MethodError
+            No solution is found.
+        NotApplicableError
+            No initial hands are found.
+        """
 
     def max_batch(self) -> int:
-        """Return the largest number of sessions for one call of :meth:`solve_together`; a suite
-        gives methods that are not this project's own one session, whatever they return."""
+        """Return the largest number of sessions for one call of :meth:`solve_together`.
+
+        A suite passes one session to methods from outside this project, whatever they return here.
+        """
         return 1
 
     def solve_together(self, sessions: Sequence[Session]) -> Sequence[Result | MethodError]:
-        """Solve in several sessions that differ in their seeds alone; return for each, in order,
-        the result of :meth:`solve`, or the MethodError that :meth:`solve` raises, as an object.
+        """Solve in many sessions that differ only in their seeds.
+
+        Return for each session, in order, the result of :meth:`solve` or the MethodError that it
+        raises, as an object.
         """
         results: list[Result | MethodError] = []
         for session in sessions:
@@ -147,18 +163,39 @@ MODULES = (
 def run_method(
     method: Method, task: TaskLike, seed: int = 0, *, model: MotionModel = PAPER
 ) -> tuple[Result, Session]:
-    """Let a method solve a task, in this process.
+    """Let a method solve a task in this process.
 
-    Methods of this project may see the task and count by themselves; any other method is refused
-    undeclared information whose use a session sees (:data:`METERED`). ``task`` is a task, its name
-    or its file; ``seed`` is the seed of the method's random numbers; ``model`` has the constants of
-    movement. There is no budget of trials, and the solution is not executed.
+    There is no budget of trials, and the solution is not executed. Methods of this project may see
+    the task, and count by themselves. Any other method is refused information that it does not
+    declare, if a session can see its use (:data:`METERED`).
 
-    Returns the solution with its details, and the session in which it was found, with its counts
-    and rewards. Raises MethodError if the method finds no solution, UndeclaredError if it uses
-    such information, NotApplicableError if it does not apply to the task or finds no initial hands,
-    SolutionError if its solution is no sequence, and ValueError for a seed that is no whole number
-    from 0 to 2^128 - 1.
+    Parameters
+    ----------
+    method : Method
+    task : Task, str or pathlib.Path
+    seed : int
+        Seed of the method's random numbers.
+    model : MotionModel
+
+    Returns
+    -------
+    result : Result
+        The solution with its details.
+    session : Session
+        The session in which it was found, with its counts and rewards.
+
+    Raises
+    ------
+    MethodError
+        The method finds no solution.
+    UndeclaredError
+        The method uses information that it does not declare.
+    NotApplicableError
+        The method does not apply to the task, or finds no initial hands.
+    SolutionError
+        The solution is not a sequence.
+    ValueError
+        The seed is not an integer from 0 to 2^128 - 1.
     """
     chosen = as_task(task)
     if (reason := method.why_not(outline_of(chosen))) is not None:

@@ -1,4 +1,4 @@
-"""The session through which a method works: what it may use, and what it has spent."""
+"""The session of a method: what the method may use, and what it has spent."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ from coartic.tasks.task import Task
 
 
 class Information(StrEnum):
-    """Information that a method can use, beyond what a session shows to every method."""
+    """Information that a method can use in addition to what a session shows to all methods."""
 
     GOALS = "goals"
     """Centres of the goals, and their radius."""
     FORWARD_KINEMATICS = "forward kinematics"
-    """Place of a hand in a configuration."""
+    """Position of a hand in a configuration."""
     JACOBIAN = "Jacobian"
-    """Derivative of a hand's place by the joints, in a configuration."""
+    """Derivative of a hand's position by the entries of a configuration."""
     CORRECTIVE_PROCESS = "corrective process"
-    """A configuration that hits a goal, found by **A**; **A** uses goal and Jacobian."""
+    """A configuration that hits a goal, found by **A**, which uses goal and Jacobian."""
     REWARD_BY_TRIAL = "reward by trial"
-    """The total reward of a trial, after making it."""
+    """The total reward of a trial after the trial is made."""
     REWARD_BY_SUBTASK = "reward by subtask"
     """Reward of each goal of a trial, after the trial is made."""
     KINEMATIC_MODEL = "kinematic model"
     """The kinematics as formulas, with all derivatives."""
     REWARD_FORMULA = "reward as a formula"
-    """Fact that reward is lost in proportion to the joint-space path."""
+    """That reward is lost in proportion to the path in joint space."""
     SECONDARY_OBJECTIVES = "secondary objectives"
     """Objectives beyond hitting the goals, such as smoothness."""
 
@@ -71,19 +71,23 @@ METERED = frozenset(
         Information.KINEMATIC_MODEL,
     }
 )
-"""Information whose use a session sees. For the rest there is only the declaration."""
+"""Information whose use a session can see. For all other information there is only the
+declaration."""
 
 
 class UndeclaredError(CoarticError):
-    """A method used information that it does not declare, or a call that is not for it."""
+    """A method made a call, or used information, that its declaration does not cover."""
 
 
 class BudgetError(CoarticError):
-    """More trials were asked for than a budget has."""
+    """More trials were requested than the budget has."""
 
 
 class MethodError(CoarticError):
-    """No solution was found: ``outcome`` is ``"infeasible"`` or ``"solver-failed"``."""
+    """A method found no solution.
+
+    ``outcome`` is ``"infeasible"`` or ``"solver-failed"``.
+    """
 
     def __init__(
         self,
@@ -93,25 +97,25 @@ class MethodError(CoarticError):
     ) -> None:
         super().__init__(reason)
         if outcome not in ("infeasible", "solver-failed"):
-            raise ValueError(f"outcome {outcome!r}: it is 'infeasible' or 'solver-failed'")
+            raise ValueError(f"outcome is {outcome!r}; it must be 'infeasible' or 'solver-failed'")
         self.outcome = outcome
         self.details = details or {}
 
 
 @dataclass
 class Meter:
-    """Counts of the trials, evaluations and seconds that a method spent."""
+    """Counts of the trials, evaluations and seconds that a method has used."""
 
     trials: int = 0
-    """Physical trials, failed trials included."""
+    """Physical trials, including failed trials."""
     initial_trials: int = 0
-    """Trials of the search for the initial hands, where the task names a policy in their place.
-    They are not among ``trials``; their ticks, corrections and evaluations are counted below."""
+    """Trials of the search for the initial hands, if the task names a policy. They are not among
+    ``trials``, but their ticks, corrections and evaluations are in the counts below."""
     movement_ticks: int = 0
     """Control ticks of all trials."""
     forward_kinematics: int = 0
     """Forward-kinematics evaluations, one per configuration. Compiled kernels skip steps that
-    cannot end a movement."""
+    cannot end a movement, and do not count them."""
     jacobians: int = 0
     """Jacobian evaluations; the corrective process makes one per iteration."""
     corrective_iterations: int = 0
@@ -127,12 +131,12 @@ class Meter:
     solver_iterations: int = 0
     """Iterations of a solver."""
     build_s: float = 0.0
-    """Wall time of setting problems up, which is paid once."""
+    """Wall time of setting up problems, which is needed once."""
     solve_s: float = 0.0
     """Wall time of solving them."""
 
     COUNTS: ClassVar[tuple[str, ...]]
-    """Names of all counters, without the times."""
+    """Names of all counters except the times."""
     SOLVER: ClassVar[tuple[str, ...]] = (
         "forward_kinematics",
         "jacobians",
@@ -141,12 +145,14 @@ class Meter:
         "hessians",
         "solver_iterations",
     )
-    """Counters to which a method adds: the evaluations of its solver, or of a corrective process
-    that it runs itself, with one Jacobian per iteration."""
+    """Counters to which a method itself adds: the evaluations of its solver, or of a corrective
+    process that it runs itself, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
-        """Add each count to the counter of that name, in place. Signs, sums and budgets are not
-        checked."""
+        """Add each count to the counter of that name, in place.
+
+        Signs, sums and budgets are not checked.
+        """
         for name, count in counts.items():
             setattr(self, name, getattr(self, name) + int(count))
 
@@ -157,20 +163,32 @@ MOST_COUNT = 2**63 - 1
 
 
 def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
-    """Return rewards of trials as an array of integers of 8 bytes, :data:`NO_REWARD` for None."""
+    """Return rewards of trials as an array of 8-byte integers, :data:`NO_REWARD` for None."""
     return array("q", [NO_REWARD if reward is None else reward for reward in rewards])
 
 
 class Session:
     """The task, the seed and the meter with which a method works.
 
-    The declaration is enforced: a call that uses information of :data:`METERED` which
-    ``information`` lacks raises UndeclaredError. Trials and evaluations are counted. This is no
-    sandbox. ``trusted`` methods, this project's own, may also take the task to their compiled
-    kernels and state the counts themselves. ``of_run`` marks the session of a run: trials that a
-    process makes outside such sessions are counted apart
-    (:func:`coartic.motion.trial.trials_outside`). ``trial_budget`` is the most trials, None for any
-    number. Threads can share a session: they make trials one after the other, of one budget.
+    The declaration is enforced: a call that uses information of :data:`METERED` which is not in
+    ``information`` raises UndeclaredError. Trials and evaluations are counted. A session is not a
+    sandbox. Threads can share it: they make trials one after the other, from the same budget.
+
+    Parameters
+    ----------
+    task : Task
+    seed : int
+    information : iterable of Information
+        The information that the method declares.
+    model : MotionModel
+    trial_budget : int, optional
+        Largest number of trials; None for no limit.
+    trusted : bool
+        True for methods of this project. They may also get the task for their compiled kernels, and
+        set the counts themselves.
+    of_run : bool
+        True for the session of a run. Trials that a process makes outside such sessions are counted
+        separately (:func:`coartic.motion.trial.trials_outside`).
     """
 
     def __init__(
@@ -196,9 +214,9 @@ class Session:
         self._meter = Meter()
         self._rewards = array("q")
         self.lock = RLock()
-        """Held from the look at the budget until trials are counted."""
+        """Held from the check of the budget until the trials are counted."""
 
-    # Open to every method: the robot, not the goals.
+    # Every method can use these. They say nothing about the goals.
 
     @property
     def task_name(self) -> str:
@@ -212,12 +230,12 @@ class Session:
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Hands that may hit goals, of ``"left"`` and ``"right"``."""
+        """Hands that may hit goals: ``"left"``, ``"right"`` or both."""
         return self._task.hands
 
     @property
     def initial_hands(self) -> str:
-        """Hand sequence of trial 0, such as ``"RRRR"``, or name of a policy that finds one."""
+        """Hand sequence of trial 0, such as ``"RRRR"``, or the policy that finds one."""
         return self._task.initial_hands
 
     @property
@@ -236,53 +254,79 @@ class Session:
         return self._task.robot.dof
 
     def joints(self, hand: Hand) -> slice:
-        """Return the slice of a configuration that holds the joint angles, rad, of a hand's arm."""
+        """Return the slice of a configuration with the joint angles, rad, of a hand's arm."""
         return self._task.robot.joints(hand)
 
-    # These need a declaration.
+    # These have to be declared.
 
     @property
     def goals(self) -> Array:
-        """Goal centres, shape ``(G, 2)``, length unit, a copy. Raises UndeclaredError without
-        ``Information.GOALS``."""
+        """Goal centres, shape ``(G, 2)``, length unit, a copy.
+
+        Raises UndeclaredError without ``Information.GOALS``.
+        """
         self._use(Information.GOALS)
         return np.array(self._task.goal_array)
 
     @property
     def radius(self) -> float:
-        """θ^g: radius of every goal, length unit. Raises UndeclaredError without
-        ``Information.GOALS``."""
+        """θ^g: radius of every goal, length unit.
+
+        Raises UndeclaredError without ``Information.GOALS``.
+        """
         self._use(Information.GOALS)
         return self._task.radius
 
     @property
     def robot(self) -> Robot:
-        """The robot, with lengths of links and places of shoulders. Raises UndeclaredError without
-        ``Information.KINEMATIC_MODEL``. The method itself counts evaluations (:meth:`spend`)."""
+        """The robot with the lengths of its links and the positions of its shoulders.
+
+        The method counts its evaluations itself (:meth:`spend`). Raises UndeclaredError without
+        ``Information.KINEMATIC_MODEL``.
+        """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
-        """Return the position of a hand, x and y, as a CasADi expression, 2 x 1, length unit, for a
-        CasADi ``q``, dof x 1. Raises UndeclaredError without ``Information.KINEMATIC_MODEL``, and
-        ValueError for another size or hand. The method itself counts evaluations (:meth:`spend`).
+        """Return the position of a hand as a CasADi expression (:meth:`Robot.symbolic_hand`).
+
+        The method counts its evaluations itself (:meth:`spend`).
+
+        Parameters
+        ----------
+        q : CasADi matrix, dof x 1
+        hand : {"left", "right"}
+
+        Returns
+        -------
+        CasADi matrix, 2 x 1
+            x and y, length unit.
+
+        Raises
+        ------
+        UndeclaredError
+            ``Information.KINEMATIC_MODEL`` is not declared.
+        ValueError
+            ``q`` has another size, or the hand is unknown.
         """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot.symbolic_hand(q, hand)
 
     @property
     def used(self) -> frozenset[Information]:
-        """Set of the declared information that the session has seen used so far."""
+        """The declared information that the session has seen used so far."""
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Note a use of the corrective process if a corrective movement of a solution has no
-        target, for which that process is to look. Raises UndeclaredError if the method does not
-        declare such a use, and SolutionError if the solution is no sequence."""
+        """Check that a solution uses only declared information, and note what it uses.
+
+        A corrective movement without a target uses the corrective process. Raises UndeclaredError
+        if the method does not declare it, and SolutionError if the solution is not a sequence.
+        """
         if not isinstance(solution, Sequence):
-            raise SolutionError(f"the solution is {brief_value(solution)}; needed is a list")
-        for m in solution:
-            if getattr(m, "kind", "") == "corrective" and m.target is None:
+            raise SolutionError(f"the solution is {brief_value(solution)}; it must be a list")
+        for movement in solution:
+            if getattr(movement, "kind", "") == "corrective" and movement.target is None:
                 self._use(Information.CORRECTIVE_PROCESS)
 
     def _use(self, *information: Information) -> None:
@@ -295,34 +339,84 @@ class Session:
                 )
         self._used.update(information)
 
-    # Calls that are counted.
+    # Calls that the session counts.
 
     def forward_kinematics(self, q: Any, hand: Hand) -> Array:
-        """Return hand positions, ``(..., 2)``, length unit, for configurations ``(..., dof)``;
-        count an evaluation for each. Raises UndeclaredError without
-        ``Information.FORWARD_KINEMATICS``, and ValueError if ``q`` or ``hand`` does not fit."""
+        """Return positions of a hand, and count an evaluation for each.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., dof)
+        hand : {"left", "right"}
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            x and y, length unit.
+
+        Raises
+        ------
+        UndeclaredError
+            ``Information.FORWARD_KINEMATICS`` is not declared.
+        ValueError
+            ``q`` or ``hand`` does not fit the robot.
+        """
         self._use(Information.FORWARD_KINEMATICS)
         positions = self._task.robot.forward_kinematics(q, hand)
         self._meter.add(forward_kinematics=positions[..., 0].size)
         return positions
 
     def jacobian(self, q: Any, hand: Hand) -> Array:
-        """Return derivatives of a hand's x and y by each entry of ``q``, ``(..., 2, dof)``, length
-        unit per length unit (base) or rad, for configurations ``(..., dof)``; count a Jacobian for
-        each. Raises UndeclaredError without ``Information.JACOBIAN``, and ValueError if ``q`` or
-        ``hand`` does not fit the robot."""
+        """Return Jacobians of a hand's position, and count each of them.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., dof)
+        hand : {"left", "right"}
+
+        Returns
+        -------
+        ndarray, shape (..., 2, dof)
+            Derivatives of x and y by each entry of ``q``, length unit per length unit (base) or rad
+            (joints).
+
+        Raises
+        ------
+        UndeclaredError
+            ``Information.JACOBIAN`` is not declared.
+        ValueError
+            ``q`` or ``hand`` does not fit the robot.
+        """
         self._use(Information.JACOBIAN)
         jacobians = self._task.robot.jacobian(q, hand)
         self._meter.add(jacobians=jacobians[..., 0, 0].size)
         return jacobians
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
-        """Run the corrective process from ``q``, ``(dof,)``, with a hand for a goal (from 1); count
-        its iterations, Jacobians and evaluations. Return the configuration found, or, without an
-        error, the last iterate if the result is not ``converged``. No movement is made.
+        """Run the corrective process for a goal, and count what it takes.
 
-        Raises UndeclaredError without ``Information.CORRECTIVE_PROCESS``, and ValueError for a goal
-        that the task lacks, and a ``q`` or hand that does not fit the robot."""
+        No movement is made. Iterations, Jacobians and forward-kinematics evaluations are counted.
+
+        Parameters
+        ----------
+        q : array_like, shape (dof,)
+            Where to begin.
+        hand : {"left", "right"}
+        goal : int
+            Number of the goal, from 1.
+
+        Returns
+        -------
+        Correction
+            The configuration found, or the last iterate if it is not ``converged``.
+
+        Raises
+        ------
+        UndeclaredError
+            ``Information.CORRECTIVE_PROCESS`` is not declared.
+        ValueError
+            The task does not have the goal, or ``q`` or ``hand`` does not fit the robot.
+        """
         self._use(Information.CORRECTIVE_PROCESS)
         check_limits("goal", goal, 1, self.goals_count)
         correction = correct(
@@ -341,14 +435,30 @@ class Session:
         return correction
 
     def trial(self, solution: Sequence[Movement]) -> Execution:
-        """Make one physical trial of a solution; count the trial, its ticks, evaluations,
-        iterations and corrections; return the execution.
+        """Make one physical trial of a solution, and count it.
 
-        The corrective process acts where a goal is missed; its ticks count. Where this process is
-        not declared, the execution has the movements as given and no configurations. Raises
-        UndeclaredError without ``Information.REWARD_BY_TRIAL``, and without
-        ``Information.CORRECTIVE_PROCESS`` for a corrective movement without a target; BudgetError
-        if no trial is left; SolutionError for a solution that breaks the task's rules.
+        Its ticks, evaluations, iterations and corrections are counted as well. The corrective
+        process acts if a goal is missed, and its ticks count.
+
+        Parameters
+        ----------
+        solution : sequence of Movement
+
+        Returns
+        -------
+        Execution
+            The execution. If ``Information.CORRECTIVE_PROCESS`` is not declared, its movements are
+            those of ``solution``, and it has no configurations.
+
+        Raises
+        ------
+        UndeclaredError
+            ``Information.REWARD_BY_TRIAL`` is not declared, or a corrective movement has no target
+            and ``Information.CORRECTIVE_PROCESS`` is not declared.
+        BudgetError
+            The budget has no trial left.
+        SolutionError
+            The solution breaks the task's rules.
         """
         self._use(Information.REWARD_BY_TRIAL)
         self.check_solution(solution)
@@ -375,33 +485,53 @@ class Session:
     def trials(self, hands: HandSequences, targets: Any, *, until: Any = None) -> Trials:
         """Make N physical trials at once.
 
-        ``hands`` is one hand sequence for all (``"RRLR"``), or a sequence each. ``targets`` has
-        shape ``(N, G, dof)``, length unit (base) and rad (joints): a joint whose target is NaN
-        keeps its value, and for a goal without any target the corrective process acts alone, which
-        has to be declared. It acts where a goal is missed, too; its ticks count. A trial with a
-        joint's target beyond 100,000, which :meth:`trial` refuses, fails without a movement.
+        The corrective process acts if a goal is missed, and its ticks count. Counts are the same as
+        for :meth:`trial`, which however spends one or two more evaluations of forward kinematics
+        per goal tried.
 
-        Where the budget has fewer trials left, the first are made: results have a row for each
-        trial made. With ``until``, rewards of shape ``(N,)``, trials end after the first whose
-        reward exceeds its entry of ``until``; no later trial is counted or returned.
+        Parameters
+        ----------
+        hands : str or sequence of str
+            One hand sequence for all trials (``"RRLR"``), or a sequence for each.
+        targets : array_like, shape (N, G, dof)
+            Targets, length unit (base) and rad (joints). A joint whose target is NaN keeps its
+            value. For a goal with only NaN no movement is made to a target, and only the corrective
+            process acts, which has to be declared. A trial with a target beyond 100,000 fails
+            without a movement (:meth:`trial` refuses it).
+        until : array_like, shape (N,), optional
+            Rewards. Trials end after the first one whose reward exceeds its entry; no later trial
+            is counted or returned.
 
-        Ticks and counts are the same as with :meth:`trial`, except that :meth:`trial` spends one or
-        two more evaluations of forward kinematics per goal tried. Where the corrective process is
-        not declared, ``corrections``, ``iterations``, ``targets`` and ``reached`` come back empty.
-        Raises UndeclaredError without ``Information.REWARD_BY_TRIAL``, BudgetError for N > 0
-        where no trial is left, ValueError for hands or arrays that do not fit.
+        Returns
+        -------
+        Trials
+            The results, with a row for each trial made. If the budget has fewer trials left, the
+            first trials are made. If ``Information.CORRECTIVE_PROCESS`` is not declared,
+            ``corrections``, ``iterations``, ``targets`` and ``reached`` are empty.
+
+        Raises
+        ------
+        UndeclaredError
+            ``Information.REWARD_BY_TRIAL`` is not declared, or ``Information.CORRECTIVE_PROCESS``
+            for a goal without targets.
+        BudgetError
+            N is above 0, and the budget has no trial left.
+        ValueError
+            Hands or arrays do not fit.
         """
         self._use(Information.REWARD_BY_TRIAL)
-        given = check_targets(self._task, targets)
-        if np.isnan(given.min(initial=0.0)) and np.isnan(given).all(axis=2).any():
+        configurations = check_targets(self._task, targets)
+        count = len(configurations)
+        has_nan = np.isnan(configurations.min(initial=0.0))
+        if has_nan and np.isnan(configurations).all(axis=2).any():
             self._use(Information.CORRECTIVE_PROCESS)
-        codes = hand_codes(self._task, hands, len(given))
+        codes = hand_codes(self._task, hands, count)
         until = None if until is None else real_array("until", until)
-        if until is not None and until.shape != given.shape[:1]:
-            raise ValueError(f"until has shape {until.shape}; needed is {given.shape[:1]}")
+        if until is not None and until.shape != (count,):
+            raise ValueError(f"until has shape {until.shape}; it must be ({count},)")
         with self.lock:
-            left = self._affordable(len(given))
-            accounts = self._make_trials(codes[:left], given[:left], until)
+            left = self._affordable(count)
+            accounts = self._make_trials(codes[:left], configurations[:left], until)
         trials = trials_of(accounts, self.dof)
         if Information.CORRECTIVE_PROCESS in self._information:
             return trials
@@ -413,8 +543,10 @@ class Session:
         )
 
     def _affordable(self, count: int) -> int:
-        """Return how many of ``count`` trials the budget allows: ``count``, or the number left if
-        that is less. Raises BudgetError if none is left and ``count`` is above 0."""
+        """Return how many of ``count`` trials the budget allows.
+
+        Raises BudgetError if ``count`` is above 0 and no trial is left.
+        """
         left = self.trials_left
         if left is None:
             return count
@@ -422,44 +554,60 @@ class Session:
             raise BudgetError(f"the budget of {counted(self._trial_budget or 0, 'trial')} is spent")
         return min(count, left)
 
-    # The same for an objective, which returns what fits the task and the budget.
+    # The same calls for an objective, which checks points and budget itself.
 
     @cached_property
     def _compiled(self) -> CompiledTask:
         return compiled_task(self._task, self.model)
 
     def hand_codes(self, hands: HandSequences, count: int) -> Hands:
-        """Return the hands of ``count`` trials, 0 left or 1 right, shape ``(count, G)``, from one
-        hand sequence for all or a sequence for each. Raises ValueError for hand sequences that do
-        not fit the task or ``count``."""
+        """Return the hands of ``count`` trials, 0 left or 1 right, shape ``(count, G)``.
+
+        ``hands`` is one hand sequence for all trials, or a sequence for each. Raises ValueError if
+        it does not fit the task or ``count``.
+        """
         return hand_codes(self._task, hands, count)
 
     def _make_trials(self, codes: Hands, targets: Configs, until: Array | None = None) -> Accounts:
-        """Make and count N trials, or fewer by the first N entries of ``until`` (:meth:`trials`),
-        with hands 0 (left) or 1 (right), ``(N, G)``; return their accounts. The caller checks
-        arguments and budget, and holds ``lock``."""
+        """Make and count N trials, and return their accounts.
+
+        With ``until`` there may be fewer (:meth:`trials`). ``codes`` are the hands, 0 (left) or 1
+        (right), shape ``(N, G)``. The caller checks arguments and budget, and holds ``lock``.
+        """
         accounts = make_trials(self._compiled, codes, targets[:, :, None])
         count_trials(-len(targets) * self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > until[: len(targets)]
             if better.any():
-                made = int(better.argmax()) + 1
-                accounts = Accounts._make(each[:made] for each in accounts)
+                count = int(better.argmax()) + 1
+                accounts = Accounts._make(array[:count] for array in accounts)
         self._count(accounts.rewards, *np.add.reduce(accounts.counts).tolist())
         return accounts
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
-        """Return the hand sequence of the first trial, such as ``"RRRR"``: the sequence that the
-        task names, or, if the task names a policy, the sequence of ``hands`` (by default the
-        task's) with which the corrective process alone gets the highest reward, among sequences of
-        one hand (``"best-single-hand"``) or all (``"best-of-all"``).
+        """Find the hand sequence of the first trial, such as ``"RRRR"``.
 
-        Trials of this search are counted as ``initial_trials``, not among the method's trials or in
-        its budget; their ticks and other counts are added to the method's. Raises
-        NotApplicableError if a policy finds no such sequence that completes the task, or has more
-        than 4096 to try; UndeclaredError unless ``Information.CORRECTIVE_PROCESS`` and
-        ``REWARD_BY_TRIAL`` are both declared; ValueError for ``hands`` that are empty or not the
-        task's.
+        If the task names a sequence, it is returned. If the task names a policy, it is the sequence
+        for which the corrective process on its own gets the highest reward: among sequences of one
+        hand (``"best-single-hand"``), or among all (``"best-of-all"``).
+
+        The trials of this search are counted as ``initial_trials``. They are not among the method's
+        trials, and do not count for its budget, but their ticks and other counts are added to the
+        method's.
+
+        Parameters
+        ----------
+        hands : tuple of {"left", "right"}, optional
+            Hands among which a policy chooses; the task's by default.
+
+        Raises
+        ------
+        NotApplicableError
+            No sequence tried completes the task, or there are more than 4096 to try.
+        UndeclaredError
+            ``Information.CORRECTIVE_PROCESS`` and ``REWARD_BY_TRIAL`` are not both declared.
+        ValueError
+            ``hands`` is empty, or names a hand that is not the task's.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
         chosen, spent = search_initial_hands(self._task, hands, model=self.model)
@@ -476,9 +624,11 @@ class Session:
         corrections: int,
         failed: int,
     ) -> None:
-        """Add trials with these rewards (:data:`NO_REWARD` where a trial failed) to
-        :attr:`rewards`, and to the meter their number and their sums of ticks, evaluations,
-        iterations, corrections and failures; an iteration is a Jacobian, too."""
+        """Add trials to :attr:`rewards` and to the meter.
+
+        ``rewards`` has :data:`NO_REWARD` for each failed trial; all other arguments are sums over
+        the trials. An iteration counts as a Jacobian as well.
+        """
         before, meter = len(self._rewards), self._meter
         self._rewards.frombytes(rewards.tobytes())
         meter.trials += len(self._rewards) - before
@@ -491,7 +641,7 @@ class Session:
 
     @property
     def trials_made(self) -> int:
-        """Number of trials made so far, without trials of the search for the initial hands."""
+        """Number of trials made so far, without the search for the initial hands."""
         return self._meter.trials
 
     @property
@@ -508,18 +658,20 @@ class Session:
 
     @property
     def rewards(self) -> list[int | None]:
-        """Total reward of each trial made, without trials of the search for the initial hands, in
-        order, a new list; None where a trial failed."""
+        """Total reward of each trial made, in order, a new list; None if a trial failed.
+
+        Trials of the search for the initial hands are not included.
+        """
         return [None if reward == NO_REWARD else reward for reward in self._rewards]
 
     # Counts that the method adds itself.
 
     def spend(self, **counts: int) -> None:
-        """Add counts to the counters of these names. A method may name counters of
-        :attr:`Meter.SOLVER`, a trusted method all of :attr:`Meter.COUNTS`.
+        """Add counts to the counters with these names.
 
-        Raises ValueError for another counter, for a count that is no whole number from 0, and for a
-        sum beyond 2^63 - 1.
+        A method may name counters of :attr:`Meter.SOLVER`, a trusted method all of
+        :attr:`Meter.COUNTS`. Raises ValueError for another counter, for a count that is not an
+        integer from 0, and for a sum above 2^63 - 1.
         """
         allowed = Meter.COUNTS if self._trusted else Meter.SOLVER
         for name, count in counts.items():
@@ -530,11 +682,11 @@ class Session:
         self._meter.add(**counts)
 
     def building(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block, s, to counter ``build_s``."""
+        """Return a context that adds the wall time of its block to ``build_s``, s."""
         return self._timing("build_s")
 
     def solving(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block, s, to counter ``solve_s``."""
+        """Return a context that adds the wall time of its block to ``solve_s``, s."""
         return self._timing("solve_s")
 
     @contextmanager
@@ -546,23 +698,27 @@ class Session:
             spent = getattr(self._meter, counter) + time.perf_counter() - clock
             setattr(self._meter, counter, spent)
 
-    # The back door of this project's compiled methods.
+    # Only for this project's compiled methods.
 
     def reveal(self, *information: Information) -> Task:
-        """Return the task itself, for methods of this project that count by themselves, with
-        :meth:`spend`. Note ``information``, at least one item, as used. Raises UndeclaredError
-        for any other method, without an item, and for an item that the method does not declare.
+        """Return the task itself, for methods of this project.
+
+        These methods count by themselves, with :meth:`spend`. ``information``, at least one item,
+        is noted as used. Raises UndeclaredError for any other method, without an item, and for an
+        item that the method does not declare.
         """
         self._needs_trust("reveal")
         if not information:
-            raise UndeclaredError("reveal without saying what is used of the task")
+            raise UndeclaredError("reveal needs the information that the method uses of the task")
         self._use(*information)
         return self._task
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
-        """Add rewards of trials that a compiled method of this project made (None for a failed
-        trial) to :attr:`rewards`, and ``solve_s``, the time that the method took, s, to the counter
-        of this name; no other count is changed. Raises UndeclaredError for any other method."""
+        """Add rewards and time of trials that a compiled method of this project made.
+
+        ``rewards`` has None for a failed trial. ``solve_s``, s, is added to the counter of this
+        name; no other count changes. Raises UndeclaredError for any other method.
+        """
         self._needs_trust("record")
         self._rewards.extend(_pack_rewards(rewards))
         self._meter.solve_s += solve_s

@@ -1,2 +1,4 @@
-"""Pictures of the robot, movements tick by tick, and films of movements. Modules here know executed
-solutions, not who found them."""
+"""Pictures of the robot, trajectories tick by tick, and films of movements.
+
+Modules here know executed solutions, but not which method found them.
+"""

@@ -1,7 +1,7 @@
-"""The robot and its goals, by the conventions of the paper's figures.
+"""Draw the robot and its goals by the conventions of the paper's figures.
 
-Open squares mark the left arm, closed circles the right arm, open circles with a number the goals
-(paper, Figures 1, 4 and 6).
+Open squares mark the left arm, closed circles the right arm, and open circles with a number the
+goals (paper, Figures 1, 4 and 6).
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from coartic.robot import Array, Hand
 from coartic.tasks.task import Task
 
 _BLACK, _BASE_GREY, _WHITE = "#000000", "#7a7a7a", "#ffffff"
-_HIT = "#009e73"  # of a goal
+_HIT = "#009e73"  # colour of a goal that is hit
 MARKERS: dict[Hand, dict[str, Any]] = {
-    # Squares are larger than circles, so that hands at one place show both.
+    # Squares are larger than circles, so that both are visible at the same position.
     "left": {"marker": "s", "markersize": 4.2, "markerfacecolor": _WHITE},
     "right": {"marker": "o", "markersize": 2.6},
 }
-_CROWDED = 0.6  # times the robot's scale: a goal that near above another has its number
+_CROWDED = 0.6  # times the robot's scale: a goal this close above another would cover its number
 
 
 def draw_robot(
@@ -36,10 +36,28 @@ def draw_robot(
     alpha: float = 1.0,
     colour: str = _BLACK,
 ) -> Callable[[Array], None]:
-    """Draw the base and the arms of the task's hands in configuration ``q``, shape ``(dof,)``;
-    return a function that moves the drawing to another configuration. ``weight`` scales the width
-    of lines, ``alpha`` is their opacity, from 0 to 1, ``colour`` their colour. Set the limits of
-    ``axes`` yourself: the base does not widen them."""
+    """Draw the base and the arms of the task's hands in a configuration.
+
+    The limits of ``axes`` are the caller's task: the base does not widen them.
+
+    Parameters
+    ----------
+    axes : matplotlib Axes
+    task : Task
+    q : ndarray, shape (dof,)
+        The configuration, length unit and rad.
+    weight : float
+        Factor for the width of lines.
+    alpha : float
+        Opacity, from 0 to 1.
+    colour : str
+        Colour of the lines.
+
+    Returns
+    -------
+    callable
+        A function that moves the drawing to another configuration.
+    """
     base = Polygon(
         task.robot.base_outline(q),
         facecolor=(_BASE_GREY, 0.25 * alpha),
@@ -68,8 +86,10 @@ def draw_robot(
 
 
 def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]:
-    """Draw every goal as an open circle of its radius, with lines ``weight`` times as wide as
-    usual; return the circles, in goal order."""
+    """Draw every goal as an open circle, and return the circles in goal order.
+
+    The circles have the radius of the goals; ``weight`` is a factor for the width of lines.
+    """
     options: Any = {"fill": False, "edgecolor": _BLACK, "linewidth": 0.7 * weight, "zorder": 3}
     circles = [Circle(goal, task.radius, **options) for goal in task.goals]
     for circle in circles:
@@ -78,16 +98,20 @@ def circle_goals(axes: Axes, task: Task, *, weight: float = 1.0) -> list[Circle]
 
 
 def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
-    """Fill the circles of goals that are hit, and empty all other circles; ``hit`` has a bool for
-    each circle."""
+    """Fill the circles of goals that are hit, and empty all others.
+
+    ``hit`` has a bool for each circle.
+    """
     for circle, is_hit in zip(circles, np.asarray(hit), strict=True):
         circle.set(fill=bool(is_hit), facecolor=_HIT)
 
 
 def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) -> None:
-    """Write the number of every goal, from 1, above it, or below where another goal is close above.
-    ``weight`` scales the distance; ``text`` has options of ``Axes.annotate`` that are not set here,
-    such as ``fontsize``."""
+    """Write the number of every goal, from 1, above it.
+
+    It is below the goal if another goal is close above. ``weight`` is a factor for the distance.
+    ``text`` has options of ``Axes.annotate`` that are not set here, such as ``fontsize``.
+    """
     goals = task.goal_array
     right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
     crowded = _CROWDED * task.robot.scale
@@ -104,12 +128,21 @@ def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) ->
 
 
 def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Array, Array]:
-    """Return the lower left and the upper right corner, shape ``(2,)``, length unit, of a box
-    around the goals, and the base and the arms of the task's hands in ``configurations``, shape
-    ``(..., dof)``.
+    """Return the corners of a box around goals, base and arms.
 
-    ``margin`` is the free border, length unit, for arms of length 4; it scales with the shorter
-    arm. Circles of goals may reach into it.
+    Parameters
+    ----------
+    task : Task
+    configurations : array_like, shape (..., dof)
+        Configurations of base and arms, of which the arms of the task's hands are included.
+    margin : float
+        Free border, length unit, for arms of length 4. It scales with the shorter arm. Circles of
+        goals may extend into it.
+
+    Returns
+    -------
+    low, high : ndarray, shape (2,)
+        The lower left and the upper right corner, length unit.
     """
     margin *= task.robot.scale
     points = [

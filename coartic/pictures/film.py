@@ -1,7 +1,7 @@
-"""Movements tick by tick as a GIF or an MP4, in the colours of the play page.
+"""Films of movements tick by tick, GIF or MP4, in the colours of the play page.
 
-Open squares mark the left arm, closed circles the right arm; goals are numbered circles, filled
-from the tick at which they are hit, when the film pauses. Pale lines trace the hands.
+Open squares mark the left arm, closed circles the right arm. Goals are numbered circles. A goal is
+filled from the tick at which it is hit, and the film pauses there. Pale lines trace the hands.
 """
 
 from __future__ import annotations
@@ -28,11 +28,12 @@ if TYPE_CHECKING:
     from coartic.pictures.trajectories import Trajectory
 
 RATE = 12.5
-"""Frames per second: a whole number of hundredths of a second each, as GIF has them."""
+"""Frames per second. GIF needs an integer number of hundredths of a second for a frame."""
 LONGEST = 125
-"""Most frames of a film, without pauses: of longer movements a frame shows several ticks."""
+"""Largest number of frames of a film without pauses; in longer movements a frame stands for many
+ticks."""
 PAUSE, HOLD = 6, 30
-"""Frames for which the film stands where a goal is hit, and at the end."""
+"""Number of frames for which the film stops when a goal is hit, and at the end."""
 COLOURS = "#0072b2", "#c04a00"
 _DPI = 100
 _WEIGHT = 2.0  # of lines
@@ -45,18 +46,18 @@ def write_film(
     width: int = 800,
     replace: bool = False,
 ) -> tuple[int, float]:
-    """Write a film of movements side by side, all from their first tick.
+    """Write a film of movements side by side, which all begin at their first tick.
 
     Parameters
     ----------
     movements : sequence of (str, Trajectory)
-        Titles and movements. A movement that ends before the longest one then stands still.
+        Titles and movements. A movement that ends before the longest one stands still afterwards.
     path : pathlib.Path
-        The file, ``.gif`` or, where ffmpeg is installed, ``.mp4``.
+        The file, ``.gif`` or, if ffmpeg is installed, ``.mp4``.
     width : int
         Width in pixels.
     replace : bool
-        True to write over a file.
+        True to overwrite an existing file.
 
     Returns
     -------
@@ -66,22 +67,22 @@ def write_film(
     Raises
     ------
     CoarticError
-        A movement has no tick, the ending is another one, ffmpeg is missing, or the file exists or
-        cannot be written.
+        A movement has no tick, the file has another suffix, ffmpeg is missing, or the file exists
+        or cannot be written.
     """
     check_ending(path, [".gif", ".mp4"])
     is_mp4 = path.suffix.lower() == ".mp4"
     if is_mp4 and not FFMpegWriter.isAvailable():
-        raise CoarticError(f"{path}: MP4 needs ffmpeg; install it, or choose a .gif")
+        raise CoarticError(f"{path}: MP4 needs ffmpeg, which is not installed; use a .gif instead")
     check_output(path, replace=replace)
     lengths = [len(movement.configurations) for _, movement in movements]
     if 0 in lengths:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
-    stride, last = math.ceil(max(lengths) / LONGEST), max(lengths) - 1
+    stride, end = math.ceil(max(lengths) / LONGEST), max(lengths) - 1
     hits = {int(hit) for _, movement in movements for hit in movement.hits}
-    rows = sorted({*range(0, last, stride), *hits, last})
+    rows = sorted({*range(0, end, stride), *hits, end})
     shown = [row for row in rows
-             for _ in range(HOLD if row == last else PAUSE if row in hits else 1)]  # fmt: skip
+             for _ in range(HOLD if row == end else PAUSE if row in hits else 1)]  # fmt: skip
     figure, show = stage(movements, width)
     rate: Any = RATE
     writer = FFMpegWriter(rate, codec="h264") if is_mp4 else PillowWriter(rate)
@@ -100,13 +101,16 @@ def write_film(
 def stage(
     movements: Sequence[tuple[str, Trajectory]], width: int
 ) -> tuple[Figure, Callable[[int], list[Any]]]:
-    """Return a figure ``width`` pixels wide with a panel for each movement, all over the same
-    region, and a function that shows a row of their configurations, from 0."""
+    """Return a figure with a panel for each movement, and a function that updates it.
+
+    The figure is ``width`` pixels wide, and all panels show the same region. The function shows a
+    row, from 0, of the movements' configurations.
+    """
     corners = np.array([box(movement.task, movement.configurations) for _, movement in movements])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     across, up = high - low
     height = width / len(movements) * up / across + 70  # pixels, with the titles
-    size = width / _DPI, 2 * round(height / 2) / _DPI  # even, as MP4 needs it
+    size = width / _DPI, 2 * round(height / 2) / _DPI  # an even number, which MP4 needs
     figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
     panels = figure.subplots(1, len(movements), squeeze=False)[0]
     shows = []
@@ -122,19 +126,21 @@ def stage(
         shows.append(_scene(axes, movement, colour))
 
     def show(row: int) -> list[Any]:
-        for one in shows:
-            one(row)
+        for show_panel in shows:
+            show_panel(row)
         return []
 
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # else each frame is laid out again
+    figure.set_layout_engine("none")  # otherwise each frame would be laid out again
     return figure, show
 
 
 def _scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
-    """Draw goals, robot, paths of the hands and a counter of ticks, and return a function that
-    updates the drawing to a row of the movement's configurations, from 0; a row past the end shows
-    the last configuration."""
+    """Draw goals, robot, paths of the hands and a counter of ticks.
+
+    Return a function that updates the drawing to a row, from 0, of the movement's configurations. A
+    row past the end shows the last configuration.
+    """
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}
     traces = {hand: axes.plot([], [], color=colour, alpha=0.4)[0] for hand in task.hands}

@@ -1,4 +1,4 @@
-"""A solution tick by tick: the movements that :func:`coartic.motion.solution.execute` scores."""
+"""Solutions tick by tick: the movements that :func:`coartic.execute` scores."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Every control tick of an execution that hit all goals (:func:`trajectory`)."""
+    """Every control tick of an execution that hits all goals (:func:`trajectory`)."""
 
     task: Task
     """The task."""
     execution: Execution
     """Execution of the solution (:func:`coartic.execute`)."""
     configurations: Array
-    """Configurations passed, shape ``(ticks, dof)``, length unit (base) and rad (joints): a row
-    for each control tick, the first row the start. A movement of k steps gives k + 1 rows: the
-    first row of the next movement repeats the last row."""
+    """Configurations, shape ``(ticks, dof)``, length unit (base) and rad (joints): a row for each
+    control tick, the first row being the start. A movement of k steps has k + 1 rows, so that its
+    last row is repeated as the first row of the next movement."""
     hits: NDArray[np.int64]
-    """Row at which each goal was hit, shape ``(G,)``. A goal that was hit without a tick
-    of its own has the row in which the robot stood; 0 before the first tick."""
+    """Row in which each goal was hit, shape ``(G,)``. If a goal was hit without any ticks, this is
+    the row in which the robot stood; 0 before the first tick."""
     __eq__ = equal_contents
 
     @property
     def hands(self) -> tuple[Hand, ...]:
-        """Hand for each goal, as names; ``execution.hands`` has letters."""
+        """Name of the hand for each goal; ``execution.hands`` has the letters."""
         return hands_of(self.execution.hands)
 
     @property
@@ -60,27 +60,36 @@ class Trajectory:
         return -self.execution.ticks
 
     def hand_path(self, hand: Hand) -> Array:
-        """Return the position of a hand in each row of ``configurations``, shape ``(rows, 2)``,
-        length unit; also of a hand that the task does not let hit goals."""
+        """Return the position of a hand in each row of ``configurations``.
+
+        The shape is ``(rows, 2)``, length unit. The hand need not be one that may hit goals of the
+        task.
+        """
         return self.task.robot.forward_kinematics(self.configurations, hand)
 
     def subtask(self, goal: int) -> Array:
-        """Return the rows of ``configurations`` from the hit of the goal before, or the start, to
-        the hit of a goal, both included, shape ``(rows, dof)``; none if no tick was made.
+        """Return the rows of ``configurations`` that belong to a goal.
 
-        ``goal`` is a number from 1. Raises ValueError if there is no such goal.
+        They go from the hit of the goal before, or from the start, to the hit of this goal, both
+        included, shape ``(rows, dof)``. There are no rows if no tick was made. ``goal`` is a number
+        from 1; ValueError is raised if the task does not have it.
         """
         check_limits("goal", goal, 1, len(self.hits))
-        first = self.hits[goal - 2] if goal > 1 else 0
-        return self.configurations[first : self.hits[goal - 1] + 1]
+        start = self.hits[goal - 2] if goal > 1 else 0
+        return self.configurations[start : self.hits[goal - 1] + 1]
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the movement as a table, a row for each control tick (index ``tick``, from 0).
+        """Return the movement as a table with a row for each control tick.
 
-        ``goal`` is the number of the first goal with this or a later row in ``hits``, ``hand`` the
-        hand that is to hit it. Then the configuration (``base_x``, ``base_y`` in length units,
-        ``left_1`` and so on in rad) and the place of both hands (``left_x``, ``left_y``,
-        ``right_x``, ``right_y``, length unit). ``attrs["units"]`` has these units.
+        The index is ``tick``, from 0. The columns are
+
+        - ``goal``: number of the first goal that is hit in this or a later row;
+        - ``hand``: the hand that is to hit it;
+        - ``base_x`` and ``base_y`` (length unit), ``left_1`` and so on (rad): the configuration;
+        - ``left_x``, ``left_y``, ``right_x`` and ``right_y`` (length unit): the positions of both
+          hands.
+
+        ``attrs["units"]`` has the units.
         """
         import pandas as pd
 
@@ -99,8 +108,10 @@ class Trajectory:
         return frame
 
     def plot(self) -> Figure:
-        """Return a figure of the robot at the start (pale) and at each hit, with the path of the
-        hand that hits each goal."""
+        """Return a figure of the robot at the start (pale) and at each hit.
+
+        It also shows the path of the hand that hits each goal.
+        """
         from matplotlib.figure import Figure
 
         from coartic.pictures.drawing import box, circle_goals, draw_robot, number_goals
@@ -128,10 +139,23 @@ class Trajectory:
         width: Annotated[int, Field(ge=200, le=3840)] = 560,
         replace: bool = False,
     ) -> None:
-        """Write a film of the movement, ``width`` pixels wide (MP4: up to 2 fewer), as a file
-        ``.gif`` or, where ffmpeg is installed, ``.mp4``; with ``replace`` a file that is there is
-        written over. Raises CoarticError for another ending, if no control tick was made, and if
-        the file cannot be written, or is there and ``replace`` is False."""
+        """Write a film of the movement.
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            The file, ``.gif`` or, if ffmpeg is installed, ``.mp4``.
+        width : int
+            Width in pixels, from 200 to 3840 (in an MP4 up to 2 fewer).
+        replace : bool
+            True to overwrite an existing file.
+
+        Raises
+        ------
+        CoarticError
+            The file has another suffix, no control tick was made, or the file exists or cannot be
+            written.
+        """
         from coartic.pictures.film import write_film
 
         title = f"{self.task.name}, {self.execution.hands}"
@@ -141,7 +165,7 @@ class Trajectory:
 def trajectory(
     task: TaskLike, movements: Iterable[Movement], model: MotionModel = PAPER
 ) -> Trajectory:
-    """Execute a solution and keep every control tick.
+    """Execute a solution, and return its configuration at every control tick.
 
     The number of ticks and the configurations at the hits are the same as in
     :func:`coartic.execute`, bit for bit.
@@ -163,7 +187,7 @@ def trajectory(
     TaskError
         The task cannot be used.
     TypeError
-        The task is neither a Task nor a text nor a path.
+        The task is not a Task, a string or a path.
     SolutionError
         The solution breaks the task's rules, or does not hit every goal.
     ValueError

@@ -1,2 +1,4 @@
-"""The page on which a reader moves goals and watches the robot answer (`coartic play`): the model
-once more, in JavaScript. It knows tasks alone."""
+"""The page on which a reader moves goals and watches the robot react (`coartic play`).
+
+It has the model a second time, in JavaScript. It knows tasks, but no methods.
+"""

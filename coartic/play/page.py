@@ -1,4 +1,4 @@
-"""The page of `coartic play`: one HTML file, which needs no other and no network."""
+"""The page of `coartic play`: one HTML file that needs no other file and no network."""
 
 from __future__ import annotations
 
@@ -16,18 +16,20 @@ from coartic.tasks.task import Task, shipped_tasks
 
 FOLDER = Path(__file__).parent
 UP_OR_DOWN = ("ascending", "descending")
-"""Tasks that share start and first goal: with them the page begins by default."""
+"""Tasks with the same start and first goal; by default the page begins with them."""
 
 
 def play_page(task: Task | None = None) -> str:
-    """Return the page of ``coartic play``, one HTML file that needs no other: it begins with
-    ``task``, by default with :func:`up_or_down`, and offers all shipped tasks."""
-    presets = [preset_of(each) for each in shipped_tasks().values()]
+    """Return the page of ``coartic play``, one HTML file that needs no other.
+
+    It offers all shipped tasks and begins with ``task``, by default with :func:`up_or_down`.
+    """
+    presets = [preset_of(shipped) for shipped in shipped_tasks().values()]
     if task is None:
         presets.insert(0, up_or_down())
     else:
-        own = preset_of(task)
-        presets = [own, *(preset for preset in presets if preset != own)]
+        preset = preset_of(task)
+        presets = [preset, *(shipped for shipped in presets if shipped != preset)]
     return (
         templates()
         .get_template("page.html.jinja")
@@ -39,17 +41,26 @@ def play_page(task: Task | None = None) -> str:
     )
 
 
-def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
-    """Return the figure to play with as HTML. The page has to have the styles of ``play.css``, and
-    to define the colours that ``play.css`` names.
+def player_figure(presets: Sequence[dict[str, Any]], **options: Any) -> str:
+    """Return the interactive figure as HTML.
 
-    ``presets`` are the tasks that the figure offers (:func:`preset_of`). ``more`` is optional data
-    for the scripts, such as :func:`coartic.analysis.report.player.player` gives: ``page``, the
-    address to which links lead, None for no link; ``first``, what is shown at first; ``folder``,
-    the folder with the stored runs, quoted for a shell; ``cells``, the fields of tables that
-    start films, each with the id of the field and the film.
+    The page that contains it must have the styles of ``play.css``, and define the colours that
+    ``play.css`` names.
+
+    Parameters
+    ----------
+    presets : sequence of dict
+        The tasks that the figure offers (:func:`preset_of`).
+    **options
+        Optional data for the scripts, such as :func:`coartic.analysis.report.player.player`
+        returns:
+
+        - ``page``: address to which links lead, None for no link;
+        - ``first``: what is shown at first;
+        - ``folder``: folder with the stored runs, quoted for a shell;
+        - ``cells``: cells of tables that start films, each with the id of the cell and the film.
     """
-    content = {"presets": presets, "version": coartic.__version__, **more}
+    content = {"presets": presets, "version": coartic.__version__, **options}
     data = json.dumps(content, allow_nan=False, separators=(",", ":"))
     return (
         templates()
@@ -64,9 +75,14 @@ def player_figure(presets: Sequence[dict[str, Any]], **more: Any) -> str:
 
 
 def preset_of(task: Task) -> dict[str, Any]:
-    """Return a task as the figure offers it: ``label``, with † if its goals are reconstructed;
-    ``task``, the fields that the figure needs as plain data; and ``optimum``, the reward of the
-    best known solution if it is proven to be the best, or None."""
+    """Return a task in the form in which the figure offers it.
+
+    The keys are
+
+    - ``label``: the task's label, with † if its goals are reconstructed;
+    - ``task``: the fields that the figure needs, as plain data;
+    - ``optimum``: reward of the best known solution if it is proven to be the best, otherwise None.
+    """
     keys = {"hands", "goals", "radius", "locked_base", "initial_hands", "start", "robot"}
     mark = " †" if "goals" in task.reconstructed else ""
     content = task.model_dump(mode="json", include=keys)
@@ -77,14 +93,17 @@ def preset_of(task: Task) -> dict[str, Any]:
 
 
 def up_or_down() -> dict[str, Any]:
-    """Return a preset (:func:`preset_of`) for two tasks with the same first goal: ``task`` is
-    ``ascending``, ``others`` are the later goals of ``descending``, and ``optimum`` is None."""
+    """Return a preset (:func:`preset_of`) for two tasks with the same first goal.
+
+    ``task`` is ``ascending``, ``others`` are the later goals of ``descending``, and ``optimum`` is
+    None.
+    """
     up, down = (shipped_tasks()[name] for name in UP_OR_DOWN)
     return {**preset_of(up), "label": "Up or down", "others": down.goals[1:], "optimum": None}
 
 
 def part_of_page(name: str) -> str:
-    """Return the text of file ``name`` of this folder, without a first line ``"use strict";``."""
+    """Return the text of a file of this folder, without a first line ``"use strict";``."""
     return (FOLDER / name).read_text("utf-8").removeprefix('"use strict";\n')
 
 
