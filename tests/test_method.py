@@ -58,7 +58,7 @@ def test_a_method_without_the_corrective_process_does_not_see_it():
 @pytest.mark.parametrize(
     ("name", "hands", "shape", "value", "message"),
     [
-        ("ascending", "RRR", (3, 10), 0.0, "have shape"),
+        ("ascending", "RRR", (3, 10), 0.0, "has shape"),
         ("ascending", ["RRR"], (2, 3, 10), 0.0, "hand"),
         ("ascending", "RRR", (1, 3, 10), np.inf, "infinite"),
         ("two-armed-1", "RRRR", (1, 4, 10), 0.1, "moves the base in y"),

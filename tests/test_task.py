@@ -73,7 +73,7 @@ def test_a_saved_task_is_read_as_it_was(task, tmp_path):
         ({"start": {"left": [0] * 4, "right": "x"}}, "start.right is 'x': "),
         ({"q0": [0] * 3}, "Task: q0 has shape (3,); it must be (10,)"),
         ({"q0": {"base": [0, 0]}}, "Task: q0 is {'base': [0, 0]}"),
-        ({"q0": [0] * 10, "start": {"left": [0] * 4, "right": [0] * 4}}, "give one of them"),
+        ({"q0": [0] * 10, "start": {"left": [0] * 4, "right": [0] * 4}}, "pass only one"),
     ],
 )
 def test_a_wrong_task_is_refused_in_a_sentence(wrong, words):
