@@ -347,7 +347,7 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     for _ in range(3):
         assert text(page, "why") == ""
         press(page, "Add a goal")
-    assert text(page, "why") == "Goals can be added while there are fewer than 6."
+    assert text(page, "why") == "A task can have at most 6 goals here."
     labels = page.locator(".handle").evaluate_all("all => all.map(each => each.ariaLabel)")
     places = [re.search(r"at (\S+), (\S+)\. ", label).groups() for label in labels]
     places = np.array(places, dtype=float)
@@ -361,7 +361,7 @@ def test_goals_come_apart_from_others_and_reset_takes_them_back(opened):
     assert "both robots" in text(page, "lead")
     # A link to this file is of use with the file.
     press(page, "Copy link")
-    page.get_by_text("this machine only").get_by_text("send play.html").wait_for()
+    page.get_by_text("only on this machine").get_by_text("send play.html").wait_for()
 
 
 def test_on_a_phone_picture_slider_and_finding_come_first(visited, address):

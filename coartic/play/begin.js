@@ -1,6 +1,6 @@
 "use strict";
-/* Begins the figure. Its state is in the address of its own page. Elsewhere the data name the `page`
-   that links lead to, or null: then there are none. */
+/* Begins the figure. On its own page its state is in the address. Elsewhere the data have the `page` to which links
+   lead, or null for no links. */
 {
   const source = document.getElementById("play-model").textContent;
   const data = JSON.parse(document.getElementById("play-data").textContent);
@@ -16,7 +16,7 @@
   const figure = new Play(root, { ...data, source, keep, address }, own ? here() : "");
   root.querySelector("[data-is=link]").hidden = data.page === null;
   if (own) window.addEventListener("hashchange", () => { if (figure.link !== here()) figure.restore(here()); });
-  /* Cells of tables of the report, by their ids, show their films. */
+  /* Cells of the report's tables show films when they are clicked. */
   document.addEventListener("DOMContentLoaded", () => (data.cells || []).forEach(([id, choice]) => {
     const cell = document.getElementById(id);
     if (!cell) return;

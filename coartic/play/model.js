@@ -1,18 +1,18 @@
 "use strict";
 /* coartic's model for browsers and Node: the same numbers as in Python, bit by bit.
 
-   Each function has the name of its counterpart in the Python package and does the same operations
-   in the same order. A comment names the module of the counterpart. A configuration is an
-   array, which is soon copied: x and y of the base, the joints of the left arm, those of the right one. Hands are
-   0 (left) and 1 (right), goals are counted from 0. Without a counterpart is shortest_plan, a local search. */
+   Each function has the name of its counterpart in the Python package and does the same operations in the same order;
+   a comment names the module of the counterpart. (shortest_plan, a local search, has no counterpart.) A configuration
+   is an array: x and y of the base, the joints of the left arm, the joints of the right arm. Hands are 0 (left) and
+   1 (right), goals are counted from 0. */
 
 const HANDS = ["left", "right"];
 const [LEFT, RIGHT, NO_HAND] = [0, 1, 2];
 const BASE_DOF = 2;
 const MOST_LINKS = 100;
-const MOST_SEQUENCES = 4096; // hand sequences that are tried one by one
+const MOST_SEQUENCES = 4096; // largest number of hand sequences that are all tried
 
-/* coartic/motion/batch.py; `task` is one of the package as plain data. The model is the default of coartic/model.py. */
+/* coartic/motion/batch.py; `task` is a task of the package as plain data. The model is the default of coartic/model.py. */
 function problem_of(task) {
   const { robot, goals, radius, start: { base, left, right } } = task;
   const model = { step: 0.01, arrival_tolerance: radius / 10, gain: 0.05, correction_tolerance: radius / 10, max_iterations: 20000 };
@@ -33,7 +33,7 @@ function scale_of({ left_links, right_links }) {
   return Math.min(...[left_links, right_links].map((links) => links.reduce((sum, length) => sum + length))) / 4;
 }
 
-/* Of each coordinate whether it moves with some hands: base and their arms. */
+/* For each coordinate whether it moves if these hands move: the base and their arms. */
 function movable({ start, free, arms }, hands) {
   return start.map((_, j) => (j < BASE_DOF ? free[j] : hands.includes(j < arms[RIGHT].first ? LEFT : RIGHT)));
 }
@@ -47,7 +47,7 @@ const PER_QUARTER = 2 / Math.PI;
 const factorial = (n) => (n < 2 ? 1 : n * factorial(n - 1));
 const [S3, S5, S7, S9, S11, S13, S15, S17] = [3, 5, 7, 9, 11, 13, 15, 17].map((n) => ((n - 1) % 4 ? -1 : 1) / factorial(n));
 const [C4, C6, C8, C10, C12, C14, C16] = [4, 6, 8, 10, 12, 14, 16].map((n) => (n % 4 ? -1 : 1) / factorial(n));
-const TO_WHOLE = 6755399441055744; // 1.5 * 2**52: added and taken away it rounds, halves to even
+const TO_WHOLE = 6755399441055744; // 1.5 * 2**52: adding and subtracting it rounds to an integer, halves to even
 
 /* coartic/robot.py: fill xs, ys with shoulder, joints and hand. */
 function chain(q, arm, xs, ys) {
@@ -92,14 +92,14 @@ function chain(q, arm, xs, ys) {
 const xs = new Float64Array(MOST_LINKS + 1);
 const ys = new Float64Array(MOST_LINKS + 1);
 
-/* coartic/robot.py: positions of shoulder, joints and hand, a point each. */
+/* coartic/robot.py: positions of shoulder, joints and hand. */
 function joint_positions(problem, q, hand) {
   const arm = problem.arms[hand];
   chain(q, arm, xs, ys);
   return Array.from({ length: arm.links.length + 1 }, (_, k) => [xs[k], ys[k]]);
 }
 
-/* coartic/robot.py: how a point of an arm, its hand or an elbow, moves with some joints, a row each. Fills xs, ys. */
+/* coartic/robot.py: derivatives of a point of an arm, its hand or an elbow, by joints: a row for each. Fills xs, ys. */
 function jacobian(problem, q, hand, joints, tip = problem.arms[hand].links.length) {
   const arm = problem.arms[hand];
   chain(q, arm, xs, ys);
@@ -124,8 +124,8 @@ function distance_to_goal(problem, q, number, hand) {
 const CLEARANCE = 1e-9; // for rounding
 const between = [];
 
-/* coartic/motion/movement.py: move `q` itself; ticks, negative for a miss. Steps are skipped in which the hand,
-   which moves by at most `speed` a step, stays out of both discs. */
+/* coartic/motion/movement.py: move, changing `q` itself; return the ticks, negative for a miss. The hand moves by at
+   most `speed` per step; steps at which it is certainly outside both discs are skipped. */
 function move(problem, q, target, number, hand, stop_on_arrival) {
   const { model, radius } = problem;
   const [goal_x, goal_y] = problem.goals[number];
@@ -140,12 +140,12 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   }
   const distance = Math.sqrt(square);
   const last = Math.ceil(distance / model.step);
-  let [turned, way] = [0, Math.hypot(target[0] - q[0], target[1] - q[1])];
+  let [turned, path] = [0, Math.hypot(target[0] - q[0], target[1] - q[1])];
   for (let k = 0; k < tip; k += 1) {
     turned += target[first + k] - q[first + k];
-    way += links[k] * Math.abs(turned);
+    path += links[k] * Math.abs(turned);
   }
-  const speed = (way * model.step) / distance;
+  const speed = (path * model.step) / distance;
   let [end_x, end_y] = [0, 0];
   if (stop_on_arrival) {
     chain(target, arm, xs, ys);
@@ -178,7 +178,7 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   }
 }
 
-/* coartic/motion/movement.py: change `q` itself; whether **A** converges. */
+/* coartic/motion/movement.py: correct, changing `q` itself; return whether **A** converges. */
 function correct(problem, q, number, hand) {
   const { model } = problem;
   const [free_x, free_y] = problem.free;
@@ -206,9 +206,9 @@ function correct(problem, q, number, hand) {
   }
 }
 
-const RANK = 1e-12; // square of the ratio of singular values up to which the smaller counts as 0
+const RANK = 1e-12; // squared ratio of singular values up to which the smaller one counts as 0
 
-/* coartic/motion/movement.py: project joint changes `v` themselves onto the null space of a Jacobian, a row for each joint. */
+/* coartic/motion/movement.py: project joint changes, in place, onto the null space of a Jacobian, a row for each joint. */
 function project(v, rows) {
   let [a, b, c, along_x, along_y] = [0, 0, 0, 0, 0];
   rows.forEach(([x, y], i) => {
@@ -231,7 +231,7 @@ function project(v, rows) {
 
 /* ---- Trials ---- */
 
-/* What happens from the start on: movements as made, and where the goals were hit. */
+/* A trial from the start: the movements made, and the configurations at the hits. */
 class Trial {
   constructor(problem) {
     this.problem = problem;
@@ -243,7 +243,7 @@ class Trial {
     this.going = true;
   }
 
-  /* coartic/motion/solution.py: make a movement and note it; whether it hits. */
+  /* coartic/motion/solution.py: make a movement and note it; return whether it hits. */
   moves(goal, hand, kind, target) {
     const signed = move(this.problem, this.q, target, goal, hand, kind !== "corrective");
     const ticks = Math.abs(signed);
@@ -252,7 +252,7 @@ class Trial {
     return signed > 0;
   }
 
-  /* coartic/motion/trial.py: **A** finishes what was missed; whether it hits. */
+  /* coartic/motion/trial.py: **A** corrects a goal that was missed; return whether it hits. */
   corrects(goal, hand) {
     const target = this.q.slice();
     this.going = correct(this.problem, target, goal, hand);
@@ -263,7 +263,7 @@ class Trial {
     return distance_to_goal(this.problem, this.q, goal, hand) <= this.problem.radius;
   }
 
-  /* The goal is hit. */
+  /* Note that the goal is hit. */
   ends(goal, hand) {
     const q = this.q.slice();
     if (!this.movements.length || this.movements.at(-1).goal !== goal) {
@@ -273,7 +273,7 @@ class Trial {
     this.hands.push(hand);
   }
 
-  /* coartic/motion/trial.py: reach for a goal, with a target or by **A** alone. */
+  /* coartic/motion/trial.py: reach for a goal, with a target or only by **A**. */
   reaches(goal, hand, target) {
     const hit = target ? this.moves(goal, hand, "learned", target) : this.looks(goal, hand);
     this.going = hit || this.corrects(goal, hand);
@@ -351,7 +351,7 @@ function hand_sequences(problem) {
 
 const letters_of = (hands) => hands.map((hand) => "LR"[hand]).join("");
 
-/* coartic/motion/solution.py: the hands that the task names, or those that its rule finds. */
+/* coartic/motion/solution.py: the hands that the task names, or that its policy finds. */
 function initial_hands(problem, named = problem.task.initial_hands) {
   if (/^[LR]+$/.test(named)) return [...named].map((letter) => "LR".indexOf(letter));
   const single = problem.hands.map((hand) => problem.goals.map(() => hand));
@@ -362,15 +362,15 @@ function initial_hands(problem, named = problem.task.initial_hands) {
   return ranked[0].hands;
 }
 
-/* The hands with which the corrective process alone is fastest; the initial ones where there are too many to try. */
+/* The hands with which the corrective process alone is fastest, or the initial hands if there are too many to try. */
 function best_hands(problem) {
   return initial_hands(problem, problem.hands.length ** problem.goals.length > MOST_SEQUENCES ? undefined : "best-of-all");
 }
 
-/* ---- Random numbers: those of numpy.random.default_rng(seed), so that a seed gives the same run ----
-   Uniform ones to the last bit, normal ones to 5e-15: tables are computed here. */
+/* ---- Random numbers of numpy.random.default_rng(seed), so that a seed gives the same run ----
+   Uniform numbers are equal to the last bit, normal numbers to 5e-15, because the tables are computed here. */
 
-/* NumPy's SeedSequence, for a seed below 2**128: so many words of 32 bits. */
+/* NumPy's SeedSequence for a seed below 2**128: `count` words of 32 bits. */
 function generate_state(seed, count) {
   const entropy = [];
   for (let rest = BigInt(seed); rest > 0n || !entropy.length; rest >>= 32n) entropy.push(Number(rest & 0xffffffffn));
@@ -409,7 +409,7 @@ const limbs_of = (value) => [0n, 24n, 48n, 72n, 96n, 120n].map((shift) => Number
 const PCG_FACTOR = limbs_of(0x2360ed051fc65da44385df649fccf645n);
 const made = new Float64Array(6);
 
-/* numpy.random.default_rng: PCG64 (O'Neill 2014), its 128 bits in limbs of 24. */
+/* numpy.random.default_rng: PCG64 (O'Neill 2014), with its 128 bits in limbs of 24 bits. */
 class Generator {
   constructor(seed) {
     const words = generate_state(seed, 8).map(BigInt);
@@ -424,7 +424,7 @@ class Generator {
     this.next();
   }
 
-  /* Makes the next 64 bits: `high` and `low`. */
+  /* Draw the next 64 bits: `high` and `low`. */
   next() {
     const { state, increment } = this;
     let carry = 0;
@@ -523,7 +523,7 @@ class Learner {
     return this.greedy_hand(number, previous);
   }
 
-  /* The preferred posture at `q`, with the hand that is chosen: halfway to the stored target of the next goal. */
+  /* The preferred posture at `q` with the chosen hand: halfway to the stored target of the next goal. */
   prefer(q, number, hand) {
     if (number + 1 === this.problem.goals.length) return q;
     const next = this.greedy_hand(number + 1, hand);
@@ -531,7 +531,7 @@ class Learner {
     return stored ? q.map((value, j) => (this.explored[next][j] ? 0.5 * (value + stored[j]) : value)) : q;
   }
 
-  /* Move the mean t of exploration by κ N(t) (p − t), and an explored idle arm, whose rows are 0, by κ (p − t). */
+  /* Move the mean t of exploration by κ N(t) (p − t). The rows of an explored idle arm are 0, so that it moves by κ (p − t). */
   drift(target, preferred, hand) {
     const joints = target.flatMap((_, j) => (this.explored[hand][j] ? [j] : []));
     const v = joints.map((j) => preferred[j] - target[j]);
@@ -539,7 +539,7 @@ class Learner {
     joints.forEach((j, i) => { target[j] += this.rules.drift * v[i]; });
   }
 
-  /* q^t = mean + η, the mean from q*(s, a); null where no target is stored. */
+  /* q^t = mean + η, with the mean from q*(s, a); null if no target is stored. */
   set_target(q, number, previous, hand, explore) {
     const stored = this.targets[number][previous][hand];
     if (!stored) return null;
@@ -579,7 +579,7 @@ class Learner {
     }
   }
 
-  /* The next trial, and what is learned from it. */
+  /* Make the next trial, and learn from it. */
   step() {
     const trial = this.make_trial(true);
     this.trials += 1;
@@ -590,12 +590,12 @@ class Learner {
     return trial;
   }
 
-  /* A trial without noise, greedy. */
+  /* A greedy trial without noise. */
   replay() {
     return this.make_trial(false);
   }
 
-  /* coartic/learner/run.py: what is learned so far; null for nothing. */
+  /* coartic/learner/learning_run.py: the solution learned so far, or null. */
   learned() {
     if (this.rules.credit === "overall") return this.best;
     const replay = this.trials ? this.replay() : null;
@@ -605,7 +605,7 @@ class Learner {
 
 /* ---- A plan that looks ahead (as coartic/baselines/receding_horizon.py, by a local search) ---- */
 
-/* The way from a point of an arm, its hand or an elbow, to a place, and how that point moves with some joints. */
+/* The displacement from a point of an arm, its hand or an elbow, to a position, and the point's derivatives by joints. */
 function pull_of(problem, q, place, hand, joints, tip = problem.arms[hand].links.length) {
   const rows = jacobian(problem, q, hand, joints, tip);
   const dx = place[0] - xs[tip];
@@ -613,7 +613,7 @@ function pull_of(problem, q, place, hand, joints, tip = problem.arms[hand].links
   return { dx, dy, distance: Math.sqrt(dx * dx + dy * dy), rows };
 }
 
-/* Move `q` to a near posture, by some joints, with that point within `radius` of a place; whether it gets there. */
+/* Move `q`, by some joints, to a near posture with that point within `radius` of a position; return whether it succeeds. */
 function bring_within(problem, q, place, hand, joints, radius, tip) {
   for (let round = 0; round < 60; round += 1) {
     const { dx, dy, distance, rows } = pull_of(problem, q, place, hand, joints, tip);
@@ -633,8 +633,8 @@ function bring_within(problem, q, place, hand, joints, radius, tip) {
 
 const distance_of = (a, b) => Math.sqrt(a.reduce((square, value, j) => square + (value - b[j]) ** 2, 0));
 
-/* The shortest joint-space path from `q` through goals `from` to `to` (excluded) with given hands, from
-   guessed postures: a taut string whose corners slide on the discs. Null where it finds none. */
+/* The shortest joint-space path from `q` through goals `from` to `to` (excluded) with these hands, starting from
+   guessed postures: a taut string whose corners slide on the discs. Null if none is found. */
 function pulled_taut(problem, q, from, hands, guess, rounds) {
   const joints = movable(problem, problem.hands).flatMap((moves, j) => (moves ? [j] : []));
   const radius = problem.radius * (1 - 1e-3);
@@ -649,7 +649,7 @@ function pulled_taut(problem, q, from, hands, guess, rounds) {
       const v = after ? 1 / (distance_of(here, after) + 1e-6) : 0;
       const way = here.map((value, j) => (w * before[j] + (after ? v * after[j] : 0)) / (w + v) - value);
       const { dx, dy, distance, rows } = pull_of(problem, here, problem.goals[from + k], hands[k], joints);
-      if (distance > radius - 1e-6) { // on the rim it slides along
+      if (distance > radius - 1e-6) { // on the rim the corner slides along it
         const inward = rows.map(([x, y]) => x * dx + y * dy);
         const share = inward.reduce((sum, value, i) => sum + value * way[joints[i]], 0)
           / inward.reduce((sum, value) => sum + value * value, 1e-12);

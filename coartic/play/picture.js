@@ -1,13 +1,13 @@
 "use strict";
 /* Draws robots and goals on a canvas, in length units. */
 
-/* What is in sight of points, with a margin: left, bottom, right, top. */
+/* The box around points with a margin: left, bottom, right, top. */
 function around(points, margin = 0) {
   const sides = [0, 1].map((axis) => points.map((point) => point[axis]));
   return [...sides.map((side) => Math.min(...side) - margin), ...sides.map((side) => Math.max(...side) + margin)];
 }
 
-const PRINTED = 3; // pixels a CSS pixel in print
+const PRINTED = 3; // pixels per CSS pixel in print
 
 class Picture {
   constructor(canvas) {
@@ -15,12 +15,12 @@ class Picture {
     this.context = canvas.getContext("2d");
   }
 
-  /* Colours of the page, by the names of its variables. */
+  /* A colour of the page by the name of its variable. */
   colour(name) {
     return getComputedStyle(this.canvas).getPropertyValue(`--${name}`).trim();
   }
 
-  /* Start again, with a box of the world in sight. */
+  /* Start a new drawing that shows a box of the world. */
   begin([left, bottom, right, top]) {
     const { canvas, context } = this;
     const density = this.density || (window.matchMedia("print").matches ? PRINTED : window.devicePixelRatio || 1);
@@ -60,7 +60,7 @@ class Picture {
     context.setLineDash([]);
   }
 
-  /* A grid of a number of length units, which is named. */
+  /* A grid with lines every `unit` length units, and a scale bar. */
   grid(unit, colour, ink) {
     const { context, size, scale } = this;
     const [left, top] = this.toWorld([0, 0]);
@@ -76,14 +76,14 @@ class Picture {
     this.text(counted(unit, "length unit"), [18 + unit * scale, size[1] - 12], ink, "left", 12);
   }
 
-  /* What the box slides on, below it or beside it. */
+  /* The rail on which the box slides, below or next to it. */
   rail([x, y], off, level, colour) {
     const [[left, top], [right, bottom]] = [[0, 0], this.size].map((point) => this.toWorld(point));
     this.context.strokeStyle = colour;
     this.line(level ? [[left, y - off], [right, y - off]] : [[x, bottom], [x, top]], 3);
   }
 
-  /* A robot; the arm at work is thick. Joints of the left arm are squares, those of the right one circles. */
+  /* A robot. The chosen arm is thick; joints of the left arm are squares, joints of the right arm circles. */
   robot(problem, q, { colour, alpha = 1, weight = 1, chosen = null, thin = false }) {
     const { context } = this;
     const unit = Math.max(1.6, Math.min(3, this.scale / 26)) * weight;
@@ -109,10 +109,10 @@ class Picture {
       context.beginPath();
       points.slice(1).forEach((to, k) => {
         const from = points[k];
-        const way = Math.atan2(to[1] - from[1], to[0] - from[0]);
-        context.moveTo(from[0] - radius(k) * Math.sin(way), from[1] + radius(k) * Math.cos(way));
-        context.arc(...from, radius(k), way + Math.PI / 2, way + 1.5 * Math.PI);
-        context.arc(...to, radius(k + 1), way - Math.PI / 2, way + Math.PI / 2);
+        const angle = Math.atan2(to[1] - from[1], to[0] - from[0]);
+        context.moveTo(from[0] - radius(k) * Math.sin(angle), from[1] + radius(k) * Math.cos(angle));
+        context.arc(...from, radius(k), angle + Math.PI / 2, angle + 1.5 * Math.PI);
+        context.arc(...to, radius(k + 1), angle - Math.PI / 2, angle + Math.PI / 2);
         context.closePath();
       });
       context.fill();
@@ -138,7 +138,7 @@ class Picture {
   goal([x, y], radius, { label, colour, hit, held, movable }) {
     const { context } = this;
     const [px, py] = this.toScreen([x, y]);
-    const r = Math.max(2, radius * this.scale); // to scale, unless it would not be seen
+    const r = Math.max(2, radius * this.scale); // to scale, but never too small to be seen
     if (movable) {
       context.fillStyle = colour;
       context.globalAlpha = held ? 0.3 : 0.13;

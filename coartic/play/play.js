@@ -1,17 +1,17 @@
 "use strict";
-/* The page on which goals are moved and the robot answers. `Play` is one such figure; its data come
-   from coartic/play/page.py, or from a report, which has runs of its own to show. */
+/* The page on which a reader moves goals and the robot reacts. `Play` is one such figure. Its data come from
+   coartic/play/page.py, or from a report, which also shows its stored runs. */
 
-const SEEDS = 5; // of which runs two robots are seen
+const SEEDS = 5; // number of runs of each robot
 const TRIALS = 10000; // of a run
-const PACE = 90; // ticks a second
-const PRACTICE = 1.05; // by which the trials shown grow in two pictures, at first
-const FIRST_SEEN = 0.05; // where these begin: the first trial is seen for a second, until they reach 2
-const HOLD_S = 0.9; // at a hit
+const TICKS_PER_S = 90;
+const PRACTICE = 1.05; // factor by which the number of trials shown grows from picture to picture, at first
+const FIRST_SEEN = 0.05; // where that number begins: the first trial is shown for a second, until it reaches 2
+const HOLD_S = 0.9; // pause at a hit
 const DRIFTS = [0, 0.03, 0.1, 0.3, 1]; // κ, how far exploration leans towards the next goal
 const MOST_GOALS = 6;
-const FAR = 12; // length units or rad: no goal lies farther, no joint is turned more
-const STRIDE = 2; // to a new goal, for arms of length 4
+const FAR = 12; // largest coordinate of a goal or angle of a joint, length units or rad
+const STRIDE = 2; // distance to a new goal, for arms of length 4
 const ROLES = ["first", "second"];
 const NAMES = {
   alone: "corrective process alone", learner: "the learner", plan: "the planner (local search)", you: "you",
@@ -23,16 +23,16 @@ const capital = (words) => words[0].toUpperCase() + words.slice(1);
 const bounded = (values) => values.map((value) => Math.max(-FAR, Math.min(FAR, value)));
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
-/* What the reader has chosen; all of it is in the link. `mate` moves the second robot where you move the first.
-   `announced`
-   has the place from which a goal has just moved. Of `own` postures, each with its hand, one without joints is left to
-   the robot. Before tick 0 the robots stand where they hit the goal they share, or you place yours. */
+/* The reader's choices, all of which are in the link. `mate` moves the second robot if the reader moves the first.
+   `announced` has the position from which a goal has just moved. `own` has the reader's postures, each with its hand;
+   for a posture without joints the robot chooses. With a tick below 0 the robots stand where they hit the goal that
+   they share, or the reader places one. */
 const AT_FIRST = {
   open: 0, preset: 0, who: "learner", mate: "learner", reward: "whole", explores: "EC4", drift: 0, ahead: 1, goals: null,
   others: null, announced: null, trials: 0, tick: -1, own: null, edited: 1,
 };
 
-/* As text: goals=6,0.1;6,2&trials=300. A list of others that is empty is written as well. */
+/* The state as a string, such as goals=6,0.1;6,2&trials=300. An empty list of others is written as well. */
 function written(state, first) {
   const text = (value) => (Array.isArray(value) ? value.map((row) => row.join(",")).join(";") : encodeURIComponent(value));
   return Object.entries(state).filter(([name, value]) => value !== first[name])
@@ -52,8 +52,8 @@ function read(link, first) {
   return state;
 }
 
-/* Posture difference of two samples: their means and the distance of these, also in pooled standard deviations; null
-   where no runs differ. */
+/* Posture difference of two samples: their means, the distance between the means, and this distance in pooled standard
+   deviations, null if no runs differ. */
 function posture_difference(samples) {
   const means = samples.map((runs) => runs[0].map((_, j) => runs.reduce((sum, q) => sum + q[j], 0) / runs.length));
   const distance = distance_of(...means);
@@ -92,9 +92,9 @@ class Play {
     this.first = { ...AT_FIRST, ...data.first };
     this.worker = new Worker(URL.createObjectURL(new Blob([data.source], { type: "text/javascript" })));
     this.worker.onmessage = ({ data: message }) => this.hear(message);
-    this.fresh = new Set(); // what answers the present question
+    this.fresh = new Set(); // results for the present state
     root.classList.add("live");
-    // Until somebody does something it shows how it learned, and plays, when it is seen; unless less motion is asked for.
+    // Until the reader acts, show how the robot learned and then play, while in sight; not with reduced motion.
     ["pointerdown", "keydown", "input"].forEach((kind) => root.addEventListener(kind, () => { this.waits = false; }, true));
     this.restore(saved);
     new ResizeObserver(() => { this.box = null; this.refresh(); }).observe(root);
@@ -107,7 +107,7 @@ class Play {
     }, { threshold: 0.3 }).observe(this.find("stage"));
   }
 
-  /* ---- What is asked: tasks, and who answers ---- */
+  /* ---- Tasks, and who moves the robots ---- */
 
   get preset() {
     return this.data.presets[this.state.preset];
@@ -135,7 +135,7 @@ class Play {
     return Math.min(2, this.state.goals.length - 1);
   }
 
-  /* Where a goal has just moved: its number, and the task as it was. */
+  /* The goal that has just moved, and the task before; null if none has. */
   get announced() {
     const { who, announced, goals, others } = this.state;
     if (!announced || others || who !== "learner" || !this.moved) return null;
@@ -170,7 +170,7 @@ class Play {
     return fields.length ? `replace(CONDITIONS["${id}"], ${fields.join(", ")})` : `CONDITIONS["${id}"]`;
   }
 
-  /* Goals, robot or method have changed: the fast answer at once, the others from the worker. */
+  /* Goals, robot or method have changed: show the fast results at once, and ask the worker for the others. */
   ask() {
     const { state } = this;
     const mover = (who) => (Object.hasOwn(NAMES, who) || this.stored(who) ? who : "learner");
@@ -202,7 +202,7 @@ class Play {
     });
     if (announced) order("0 before", announced.task, { horizon: MOST_GOALS });
     this.asked = new Map(jobs.map((job) => [job.key, JSON.stringify(job)]));
-    // What is known need not be found again.
+    // Do not compute results again that exist already.
     this.fresh = new Set([...this.asked.keys()].filter((key) => {
       const { done, job } = this.results.get(key) || {};
       return done && job === this.asked.get(key);
@@ -216,7 +216,7 @@ class Play {
     if (order !== this.order) return;
     this.busy = false;
     reports.forEach(({ key, made, done, snapshots }) => {
-      // The answer to an earlier question stands until there is one to this.
+      // The results for an earlier state are shown until there are new ones.
       if (!this.fresh.has(key)) this.results.set(key, { snapshots: [], job: this.asked.get(key) });
       this.fresh.add(key);
       const result = this.results.get(key);
@@ -227,18 +227,18 @@ class Play {
     if (this.stale) this.send();
   }
 
-  /* Of what is asked. */
+  /* The result of a job for the present state. */
   result(key) {
     return this.asked.has(key) ? this.results.get(key) : undefined;
   }
 
-  /* What was learned after so many trials. */
+  /* The solution learned after a number of trials. */
   snapshot(key, trials = this.shown) {
     const result = this.result(key);
     return result ? result.snapshots.findLast((each) => each.trials <= trials) || null : null;
   }
 
-  /* What each run of a robot has learned after the trials shown, of runs that have made them; the first may be on its way. */
+  /* What each run of a robot has learned after the trials shown. Unfinished runs other than the first are left out. */
   practised(k) {
     const keys = Array.from({ length: SEEDS }, (_, seed) => `${k} run ${seed}`);
     const there = keys.filter((each, seed) => this.fresh.has(each) && (this.results.get(each).done || !seed));
@@ -265,7 +265,7 @@ class Play {
     return snapshot && snapshot.movements;
   }
 
-  /* The films of the answer, made from what is known by now. */
+  /* Make the films from the results so far. */
   answer() {
     this.movers = this.problems.map((problem, k) => {
       const movements = this.solution(k);
@@ -284,18 +284,18 @@ class Play {
     this.refresh();
   }
 
-  /* The optimum of the task, where it is known. */
+  /* The optimum of the task, if it is known. */
   get optimum() {
     const { goals, others } = this.state;
     return !others && same(goals, this.preset.task.goals) ? this.preset.optimum : null;
   }
 
-  /* The number of a goal, with a letter where each of two robots has its own. */
+  /* The number of a goal, with a letter if each of two robots has its own goal of that number. */
   labelOf(k, g) {
     return `${g + 1}${this.problems.length > 1 && g ? "ab"[k] : ""}`;
   }
 
-  /* ---- Time: both robots wait for each other at the goal they share, or that is before the moved one ---- */
+  /* ---- Time: both robots wait for each other at the goal they share, or at the goal before the moved one ---- */
 
   get shared() {
     return this.announced ? this.announced.goal - 1 : 0;
@@ -336,7 +336,7 @@ class Play {
       if (Math.round(at) !== this.state.tick) at = this.state.tick; // moved by hand
       if (held > 0) held -= seconds;
       else if (this.inSight !== false) {
-        const next = at + seconds * PACE;
+        const next = at + seconds * TICKS_PER_S;
         const stop = this.stops.find((each) => each > at + 0.5 && each <= next);
         at = stop === undefined ? next : stop;
         if (stop !== undefined) held = HOLD_S;
@@ -352,7 +352,7 @@ class Play {
 
   /* ---- Pictures ---- */
 
-  /* Draw soon, once for all that has changed. */
+  /* Draw in the next frame, once for all changes. */
   refresh() {
     if (this.waiting || !this.movers) return;
     this.waiting = true;
@@ -371,7 +371,7 @@ class Play {
     const points = [...this.movers.flatMap((mover) => mover.seen()), ...this.problems.flatMap((problem) => problem.goals)];
     const [{ free, start, robot, scale }] = this.problems;
     if (!this.box || !this.held) this.box = around(points, 0.7 * scale);
-    if (!this.held) this.glide(); // the place under the pointer stays
+    if (!this.held) this.glide(); // the position under the pointer stays
     stage.begin(this.view);
     stage.grid(this.unit, colours.line, colours.soft);
     if (free[0] !== free[1]) stage.rail(start, robot.base_size[1] / 2, free[0], colours.line);
@@ -421,7 +421,7 @@ class Play {
     }
   }
 
-  /* Postures in which the robots hit the shared goal, of each run; where a goal has moved, before and after. */
+  /* Postures of each run at the hit of the shared goal; if a goal has moved, before and after that. */
   get postures_met() {
     const { announced, shared } = this;
     return this.main.map(({ trial }, k) => {
@@ -487,7 +487,7 @@ class Play {
     for (let ticks = step * Math.ceil(low / step); ticks < high; ticks += step) {
       curve.text(`${ticks}`, [left - 5, y(ticks)], colours.soft, "right", 12);
     }
-    const named = []; // heights of names
+    const named = []; // heights of the names drawn so far
     this.problems.forEach((_, k) => {
       const colour = colours[ROLES[k]];
       const level = (name, reward, dash, ink) => {
@@ -515,7 +515,7 @@ class Play {
 
   /* ---- Words ---- */
 
-  /* What is to be seen, of one robot or of two. */
+  /* What the page shows, with one robot or two. */
   get lead() {
     const { who, mate } = this.state;
     const [{ goals, hands }] = this.problems;
@@ -523,7 +523,7 @@ class Play {
     let seen = `the robot hits ${goals.length > 1 ? `goals 1 to ${goals.length} in turn` : "goal 1"}${hands.length > 1 ? ", with either hand" : ""}.`;
     if (two) seen = "both robots hit goal 1; then blue goes for the blue goals, orange for the orange ones.";
     if (this.announced) seen = `goal ${this.announced.goal + 1} has just moved. Blue is its next trial, orange a planner's.`;
-    if (who === "you") seen = `drag box and elbows of the ${two ? "blue " : ""}robot, a posture for each goal.${two ? ` Orange: ${this.nameOf(mate)}.` : ""}`;
+    if (who === "you") seen = `drag box and elbows of the ${two ? "blue " : ""}robot to place a posture for each goal.${two ? ` Orange: ${this.nameOf(mate)}.` : ""}`;
     return `${capital(this.nameOf(who))}: ${seen}${this.editing ? "" : " Goals can be dragged."}`;
   }
 
@@ -531,12 +531,12 @@ class Play {
     return (this.stored(who) || { name: NAMES[who] }).name;
   }
 
-  /* What comes out, and what its words mean. */
+  /* The result, and what its words mean. */
   get finding() {
     const { state, main, announced, difference } = this;
     const missed = main.find((mover) => !mover.trial.going);
     if (missed) return [`Goal ${missed.trial.reached.length + 1} is out of the robot's reach.`];
-    const far = "Distances are of box and joints together, in length units and radians.";
+    const far = "A distance counts box and joints together, in length units and radians.";
     if (announced) {
       const [learner, planner] = difference && main.length > 1 ? difference.shifts.map(short) : ["…", "…"];
       return [`At goal ${announced.goal} the learner's posture has shifted by ${learner}, the planner's by ${planner}.`, `${far} Thin: before the goal moved.`];
@@ -548,7 +548,7 @@ class Play {
       const tried = hands.length ** goals.length <= MOST_SEQUENCES ? "best hands" : "hands";
       const used = hands.length > 1 ? ` (${tried} ${letters_of(this.alone[0].hands)})` : "";
       const runs = this.practised(0).length;
-      if (state.who === "learner" && this.shown === 1) return ["The first trial is the corrective process alone. Practice follows."];
+      if (state.who === "learner" && this.shown === 1) return ["In the first trial only the corrective process acts. Practice follows."];
       return [
         `${saved ? `${counted(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} the corrective process alone${used}.`,
         runs > 1 && state.who === "learner" ? `Shown is the median of the learner's ${runs} runs.` : "",
@@ -557,18 +557,18 @@ class Play {
     if (main.length > 1 && main[0].trial.hands[0] !== main[1].trial.hands[0]) return ["They hit goal 1 with different hands."];
     if (!difference) return [""];
     const { deviations, distance, runs } = difference;
-    if (distance < 0.005) return ["At goal 1 the two robots stand alike."];
+    if (distance < 0.005) return ["At goal 1 both robots have the same posture."];
     const several = state.who === "learner" || (this.stored(state.who) && runs > 1);
     if (!several) return [`At goal 1 the posture difference is ${short(distance)}.`, far];
     const by_chance = this.stored(state.who) && this.preset.by_chance;
     const random = Number.isFinite(by_chance) ? ` (random search: ${by_chance.toFixed(1)})` : "";
     return [
       `At goal 1 the posture difference is ${deviations === null ? "…" : deviations.toFixed(1)} standard deviations${random}.`,
-      `One standard deviation is how far single runs (thin) lie from their mean (thick; ${counted(runs, "run")} each).${random && " Random search keeps the best of as many random trials."}`,
+      `One standard deviation is the typical distance of a run (thin) from the mean (thick, ${counted(runs, "run")} each).${random && " Random search takes the best of as many random trials."}`,
     ];
   }
 
-  /* Who needs how many ticks: role, name, trial. */
+  /* Who needs how many ticks: role, name and reward. */
   get scores() {
     const { state, main } = this;
     const you = state.who === "you";
@@ -631,7 +631,7 @@ class Play {
 
   /* ---- Handles ---- */
 
-  /* Buttons lie over what can be dragged: by pointer, finger or arrow keys. */
+  /* Buttons cover what can be dragged by pointer, finger or arrow keys. */
   place() {
     const wanted = new Map();
     if (this.editing) {
@@ -729,13 +729,13 @@ class Play {
     return fits ? own.map(([hand, ...q]) => [hands.includes(hand) ? hand : hands[0], ...q]) : goals.map((_, goal) => [this.alone[0].hands[goal] ?? hands[0]]);
   }
 
-  /* The postures that you place, or in which the robot hits the goals. */
+  /* The postures that the reader has placed, or otherwise those in which the robot hits the goals. */
   get postures() {
     const { start } = this.problems[0];
     return this.own.map(([hand, ...q], goal) => ({ hand, q: q.length ? q : [...(this.main[0].trial.reached[goal] || start)] }));
   }
 
-  /* Bring a part of the robot to a place; the hand at work stays on its goal if it can. */
+  /* Bring a part of the robot to a position; the chosen hand stays on its goal if it can. */
   bend(part, to) {
     const [problem] = this.problems;
     const goal = this.state.edited - 1;
@@ -743,7 +743,7 @@ class Play {
     const joints = (arm, from, end) => Array.from({ length: Math.max(0, end - from) }, (_, k) => arm.first + from + k);
     const mine = problem.arms[hand];
     const free = problem.free.flatMap((each, axis) => (each ? [axis] : []));
-    /* By the joints beyond the part that was moved, or else by all. */
+    /* Use the joints beyond the part that was moved, or otherwise all joints. */
     const settle = (from) => [joints(mine, from, mine.links.length), [...free, ...joints(mine, 0, mine.links.length)]].some((some) => {
       const there = [...q];
       return bring_within(problem, there, problem.goals[goal], hand, some, 0.9 * problem.radius) && Object.assign(q, there);
@@ -771,7 +771,7 @@ class Play {
       this.ask();
       this.keep();
     };
-    /* The task as it is chosen. */
+    /* Begin a preset. */
     const choose = (preset) => {
       const { who, mate, reward, drift, open } = this.state;
       const live = Object.hasOwn(NAMES, who) ? who : this.first.who;
@@ -850,7 +850,7 @@ class Play {
     on("trials-csv", "click", () => this.download(new Blob([this.csv], { type: "text/csv" }), "trials.csv"));
   }
 
-  /* A power of ten near the robot's size: 1 for arms of length 4. Places have two digits after it. */
+  /* A power of ten near the robot's size: 1 for arms of length 4. Positions are rounded to a hundredth of it. */
   get unit() {
     return 10 ** Math.round(Math.log10(scale_of(this.preset.task.robot)));
   }
@@ -860,8 +860,8 @@ class Play {
     return bounded(place).map((value) => Math.round(parts * value) / parts);
   }
 
-  /* A place for one more goal of a list: the one that is wished for, or a stride from the last in some direction; in
-     reach of the robot, and apart from all other goals. */
+  /* A position for one more goal of a list: the wish, or a stride from the last goal in some direction. It is within
+     reach of the robot and not too close to another goal. */
   spot(list, wish) {
     const [stride, last, before = [last[0] - 1, last[1]]] = [STRIDE * this.problems[0].scale, list.at(-1), list.at(-2)];
     const way = Math.atan2(last[1] - before[1], last[0] - before[0]);
@@ -874,7 +874,7 @@ class Play {
     }) || places[0];
   }
 
-  /* Show what a link holds, with the goals of the preset where it has none. */
+  /* Show the state of a link; without goals in the link, those of the preset. */
   restore(link) {
     this.state = read(link, this.first);
     const { state } = this;
@@ -928,7 +928,7 @@ class Play {
     this.find("announced").textContent = `Move goal ${this.moved + 1} now`;
     const [few, full] = [goals.length < 2, goals.length >= MOST_GOALS];
     this.set("disabled", { reset: !changed && !state.own && !trials && drift === this.first.drift, two: few, fewer: few, announced: few, add: full });
-    this.find("why").textContent = (few && "The only goal stays; it has no next goal.") || (full && `Goals can be added while there are fewer than ${MOST_GOALS}.`) || "";
+    this.find("why").textContent = (few && "The only goal cannot be removed, and has no next goal.") || (full && `A task can have at most ${MOST_GOALS} goals here.`) || "";
     const other = who !== "learner";
     this.set("hidden", {
       runs: !runs.length, dial: other, "for-learner": other, "for-dial": other, "for-two": other || one,
@@ -936,7 +936,7 @@ class Play {
     });
   }
 
-  /* ---- To keep: link and picture ---- */
+  /* ---- Saving: link, trials and picture ---- */
 
   get link() {
     const { state, preset: { task, others: second = null } } = this;
@@ -952,7 +952,7 @@ class Play {
     else if (this.editing) this.note();
   }
 
-  /* A posture has been placed, or a hand chosen: one more trial of yours. */
+  /* The reader has placed a posture or chosen a hand: note one more trial. */
   note() {
     const [{ trial }] = this.main;
     const ticks = trial.hands.map((_, goal) => trial.movements.reduce((sum, movement) => sum + (movement.goal === goal ? movement.ticks : 0), 0));
@@ -960,14 +960,14 @@ class Play {
     if (!same(this.your_trials.at(-1) || null, hits)) this.your_trials.push(hits);
   }
 
-  /* Your trials, a row a hit: the format of `read_hits`. */
+  /* The reader's trials with a row for each hit, in the format of `read_hits`. */
   get csv() {
     const joints = this.problems[0].arms.flatMap(({ links }, hand) => links.map((_, k) => `${HANDS[hand]}_${k + 1}`));
     const rows = this.your_trials.flatMap((hits, trial) => hits.map((hit) => ["you", trial + 1, ...hit]));
     return [["subject", "trial", "goal", "hand", "ticks", "base_x", "base_y", ...joints], ...rows].map((row) => `${row}\n`).join("");
   }
 
-  /* Show a stored run from its beginning, as a cell of a table asks for it. */
+  /* Show a stored run from its beginning, when a cell of a table is clicked. */
   film(choice) {
     this.restore(written({ ...this.first, ...choice }, this.first));
     this.root.scrollIntoView({ behavior: this.calm.matches ? "auto" : "smooth" });
@@ -979,18 +979,18 @@ class Play {
   async copyLink() {
     this.keep();
     const address = this.data.address(this.link);
-    let note = "The link is in the clipboard.";
+    let note = "The link was copied to the clipboard.";
     try {
       await navigator.clipboard.writeText(address);
     } catch {
       note = `The link is ${address}`;
     }
     const file = decodeURIComponent(new URL(address).pathname.split("/").at(-1));
-    if (address.startsWith("file:")) note += ` It opens on this machine only: to share it, send ${file} as well, to whose address the part from # on is added.`;
+    if (address.startsWith("file:")) note += ` It opens only on this machine. To share it, send ${file} as well, and the part of the link from # on.`;
     this.find("note").textContent = note;
   }
 
-  /* The stage at twice its size, above the postures at the shared goal and the words. */
+  /* Save the stage at twice its size, with the postures at the shared goal and the text below. */
   save() {
     const { stage, inset, data, colours } = this;
     [stage.density, inset.density] = [2, 2];

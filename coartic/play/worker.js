@@ -1,8 +1,8 @@
-/* ---- The worker: makes trials in slices, so that it hears a new order at once ---- */
+/* ---- The worker makes trials in slices of time, so that it receives a new order at once ---- */
 
 const SLICE_MS = 50;
 
-/* A run of the learner or of a planner, as an order names it. */
+/* A run of the learner or of a planner, as an order describes it. */
 class Job {
   constructor({ key, task, rules, seed, horizon, trials, turn = 0 }) {
     const problem = problem_of(task);
@@ -23,7 +23,7 @@ class Job {
     }
   }
 
-  /* What is new since the last report. */
+  /* The news since the last report. */
   report() {
     const { key, made, done, snapshots } = this;
     this.snapshots = [];
@@ -40,7 +40,7 @@ if (typeof document === "undefined" && typeof self !== "undefined" && typeof mod
     const left = () => now.filter((job) => !job.done);
     const end = performance.now() + SLICE_MS;
     for (let open = left(); open.length && performance.now() < end; open = left()) open.forEach((job) => job.step());
-    // Of later turns, further runs, a part shows nothing new.
+    // Later turns are further runs; they are reported only when they are complete.
     if (turn < 2 || !left().length) self.postMessage({ order, reports: now.map((job) => job.report()) });
     if (jobs.some((job) => !job.done)) setTimeout(work, 0, current);
   };
