@@ -47,7 +47,7 @@ BASE_DOF = 2
 
 
 class Arm(NamedTuple):
-    """An arm of a robot in the form that the formulas and the compiled kernels read."""
+    """An arm of a robot as the formulas and the compiled kernels read it."""
 
     first_joint: int
     """Index in ``q`` of the angle of the arm's first joint."""

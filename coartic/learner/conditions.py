@@ -118,8 +118,8 @@ class ExplorationCondition:
     """Solution of a run: its best trial (``"best"``), or the noiseless greedy trial after the last
     one (``"replay"``)."""
     credit: Literal["overall", "subtask"] = "overall"
-    """What Q(s, a) of a goal measures: the reward R of the whole trial (``"overall"``), or the
-    return of that goal (``"subtask"``, see ``discount``)."""
+    """Meaning of Q(s, a) of a goal: the reward R of the whole trial (``"overall"``), or the return
+    of that goal (``"subtask"``, see ``discount``)."""
     discount: Share = 0.0
     """γ: the return of goal g is Σ γ^|h − g| r_h, where r_h is the reward of the movements to goal
     h. With 0 this is the reward of the subtask itself. A value above 0 needs credit ``"subtask"``.

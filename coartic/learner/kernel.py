@@ -152,7 +152,7 @@ class Results(NamedTuple):
 
 
 class _Workspace(NamedTuple):
-    """Work space of N runs, which are all at the same goal of the same trial."""
+    """Work space of N runs, all at the same goal of the same trial."""
 
     batch: Batch
     counts: NDArray[np.int64]
@@ -319,15 +319,15 @@ def choose_hand(
 
 @inner
 def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) -> None:
-    """Set the preferred posture p of a run after its hand for a goal is chosen, in place.
+    """Set the preferred posture p of a run, in place.
 
-    The learner's ``direction`` decides what p is:
+    This happens after the hand for a goal is chosen. The learner's ``direction`` decides what p is:
 
     - *stay*: the present posture q;
     - *start*: the posture at the start of the trial;
     - *next goal*: (q + t') / 2, where t' is the target stored for the next goal and its hand with
-      the highest value. p is q if there is no next goal or no such target, and for joints that this
-      hand's movements do not explore.
+      the highest value. Without a next goal or a stored target p is q, as it is for joints that
+      this hand's movements do not explore.
 
     ``number`` is the index of the goal, from 0. ``table`` has records of value and target, shape
     ``(G, 3, 2)``: by goal, previous hand (0 left, 1 right, 2 none) and hand. Nothing changes if
@@ -397,12 +397,11 @@ def aim(
 ) -> None:
     """Choose the hand for a goal and set its target: phase 2, *aim*.
 
-    The target is the stored target q*(s, a); an idle arm that the condition does not modify keeps
-    its posture. Without a stored target there is no target, and the corrective process acts. If
-    ``explore`` is True, the hand is explored (:func:`choose_hand`), and drift and noise η are added
-    to the target.
+    The target is the stored target q*(s, a), except that an idle arm which the condition does not
+    modify keeps its posture. If no target is stored, the corrective process acts. If ``explore`` is
+    True, the hand is explored (:func:`choose_hand`), and drift and noise η are added to the target.
 
-    ``n`` is the index of the run in ``workspace.batch.runs``, ``number`` that of the goal,
+    ``n`` is the index of the run in ``workspace.batch.runs``, ``number`` the index of the goal,
     ``before`` the previous hand (0 left, 1 right, 2 none), and ``table`` as in :func:`prefer`.
     """
     run, entries = workspace.batch.runs[n], table[number, before]
@@ -545,9 +544,9 @@ def _learn_from(
 def learn_kernel(
     robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, workspace: Any
 ) -> None:
-    """Make all trials of N runs, and then in each the replay, a greedy trial without noise.
+    """Make all trials of N runs, then the replay of each run.
 
-    If there are 0 trials, trial 0 takes the place of the replay.
+    The replay is a greedy trial without noise. If there are 0 trials, trial 0 takes its place.
 
     Parameters
     ----------

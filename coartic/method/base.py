@@ -104,7 +104,7 @@ class Method(ABC):
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence on why the method does not apply to a task; None if it applies.
+        """Return a sentence on why the method does not apply to a task, or None.
 
         By default a method applies to every task.
         """

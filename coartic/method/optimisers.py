@@ -274,7 +274,7 @@ class Objective:
 
     @property
     def history(self) -> pd.DataFrame:
-        """Table of the best costs so far, with a row each time the best cost fell.
+        """Table with a row each time the best cost fell.
 
         The first row is the trial with only the corrective process. Columns: ``evaluations``, the
         number made until then (0 in the first row), and ``cost``, ticks.
@@ -425,7 +425,9 @@ class Objective:
         return cost
 
     def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
-        """Make a trial for each of many points side by side, and return the costs, ticks.
+        """Make a trial for each of many points, and return the costs, ticks.
+
+        The trials are made side by side.
 
         Parameters
         ----------
@@ -494,7 +496,7 @@ class Objective:
         self._improvements.append((evaluations, cost))
 
     def _targets_in(self, accounts: Accounts, trial: int) -> Configs:
-        """Return a copy of the targets of a trial, shape ``(G, dof)``, length unit and rad.
+        """Return a copy of a trial's targets, shape ``(G, dof)``, length unit and rad.
 
         ``trial`` is its index in ``accounts``.
         """

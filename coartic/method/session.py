@@ -39,7 +39,7 @@ from coartic.tasks.task import Task
 
 
 class Information(StrEnum):
-    """Information that a method can use in addition to what a session shows to all methods."""
+    """Information that a method can use beyond what a session shows to all."""
 
     GOALS = "goals"
     """Centres of the goals, and their radius."""
@@ -658,7 +658,7 @@ class Session:
 
     @property
     def rewards(self) -> list[int | None]:
-        """Total reward of each trial made, in order, a new list; None if a trial failed.
+        """Total reward of each trial made, a new list; None if a trial failed.
 
         Trials of the search for the initial hands are not included.
         """

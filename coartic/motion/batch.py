@@ -127,7 +127,7 @@ def robot_parameters(
 
 @inlined
 def arm_of(robot: RobotRecord, hand: int) -> Arm:
-    """Return the :class:`Arm` of a hand (0 left, 1 right) from the record of a robot.
+    """Return the :class:`Arm` of a hand (0 left, 1 right) from a robot's record.
 
     Its links share memory with the record, which comes from :func:`robot_parameters`.
     """
@@ -272,10 +272,10 @@ def squared_distance(run: RunRecord) -> float:
 
 @inlined
 def start(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
-    """Load a run into a slot for a movement, in place, so that :func:`move_slots` can make it.
+    """Load a run into a slot for a movement, in place.
 
     In addition to :func:`load`, this copies start and target and the squared joint-space distance
-    between them.
+    between them, so that :func:`move_slots` can make the movement.
     """
     load(slots, slot, number, run, arm)
     _copy_arm(slots.start, slot, run.q, arm)
@@ -321,9 +321,9 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return an upper bound on the absolute angle of every link of the arm in a slot, rad.
+    """Return an upper bound on the absolute link angles in a slot, rad.
 
-    It is the sum of the absolute angles of its joints. ``q`` has a column for each slot.
+    It is the sum of the absolute angles of the arm's joints. ``q`` has a column for each slot.
     """
     total = 0.0
     for k in range(len(q) - BASE_DOF):

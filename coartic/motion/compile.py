@@ -345,7 +345,7 @@ def _log_once(message: str) -> None:
 
 
 class _MachineCode:
-    """Machine code of a function on disk, in the form in which Numba's dispatchers ask for it.
+    """Machine code of a function on disk, as Numba's dispatchers ask for it.
 
     If several processes need the same code, one compiles it and the others wait, at most 120 s,
     provided that files can be locked. Code that is damaged or cannot be stored is compiled again.
@@ -360,8 +360,7 @@ class _MachineCode:
         self.lock: IO[bytes] | None = None  # held while this process compiles
 
     def load_overload(self, *wanted: Any) -> Any:
-        """Return the machine code of a signature from disk, or None if this process is to compile
-        it.
+        """Return a signature's machine code, or None if this process is to compile it.
 
         It waits for another process that compiles the same code (:meth:`wait_for_lock`). The first
         time that code is to be compiled, a message is logged. ``wanted`` is the signature as Numba

@@ -294,9 +294,10 @@ def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotReco
 
 @entry
 def _move_kernel(stop_on_arrival: bool, robot: NDArray[np.void], batch: Batch) -> None:
-    """Move the first run of a batch towards its target, and set the results in its record.
+    """Move the first run of a batch towards its target.
 
-    ``robot`` comes from :func:`robot_parameters`; :func:`move_slots` says what is set.
+    ``robot`` comes from :func:`robot_parameters`; :func:`move_slots` says what is set in the run's
+    record.
     """
     run = batch.runs[0]
     start(batch.slots[0], 0, 0, run, arm_of(robot[0], run.hand))
@@ -334,7 +335,7 @@ def move(
         True if the movement also ends where the hand is near the position to which the target
         brings it; False, as in a corrective movement, if it ends only on a hit or at its target.
     model : MotionModel
-        The constants, of which ``step`` and ``arrival_tolerance`` matter here.
+        The constants; only ``step`` and ``arrival_tolerance`` are used.
 
     Returns
     -------
@@ -470,7 +471,7 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
 
 @inner
 def project(v: Any, x: Any, y: Any) -> None:
-    """Project a change of base and joints onto the null space of a Jacobian, in place.
+    """Project a change of base and joints onto a Jacobian's null space, in place.
 
     The change becomes v − J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺. The rows of J are ``x`` and ``y``; all
     arguments have shape ``(n,)``. A singular value of at most a millionth of the larger one counts
@@ -582,8 +583,8 @@ def correct(
     locked_base : collection of {"x", "y"}
         Coordinates of the base that do not move.
     model : MotionModel
-        The constants, of which ``gain``, ``correction_tolerance`` (0.01 length units for None) and
-        ``max_iterations`` matter here.
+        The constants; only ``gain``, ``correction_tolerance`` (0.01 length units for None) and
+        ``max_iterations`` are used.
 
     Returns
     -------
@@ -662,7 +663,7 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
     """Return the configurations at the n steps of a straight movement, with both ends.
 
     ``q`` and ``target`` have shape ``(dof,)``, the result ``(n + 1, dof)``, length unit and rad.
-    The rounding is that of the kernels.
+    They are rounded as in the kernels.
     """
     difference, square = target - q, 0.0
     for value in difference.tolist():

@@ -47,8 +47,9 @@ def execute_noisy(
 ) -> Array:
     """Execute solutions of a task many times with motor noise, and count the ticks.
 
-    Each movement misses its target at random. The corrective process corrects a goal until it is
-    hit, with noise, too. All other rules are those of :func:`coartic.execute`.
+    Each movement misses its target at random. If a goal is missed, the corrective process corrects
+    it until it is hit; corrections have noise as well. All other rules are as in
+    :func:`coartic.execute`.
 
     Parameters
     ----------
@@ -57,23 +58,23 @@ def execute_noisy(
         K solutions of the task, as a list even if there is only one.
     motor_noise : float
         Standard deviation s of the noise, from 0 to 100, length unit (base) and rad (joints). With
-        0 the ticks are those of :func:`coartic.execute`.
+        0 the ticks are the same as in :func:`coartic.execute`.
     repeats : int
         Number R of executions of each solution.
     seed : int or iterable of int
         A seed for each solution, or one seed, from which solution k takes child k. The ticks of a
-        solution depend on its own seed and on ``repeats``, and not on the other solutions.
+        solution depend on its own seed and on ``repeats``, but not on the other solutions.
     model : MotionModel
     signal_dependent : bool
-        True if the noise of aimed movements grows with their length, as that of corrections always
-        does.
+        True if the noise of aimed movements grows with their length. The noise of corrections
+        always does.
 
     Returns
     -------
     ndarray, shape (K, R)
-        Control ticks of each execution; NaN where it failed, because the corrective process did not
-        converge or the goal was still missed after 50 corrections. Report the number of failures
-        of a solution that has any: the mean over its other executions would flatter it.
+        Control ticks of each execution; NaN if it failed, because the corrective process did not
+        converge or the goal was still missed after 50 corrections. If a solution has failures,
+        report their number as well, because the mean over its other executions is too good.
 
     Raises
     ------
@@ -83,8 +84,8 @@ def execute_noisy(
         A solution breaks the task's rules, as in :func:`coartic.execute`, or its movements have
         other ticks than they take on this task with this model: it may be of another task.
     ValueError
-        ``motor_noise``, ``repeats``, ``seed`` or a constant of the model is out of bounds, or there
-        is not a seed for each solution.
+        ``motor_noise``, ``repeats``, ``seed`` or a constant of the model is out of bounds, or the
+        number of seeds is not the number of solutions.
 
     Notes
     -----
@@ -95,18 +96,19 @@ def execute_noisy(
         correction             a_c + s min(1, L) z_c    for base and chosen arm, else a_c
 
     - An *aimed movement* has the target t: it is learned or planned. A path has the waypoints w_1
-      to w_K and one z; it is not steered on its way (open loop).
+      to w_K and one z; it is not steered while it is made (open loop).
     - A coordinate *moves* if the target, or any waypoint, differs by more than 1e-9 from where the
       robot stands at this movement in the execution without noise. A locked base does not move.
     - A *correction* has as target the configuration a that the corrective process finds from q,
-      also where the solution has a corrective movement with a target. L is the Euclidean distance
-      from q to a. A locked base coordinate keeps a_c.
-    - With ``signal_dependent``, s min(1, L) stands in place of s in all three rows; L is the
-      distance from q to the target without noise, of a path to its last waypoint.
+      even if the solution has a corrective movement with a target. L is the Euclidean distance from
+      q to a. A locked base coordinate keeps a_c.
+    - With ``signal_dependent`` all three rows have s min(1, L) instead of s. L is the distance from
+      q to the target without noise, for a path to its last waypoint.
     - The noisy target counts as the target everywhere: for the hit, for the arrival of an aimed
-      movement, for the tick that this costs.
-    - A corrective movement whose target is not that of the corrective process, by more than 1e-9
-      in the execution without noise, is an aimed movement that ends on a hit or at its target.
+      movement, and for the tick that this costs.
+    - A corrective movement is an aimed movement that ends on a hit or at its target if, in the
+      execution without noise, its target differs by more than 1e-9 from the target of the
+      corrective process.
 
     A solution draws from ``numpy.random.default_rng`` of its seed: for its aimed movements and
     paths in shape (R, movements, dof); then for each goal, for its first, second, ... correction,
@@ -115,8 +117,9 @@ def execute_noisy(
     Source: constant noise of the end posture is our simplification. Noise in the execution of
     people's movements has constant, signal-dependent and temporal parts (van Beers, Haggard &
     Wolpert 2004, *The role of execution noise in movement variability*, J. Neurophysiol.
-    91:1050-1063). ``signal_dependent`` stands for the second (Harris & Wolpert 1998,
-    *Signal-dependent noise determines motor planning*, Nature 394:780-784), nothing for the third.
+    91:1050-1063). ``signal_dependent`` stands for the second part (Harris & Wolpert 1998,
+    *Signal-dependent noise determines motor planning*, Nature 394:780-784); nothing stands for the
+    third.
 
     Examples
     --------
@@ -319,7 +322,7 @@ def _scale(changes: Array) -> Array:
 
 @entry
 def _act_kernel(action: int, robot: NDArray[np.void], batch: Batch) -> None:
-    """Let the runs of a batch whose ``acting`` is True act, 72 at a time, in place.
+    """Let the runs whose ``acting`` is True act, 72 at a time, in place.
 
     - ``MOVE``: move straight to the target, and stop on a hit or on arrival;
     - ``REPEAT``: move straight to the target, and stop on a hit;

@@ -134,7 +134,7 @@ Refused = SolutionError | ValueError | TypeError | OverflowError
 
 
 def hands_in(movements: Iterable[Movement]) -> str:
-    """Return the hand of each goal that has a movement, in goal order, such as ``"LRLR"``."""
+    """Return the hand of each goal that has a movement, such as ``"LRLR"``."""
     by_goal = {movement.goal: movement.hand for movement in movements}
     return letters_of([by_goal[goal] for goal in sorted(by_goal)])
 
@@ -657,7 +657,7 @@ def initial_hands(
 
 
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
-    """Return the reward of a trial with only the corrective process and a task's initial hands.
+    """Return the reward of the corrective process on its own with a task's initial hands.
 
     None if the trial fails, or if a policy is to find the hands and finds none
     (:func:`initial_hands`).

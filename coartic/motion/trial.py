@@ -141,7 +141,7 @@ def aim(run: RunRecord, target: Any) -> None:
 
 @inlined
 def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Let each of the first ``count`` runs of a batch do its ``action``: phase 3, *move*.
+    """Let each of the first ``count`` runs do its ``action``: phase 3, *move*.
 
     The actions are at :data:`IDLE`. ``q``, ``hit``, ``ticks``, ``evaluations`` and ``acting``
     change in place. Ticks are 0 if there is no movement.
@@ -172,7 +172,7 @@ def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
 
 @inlined
 def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
-    """Write the result of a run for its goal into an account, in place: phase 5, *account*.
+    """Write a run's result for its goal into an account: phase 5, *account*.
 
     ``moved`` is the number of ticks of the run's movements to targets. If the run missed its goal,
     its trial ends. Its count of evaluations becomes 0.
@@ -190,7 +190,7 @@ def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
 
 @inlined
 def count_goal(goal: GoalAccount, counts: Any) -> None:
-    """Add the numbers in the account of a goal to the counts of a trial, in place.
+    """Add the numbers in a goal's account to a trial's counts, in place.
 
     ``counts`` has shape ``(5,)``: ticks, evaluations, iterations, corrections and failures.
     """
@@ -203,7 +203,7 @@ def count_goal(goal: GoalAccount, counts: Any) -> None:
 
 @shared
 def _move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> None:
-    """Move each of the first ``count`` runs whose ``acting`` is True to its target, in place.
+    """Move each of the first ``count`` runs that is ``acting`` to its target, in place.
 
     A movement ends on a hit or at its target. With ``stops`` it also ends when the hand is near the
     position to which the target brings it.
@@ -239,9 +239,9 @@ def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None
 
 @shared
 def find_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Let the paper's corrective process **A** find a target for each run that it applies to.
+    """Let the paper's corrective process **A** find targets for missed goals.
 
-    :func:`_find_by` says which runs these are and what is set.
+    :func:`_find_by` says for which runs, and what is set.
     """
     _find_by(count, robot, batch, correct_slots)
 
@@ -256,7 +256,10 @@ def find_pulled_corrections(count: int, robot: RobotRecord, batch: Batch) -> Non
 
 
 class Requests(NamedTuple):
-    """Movements that are asked of the kernel: N arms, G goals each, M movements per goal."""
+    """Movements that the kernel is to make.
+
+    They are movements of N arms to G goals each, M for a goal.
+    """
 
     starts: Configs
     """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` if all arms start alike."""
@@ -359,11 +362,11 @@ def _reach_lot(
 
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any) -> None:
-    """Let every arm reach for its goals, as many at a time as a batch has runs.
+    """Let every arm reach for its goals, as many at once as a batch has runs.
 
     ``goals``, ``counts`` and ``rewards`` are the entries of :class:`Accounts`, filled in place; the
-    caller sets ``counts`` to 0. ``arrays`` are the entries of :class:`Requests` and then those of a
-    batch.
+    caller sets ``counts`` to 0. ``arrays`` are the entries of :class:`Requests`, followed by the
+    entries of a batch.
     """
     arms, batch = Requests(*arrays[:5]), Batch(*arrays[5:])
     count, room = len(arms.targets), len(batch.runs)
@@ -755,10 +758,9 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 
 
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
-    """Return a sentence if a task has more than 4096 hand sequences, too many to try.
+    """Return a sentence if a task has more than 4096 hand sequences, otherwise None.
 
-    Otherwise return None. ``task`` is its name, ``goals`` and ``hands`` are numbers of goals and
-    hands.
+    ``task`` is its name, ``goals`` and ``hands`` are numbers of goals and hands.
     """
     count = hands**goals
     if count <= MOST_SEQUENCES:
@@ -788,7 +790,7 @@ def search_initial_hands(
     *,
     model: MotionModel = PAPER,
 ) -> tuple[str, Mapping[str, int]]:
-    """Find the hand sequence of trial 0, such as ``"RRRR"``, and count what the search took.
+    """Find the hand sequence of trial 0, and count what the search took.
 
     If the task names a sequence, it is returned with no counts. If the task names a policy, trials
     with only the corrective process are made: with ``"best-single-hand"`` for sequences of one
@@ -807,7 +809,7 @@ def search_initial_hands(
     Returns
     -------
     sequence : str
-        The hand sequence.
+        The hand sequence, such as ``"RRRR"``.
     counts : mapping
         Counts by the names of :class:`~coartic.method.Meter`. They are cached: do not change them.
 
@@ -831,10 +833,10 @@ def search_initial_hands(
 def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
-    """Search the initial hands of a task with a policy, and cache the last 64 results.
+    """Search the initial hands of a task with a policy.
 
-    The task is given as JSON, and ``hands`` in order, so that they can be keys. The caller counts
-    the trials. The result is as in :func:`search_initial_hands`.
+    The last 64 results are cached. The task is passed as JSON, and ``hands`` in order, so that they
+    can be keys. The caller counts the trials. The result is as in :func:`search_initial_hands`.
     """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)

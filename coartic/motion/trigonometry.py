@@ -35,7 +35,7 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n
 
 @scalar
 def _reduced(angle: float) -> tuple[float, float, int]:
-    """Return sine and cosine of the rest of an angle, and its quarter turn modulo 4.
+    """Return sine and cosine of an angle's rest, and its quarter turn modulo 4.
 
     The rest is ``angle``, rad, minus the nearest integer number of quarter turns. Only for |angle|
     below 1e5 rad.

@@ -134,7 +134,7 @@ def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Ar
     ----------
     task : Task
     configurations : array_like, shape (..., dof)
-        Configurations of base and arms, of which the arms of the task's hands are included.
+        Configurations of the base and of the arms of the task's hands.
     margin : float
         Free border, length unit, for arms of length 4. It scales with the shorter arm. Circles of
         goals may extend into it.

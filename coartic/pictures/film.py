@@ -1,4 +1,4 @@
-"""Films of movements tick by tick, GIF or MP4, in the colours of the play page.
+"""Films of movements, GIF or MP4, in the colours of the play page.
 
 Open squares mark the left arm, closed circles the right arm. Goals are numbered circles. A goal is
 filled from the tick at which it is hit, and the film pauses there. Pale lines trace the hands.

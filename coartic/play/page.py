@@ -1,4 +1,4 @@
-"""The page of `coartic play`: one HTML file that needs no other file and no network."""
+"""The page of `coartic play`: one HTML file that needs no other."""
 
 from __future__ import annotations
 

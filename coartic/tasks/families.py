@@ -111,7 +111,7 @@ _Bases = tuple[Base, ...]
 
 
 class _Region(FileData):
-    """Region of the goals: a box in which each instance has its own, possibly smaller box."""
+    """Region of the goals: a box that contains each instance's own box."""
 
     x: Range
     """From, to, length unit; the base is at the origin at the start."""
@@ -122,9 +122,9 @@ class _Region(FileData):
 
 
 class _Alignment(FileData):
-    """Goals on a horizontal or vertical line, except one goal if there are three or more.
+    """Goals on a horizontal or vertical line.
 
-    The goal off the line is neither the first nor the last.
+    If there are three or more, one goal is off the line, neither the first nor the last.
     """
 
     steps: Range
@@ -146,7 +146,10 @@ _PARKED = Posture(first=(0, 0), others=(0, 0))
 
 
 class Postures(FileData):
-    """Postures of both arms at the start; an arm without an entry is straight along +x."""
+    """Postures of both arms at the start.
+
+    An arm without an entry is straight along +x.
+    """
 
     left: Posture = _PARKED
     """The left arm."""
@@ -176,7 +179,7 @@ class Family(FileData):
     reach: Thousandths = 4 * _PARTS
     """Sum of the links of each arm, length unit; by default the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
-    """Bases, of which each instance has one: free, on a rail (it cannot move in y), or locked."""
+    """Bases. Each instance has one of them: free, on a rail (it cannot move in y), or locked."""
     restrictions: _Bases = ()
     """Further bases with which every instance can be completed, in addition to its own."""
     radius: Thousandths = 100
@@ -186,7 +189,7 @@ class Family(FileData):
     line: _Alignment | None = None
     """Goals on a line: table ``[line]``. Without this table goals are scattered in the region."""
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
-    """Starting postures, of which each instance has one: tables ``[[start]]``."""
+    """Starting postures. Each instance has one of them: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
     """Policy that finds the hands of trial 0, ``"best-single-hand"`` or ``"best-of-all"``. An
     instance has the hands that the policy found for it."""
@@ -283,7 +286,7 @@ def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list
 
 
 def broken_rule(family: Family, task: Task) -> str | None:
-    """Return the name of the first rule that a draft of the family breaks, or None.
+    """Return the name of the first rule that a draft breaks, or None.
 
     - ``outside``: a goal is outside the region.
     - ``overlap``: two goals are too close to each other.
@@ -332,7 +335,7 @@ def broken_rule(family: Family, task: Task) -> str | None:
 
 
 def instance_of(family: Family, address: Address) -> Task:
-    """Return the instance of a family at an address: the first draft that breaks no rule.
+    """Return the instance at an address: the first draft that breaks no rule.
 
     The task has a title, initial hands and provenance. Raises TaskError if each of the first 10,000
     drafts breaks a rule of the family.
@@ -369,10 +372,10 @@ def instance_of(family: Family, address: Address) -> Task:
 
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
-    """Return an instance of a family, a task, by its name; the last 4096 are cached.
+    """Return an instance of a family, a task, by its name.
 
     The name is such as ``two-armed/v1/i017``, or ``mine.v1.toml/i017`` for the family of a file.
-    Raises TaskError if the instance does not exist.
+    The last 4096 instances are cached. Raises TaskError if the instance does not exist.
     """
     family, _, short = name.rpartition("/")
     address = address_of(f"{load_family(family).name}/{short}" if is_file(family) else name)
@@ -385,7 +388,7 @@ def instance(name: str) -> Task:
 
 
 def is_file(family: str) -> bool:
-    """Return whether the name of a family is that of a file, which ends in ``.toml``."""
+    """Return whether a family's name is a file name, which ends in ``.toml``."""
     return family.endswith(".toml")
 
 
@@ -438,7 +441,7 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 
 def load_family(name: str) -> Family:
-    """Return a shipped family by its name, or a family by the path of its file.
+    """Return a shipped family by name, or a family by its file's path.
 
     The name includes the version, such as ``two-armed/v1``. A file is read once per process. Raises
     TaskError if the family does not exist or cannot be used.
@@ -452,7 +455,7 @@ def load_family(name: str) -> Family:
 
 
 def is_family(name: str) -> bool:
-    """Return whether a string is the name of a shipped family, or the path of a family's file.
+    """Return whether a string is the name of a shipped family or a family's file.
 
     A ``.toml`` file is a family's if it can be read and has the key ``region``.
     """
@@ -487,7 +490,7 @@ def read_family(path: Path) -> Family:
 def instance_names(
     family: str, split: Split, count: int | None = None, year: int | None = None
 ) -> list[str]:
-    """List the names of instances 0 to ``count`` - 1 of a split of a family.
+    """List the names of the first instances of a split of a family.
 
     Parameters
     ----------
@@ -495,7 +498,7 @@ def instance_names(
         Name of a shipped family, or path of a family's file.
     split : {"development", "test", "fresh"}
     count : int, optional
-        Number of instances, by default 1000 for development and 10 otherwise.
+        Number of instances, from instance 0; by default 1000 for development and 10 otherwise.
     year : int, optional
         Year of fresh instances, from 1000 to 9999; None for the other splits.
 

@@ -40,9 +40,9 @@ def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
 
 
 def hash_key(name: str) -> tuple[int, int]:
-    """Return the key of a name: the first two words of the SHA-256 of its UTF-8.
+    """Return the key of a name: two words of its SHA-256.
 
-    The words have 32 bits each, little-endian.
+    They are the first two words of the hash of the UTF-8, with 32 bits each, little-endian.
     """
     left, right = struct.unpack("<2I", hashlib.sha256(name.encode()).digest()[:8])
     return left, right

@@ -133,7 +133,7 @@ class Start(FileData):
 
 
 class Task(FileData):
-    """A sequence of goals to be hit in turn, each with a hand of the robot.
+    """A sequence of goals to hit in turn, each with a hand of the robot.
 
     :func:`load_task` reads a task from a file, or finds it by its name. Fields cannot be set. In
     Python a configuration ``q0=``, shape ``(dof,)``, can be passed instead of ``start``:
@@ -206,7 +206,7 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family with its version, if the task's name is that of an instance.
+        """Name of the family with its version, if the task is named as an instance.
 
         Otherwise None.
         """
