@@ -21,8 +21,8 @@ from coartic import Movement, Task
 from coartic.baselines.cascade import Solution, solve_cascade
 from coartic.baselines.posture_graph import KINEMATICS
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
+from coartic.motion.initial_hands import changes_of_hand
 from coartic.motion.movement import follow
-from coartic.motion.trial import changes_of_hand
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import beyond_reach, letters_of
 

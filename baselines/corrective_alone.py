@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from coartic import Execution
 from coartic.method import Information, Method, MethodError, Outline, Result, Session
+from coartic.motion.initial_hands import changes_of_hand, sequences_with
 from coartic.motion.solution import corrective_movements
-from coartic.motion.trial import changes_of_hand, sequences_with
 
 
 class GivenHands(Method):

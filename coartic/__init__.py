@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from coartic.method import BudgetError, MethodError, UndeclaredError
     from coartic.method.optimisers import Objective, Optimiser, objective
     from coartic.model import PAPER, MotionModel
-    from coartic.motion.movement import Correction, MoveResult, correct, move
+    from coartic.motion.correction import Correction, correct
+    from coartic.motion.movement import MoveResult, move
     from coartic.motion.noise import execute_noisy
     from coartic.motion.solution import (
         Execution,
@@ -97,7 +98,8 @@ _HOMES = {
     "learner.learning_run": ("LearningRun",),
     "method": ("BudgetError", "MethodError", "UndeclaredError"),
     "model": ("PAPER", "MotionModel"),
-    "motion.movement": ("Correction", "MoveResult", "correct", "move"),
+    "motion.correction": ("Correction", "correct"),
+    "motion.movement": ("MoveResult", "move"),
     "motion.noise": ("execute_noisy",),
     "motion.solution": (
         *("Execution", "Movement", "corrective_trial", "execute"),

@@ -51,7 +51,7 @@ from coartic.motion.compile import (
     joint_lever,
     record_type,
 )
-from coartic.motion.movement import correct_slots, project
+from coartic.motion.correction import correct_slots, project
 from coartic.motion.solution import Movement
 from coartic.motion.trial import (
     CORRECTIONS,

@@ -35,7 +35,8 @@ from coartic.method import Meter
 from coartic.model import PAPER, MotionModel
 from coartic.motion.batch import SLOTS
 from coartic.motion.compile import addresses
-from coartic.motion.movement import correct, move
+from coartic.motion.correction import correct
+from coartic.motion.movement import move
 from coartic.motion.solution import (
     Movement,
     corrective_movements,
@@ -44,13 +45,7 @@ from coartic.motion.solution import (
     movements_by_goal,
     movements_in,
 )
-from coartic.motion.trial import (
-    COUNTED,
-    compiled_task,
-    count_trials,
-    empty_accounts,
-    make_trials,
-)
+from coartic.motion.trial import COUNTED, compiled_task, count_trials, empty_accounts, make_trials
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, letters_of
 

@@ -15,8 +15,8 @@ from coartic.internal.limits import MOST_RUN_SEED, check_limits
 from coartic.internal.validation import in_sentences
 from coartic.method.session import Information, MethodError, Session
 from coartic.model import PAPER, MotionModel
+from coartic.motion.initial_hands import too_many_sequences
 from coartic.motion.solution import Movement
-from coartic.motion.trial import too_many_sequences
 from coartic.robot import Hand
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import INITIAL_POLICIES, Task

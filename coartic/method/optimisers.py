@@ -32,19 +32,13 @@ from coartic.method import (
     UndeclaredError,
 )
 from coartic.model import PAPER, MotionModel
+from coartic.motion.initial_hands import sequences_with, too_many_sequences
 from coartic.motion.movement import LARGEST_ENTRY
 from coartic.motion.solution import (
     Movement,
     movements_of,
 )
-from coartic.motion.trial import (
-    Accounts,
-    HandSequences,
-    compiled_task,
-    make_trials,
-    sequences_with,
-    too_many_sequences,
-)
+from coartic.motion.trial import Accounts, HandSequences, compiled_task, make_trials
 from coartic.robot import HANDS, Array, Configs, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.optima import KnownOptimum, best_shipped

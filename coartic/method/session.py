@@ -19,7 +19,8 @@ from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.model import PAPER, MotionModel
-from coartic.motion.movement import Correction, correct
+from coartic.motion.correction import Correction, correct
+from coartic.motion.initial_hands import search_initial_hands
 from coartic.motion.solution import Execution, Movement, check_targets, execute_many
 from coartic.motion.trial import (
     NO_REWARD,
@@ -31,7 +32,6 @@ from coartic.motion.trial import (
     count_trials,
     hand_codes,
     make_trials,
-    search_initial_hands,
     trials_of,
 )
 from coartic.robot import Array, Configs, Hand, Hands, Robot

@@ -1,8 +1,8 @@
-"""Movements and the corrective process: what the robot does for one goal.
+"""Movements: straight lines in joint space, and paths.
 
-**Movement** (paper, section *Generating Movement for Each Goal*): the robot moves on a straight
-line in joint space, one step per control tick, and each tick costs a reward of 1. Point k of a
-movement from q to q^t is ::
+The robot moves on a straight line in joint space, one step per control tick, and each tick costs a
+reward of 1 (paper, section *Generating Movement for Each Goal*). Point k of a movement from q to
+q^t is ::
 
     q + k m (q^t - q) / |q^t - q|   for k < n
     q^t                             for k = n = ceil(|q^t - q| / m)
@@ -16,20 +16,13 @@ where m is the length of a step. Before each step the stopping rule is evaluated
 A movement of k steps takes k + 1 ticks; the last tick detects arrival (inferred: it gives the
 published initial rewards exactly).
 
-**A**, the corrective process (section *The Corrective Process*, Figure 2): Jacobian-transpose
-descent on the distance to the goal, ``q += α Jᵀ e`` with the error e of the hand. Its only
-information is the primary objective: where the goal is, and how the chosen hand's position depends
-on the base and the chosen arm. The other arm's joints do not change, and a locked base coordinate
-has no column in the Jacobian.
-
-The kernels give the same results as these loops, for many arms side by side, and do not visit every
+The kernels give the same results as this loop, for many arms side by side, and do not visit every
 step of a movement (:func:`clear_steps`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,19 +36,16 @@ from coartic.motion.batch import (
     Batch,
     RobotRecord,
     SlotArrays,
-    are_near,
     arm_of,
     batch_for,
     compact,
     find_positions,
-    load,
     padded_count,
     robot_parameters,
     start,
-    store,
     winding,
 )
-from coartic.motion.compile import entry, fill_row, inlined, inner, joint_lever, shared
+from coartic.motion.compile import entry, fill_row, inner, shared
 from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
 
 # Each bound has a clearance against rounding: a constant, and per joint a share (_ROUNDING) of the
@@ -65,9 +55,7 @@ _CLEARANCE, _ROUNDING = 1e-9, 1e-15
 _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
-_RANK = 1e-12  # squared ratio of singular values up to which the smaller one counts as 0
 _IN_GOAL, _MISSED = 1.0, 2.0  # status of a slot whose movement has ended
-_AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # status of a slot whose correction has ended
 LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or rad
 
 
@@ -82,18 +70,6 @@ class MoveResult(NamedTuple):
     """True if the hand is within the goal's radius."""
     evaluations: int
     """Forward-kinematics evaluations; on a path (:func:`follow`) one per tick."""
-
-
-class Correction(NamedTuple):
-    """Result of the corrective process (:func:`correct`)."""
-
-    q: Array
-    """Configuration found, shape ``(dof,)``, length unit and rad; the last iterate if ``converged``
-    is False."""
-    converged: bool
-    """True if the hand is within ``MotionModel.correction_tolerance`` of the goal's centre."""
-    iterations: int
-    """Iterations made, with one Jacobian each."""
 
 
 @inner
@@ -356,7 +332,7 @@ def move(
     """
     if not isinstance(stop_on_arrival, bool | np.bool_):
         raise TypeError(f"stop_on_arrival is {brief_value(stop_on_arrival)}; it must be a bool")
-    batch = _one_run(robot, q, hand, goal, radius)
+    batch = one_run(robot, q, hand, goal, radius)
     run, entries = batch.runs[0], slice(robot.dof)
     run["target"][entries] = configuration(robot, target)
     parameters = robot_parameters(robot, radius, model=check_model(model))
@@ -364,252 +340,6 @@ def move(
     return MoveResult(
         run["q"][entries].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
     )
-
-
-@inner
-def _find_statuses(slots: SlotArrays, count: int, square: float) -> None:
-    """Set the status of corrections in the first ``count`` slots, in place.
-
-    - at the goal: the squared distance of the hand from the goal's centre is at most ``square``,
-      squared length unit;
-    - failed: that distance is not finite;
-    - going on: otherwise.
-    """
-    tip = len(slots.length)
-    for i in range(padded_count(count)):
-        error_x = slots.goal[0, i] - slots.x[tip, i]
-        error_y = slots.goal[1, i] - slots.y[tip, i]
-        error = error_x * error_x + error_y * error_y
-        status = GOING if error < math.inf else _FAILED
-        slots.status[i] = _AT_GOAL if error <= square else status
-
-
-@inlined
-def descend(
-    slots: SlotArrays, count: int, robot: RobotRecord, runs: Any, pull: Any
-) -> tuple[int, bool]:
-    """Make an iteration of the corrective process in the first ``count`` slots, in place.
-
-    Slots that do not go on stay as they are; the status of a slot that goes on and does not change
-    becomes stuck. ``pull`` is as in :func:`descend_to_goals`. Return how many slots have ended, and
-    whether all link angles are certainly below 1e5 rad in size afterwards.
-    """
-    ended = 0
-    far = 0
-    tip = len(slots.length)
-    gain, free_x, free_y = robot.model.gain, robot.free_x, robot.free_y
-    if pull is not None:
-        pull(slots, count, robot, runs)
-    for i in range(padded_count(count)):
-        error_x = slots.goal[0, i] - slots.x[tip, i]
-        error_y = slots.goal[1, i] - slots.y[tip, i]
-        going = slots.status[i] == GOING
-        x = slots.q[0, i] + gain * error_x if free_x else slots.q[0, i]
-        y = slots.q[1, i] + gain * error_y if free_y else slots.q[1, i]
-        if pull is not None:
-            x, y = x + slots.pull[0, i], y + slots.pull[1, i]
-        moved = (x != slots.q[0, i]) | (y != slots.q[1, i])
-        slots.q[0, i] = x if going else slots.q[0, i]
-        slots.q[1, i] = y if going else slots.q[1, i]
-        for k in range(tip):
-            dx, dy = joint_lever(slots.x[:, i], slots.y[:, i], k, tip)
-            before = slots.q[BASE_DOF + k, i]
-            turned = before + gain * (dx * error_x + dy * error_y)
-            if pull is not None:
-                turned += slots.pull[BASE_DOF + k, i]
-            moved |= turned != before
-            slots.q[BASE_DOF + k, i] = turned if going else before
-        # A stationary point outside the goal, which the process will not leave.
-        stuck = going & (not moved)
-        slots.status[i] = _STUCK if stuck else slots.status[i]
-        ended += 0 if (going & moved) | (i >= count) else 1
-        far += 0 if winding(slots.q, i) < trigonometry.LARGEST else 1
-    return ended, far == 0
-
-
-@inlined
-def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) -> None:
-    """Iterate the corrective process in the first ``count`` slots until each has ended.
-
-    A correction ends when it has converged or failed: its configuration is not finite, no longer
-    changes, or has had ``max_iterations``. The slots are loaded by :func:`load`, and free
-    afterwards. In the record of each run
-
-    - ``converged`` and ``iterations`` are set;
-    - ``target`` gets base and arm of the last iterate; the entries of the other arm stay;
-    - ``evaluations`` grows by ``iterations`` + 1.
-
-    ``pull`` is None or a kernel ``pull(slots, count, robot, runs)``. The kernel sets ``slots.pull``
-    to what the next iteration adds to ``slots.q`` in addition to α Jᵀ e, 0 for locked coordinates
-    of the base.
-    """
-    slots, iteration = batch.slots[0], 0
-    square = largest_square(robot.model.correction_tolerance)
-    near = are_near(slots, count)
-    while count > 0:
-        find_positions(slots, count, near)
-        _find_statuses(slots, count, square)
-        ended = count
-        if iteration < robot.model.max_iterations:
-            ended, near = descend(slots, count, robot, batch.runs, pull)
-        if ended > 0:
-            for slot in range(count - 1, -1, -1):
-                if slots.status[slot] == GOING and iteration < robot.model.max_iterations:
-                    continue
-                run = batch.runs[slots.run[slot]]
-                store(slots, slot, run.target)
-                run.converged = slots.status[slot] == _AT_GOAL
-                run.iterations = iteration + (slots.status[slot] == _STUCK)
-                run.evaluations += run.iterations + 1
-                count -= 1
-                compact(batch.corrected, slot, count)
-                ended -= 1
-                if ended == 0:
-                    break
-        iteration += 1
-
-
-@inner
-def project(v: Any, x: Any, y: Any) -> None:
-    """Project a change of base and joints onto a Jacobian's null space, in place.
-
-    The change becomes v − J⁺ J v with J⁺ = Jᵀ (J Jᵀ)⁺. The rows of J are ``x`` and ``y``; all
-    arguments have shape ``(n,)``. A singular value of at most a millionth of the larger one counts
-    as 0.
-    """
-    a, b, c, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(len(v)):
-        a, b, c = a + x[j] * x[j], b + x[j] * y[j], c + y[j] * y[j]
-        along_x, along_y = along_x + x[j] * v[j], along_y + y[j] * v[j]
-    # J Jᵀ = (a, b; b, c) has the eigenvalues larger and determinant / larger.
-    larger = 0.5 * (a + c) + math.sqrt(0.25 * (a - c) * (a - c) + b * b)
-    determinant = a * c - b * b
-    back_x, back_y = 0.0, 0.0
-    if determinant > _RANK * larger * larger:
-        back_x = (c * along_x - b * along_y) / determinant
-        back_y = (a * along_y - b * along_x) / determinant
-    elif larger > 0.0:
-        u_x, u_y = (larger - c, b) if a > c else (b, larger - a)
-        square = u_x * u_x + u_y * u_y
-        share = (u_x * along_x + u_y * along_y) / (larger * square)
-        back_x, back_y = share * u_x, share * u_y
-    for j in range(len(v)):
-        v[j] -= x[j] * back_x + y[j] * back_y
-
-
-@inner
-def _pull_to_preferred(slots: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
-    """Set ``slots.pull`` of the first ``count`` slots to a pull to each run's preferred posture.
-
-    The pull is β N(q) (p − q), and 0 for locked base coordinates:
-
-    - β is the ``pull`` of the run in the slot, and p its preferred posture;
-    - q is the slot's configuration, whose positions ``x`` and ``y`` are filled already;
-    - N projects onto the null space of the hand's Jacobian.
-    """
-    tip = len(slots.length)
-    for i in range(count):
-        run, v = runs[slots.run[i]], slots.pull[:, i]
-        x, y = slots.jacobian[0, :, i], slots.jacobian[1, :, i]
-        for j in range(BASE_DOF + tip):
-            v[j], x[j], y[j] = 0.0, 0.0, 0.0
-        if robot.free_x:
-            v[0], x[0] = run.preferred[0] - slots.q[0, i], 1.0
-        if robot.free_y:
-            v[1], y[1] = run.preferred[1] - slots.q[1, i], 1.0
-        for k in range(slots.links[i]):
-            j = BASE_DOF + k
-            v[j] = run.preferred[slots.first_joint[i] + k] - slots.q[j, i]
-            x[j], y[j] = joint_lever(slots.x[:, i], slots.y[:, i], k, tip)
-        project(v, x, y)
-        for j in range(BASE_DOF + tip):
-            v[j] *= run.pull
-
-
-@shared
-def pull_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
-    """Run the corrective process with a pull to each run's preferred posture.
-
-    It runs in the first ``count`` slots, and sets the results in the runs' records
-    (:func:`descend_to_goals`).
-    """
-    descend_to_goals(batch, count, robot, _pull_to_preferred)
-
-
-@shared
-def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
-    """Run the paper's corrective process in the first ``count`` slots.
-
-    It sets the results in the runs' records (:func:`descend_to_goals`).
-    """
-    descend_to_goals(batch, count, robot, None)
-
-
-@entry
-def _correct_kernel(robot: NDArray[np.void], batch: Batch) -> None:
-    """Run the corrective process for the first run of a batch (:func:`descend_to_goals`).
-
-    ``robot`` comes from :func:`robot_parameters`.
-    """
-    run = batch.runs[0]
-    load(batch.slots[0], 0, 0, run, arm_of(robot[0], run.hand))
-    correct_slots(batch, 1, robot[0])
-
-
-def correct(
-    robot: Robot,
-    q: Array,
-    hand: Hand,
-    goal: tuple[float, float],
-    *,
-    locked_base: Collection[str] = (),
-    model: MotionModel = PAPER,
-) -> Correction:
-    """Find a configuration with a hand at a goal by Jacobian-transpose inverse kinematics.
-
-    This is the paper's corrective process. It descends from ``q`` on the distance to the goal. The
-    other arm does not move.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    q : ndarray, shape (dof,)
-        Where to begin, length unit (base) and rad (joints).
-    hand : {"left", "right"}
-        The hand.
-    goal : tuple of float
-        Centre of the goal, x and y, length unit.
-    locked_base : collection of {"x", "y"}
-        Coordinates of the base that do not move.
-    model : MotionModel
-        The constants; only ``gain``, ``correction_tolerance`` (0.01 length units for None) and
-        ``max_iterations`` are used.
-
-    Returns
-    -------
-    Correction
-        The configuration, whether it is at the goal, and how many iterations it took. If it does
-        not converge within ``model.max_iterations``, no error is raised.
-
-    Raises
-    ------
-    TypeError
-        ``robot`` or ``model`` has another type.
-    ValueError
-        A shape is wrong, a number is not finite or beyond 100,000, the hand is unknown,
-        ``locked_base`` has an entry other than ``"x"`` and ``"y"``, or a constant of the model is
-        out of bounds.
-
-    Notes
-    -----
-    Source: paper, Figure 2 (Whitney 1969; Craig 2004).
-    """
-    batch = _one_run(robot, q, hand, goal)
-    run, entries = batch.runs[0], slice(robot.dof)
-    locked = tuple(map(str, locked_base if isinstance(locked_base, Collection) else [locked_base]))
-    _correct_kernel(robot_parameters(robot, locked_base=locked, model=check_model(model)), batch)
-    return Correction(run["target"][entries].copy(), bool(run["converged"]), int(run["iterations"]))
 
 
 def follow(
@@ -726,7 +456,7 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     return array
 
 
-def _one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
+def one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
     """Return a batch of one run whose configuration and target are ``q``.
 
     ``radius`` is only checked. Raises TypeError if ``robot`` is not a Robot, and ValueError for any

@@ -19,7 +19,8 @@ from coartic.internal.limits import MOST_RUN_SEED, MOST_RUNS, brief_value, check
 from coartic.model import PAPER, MotionModel
 from coartic.motion.batch import SLOTS, Batch, arm_of, batch_for, load, start
 from coartic.motion.compile import entry, fill_row
-from coartic.motion.movement import correct_slots, follow, move_slots
+from coartic.motion.correction import correct_slots
+from coartic.motion.movement import follow, move_slots
 from coartic.motion.solution import Movement, Plan, movements_by_goal
 from coartic.motion.trial import MOVE, REPEAT, CompiledTask, compiled_task, count_trials
 from coartic.robot import BASE_DOF, HANDS, Array, Configs, Hand

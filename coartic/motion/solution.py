@@ -22,17 +22,16 @@ from coartic.internal.limits import brief_value, real_array
 from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel, check_model
 from coartic.motion.batch import width_of
-from coartic.motion.movement import LARGEST_ENTRY, configuration, correct, follow, move
+from coartic.motion.correction import correct
+from coartic.motion.initial_hands import hands_among, search_initial_hands, sequences_with
+from coartic.motion.movement import LARGEST_ENTRY, configuration, follow, move
 from coartic.motion.trial import (
     CompiledTask,
     account_type,
     compiled_task,
     count_trials,
-    hands_among,
     make_trials,
     reason_of_failure,
-    search_initial_hands,
-    sequences_with,
 )
 from coartic.robot import HANDS, Array, Configs, Hand
 from coartic.tasks.catalogue import TaskLike, as_task

@@ -178,7 +178,7 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   }
 }
 
-/* coartic/motion/movement.py: correct, changing `q` itself; return whether **A** converges. */
+/* coartic/motion/correction.py: correct, changing `q` itself; return whether **A** converges. */
 function correct(problem, q, number, hand) {
   const { model } = problem;
   const [free_x, free_y] = problem.free;
@@ -208,7 +208,7 @@ function correct(problem, q, number, hand) {
 
 const RANK = 1e-12; // squared ratio of singular values up to which the smaller one counts as 0
 
-/* coartic/motion/movement.py: project joint changes, in place, onto the null space of a Jacobian, a row for each joint. */
+/* coartic/motion/correction.py: project joint changes, in place, onto the null space of a Jacobian, a row for each joint. */
 function project(v, rows) {
   let [a, b, c, along_x, along_y] = [0, 0, 0, 0, 0];
   rows.forEach(([x, y], i) => {

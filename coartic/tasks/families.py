@@ -38,8 +38,8 @@ from coartic.internal.limits import MOST_CELLS, check_limits
 from coartic.internal.text import Line, counted, plain, unknown
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.motion.initial_hands import ranked_sequences, search_initial_hands
 from coartic.motion.movement import move
-from coartic.motion.trial import ranked_sequences, search_initial_hands
 from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, hash_key
 from coartic.tasks.task import (

@@ -15,7 +15,8 @@ import pandas as pd
 
 from coartic.analysis import verify
 from coartic.model import PAPER
-from coartic.motion.movement import Correction, MoveResult
+from coartic.motion.correction import Correction
+from coartic.motion.movement import MoveResult
 from coartic.motion.solution import Movement, initial_hands
 from coartic.robot import HANDS
 from coartic.tasks.task import hands_of
@@ -94,7 +95,7 @@ def execute(task, solution, model=PAPER):
 
 
 def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, preferred=None):
-    """:func:`coartic.motion.movement.correct`, with the Jacobian as a matrix; each iteration adds
+    """:func:`coartic.motion.correction.correct`, with the Jacobian as a matrix; each iteration adds
     β N(x) (p − x) with the pull β and a preferred posture p."""
     free, model = np.ones(robot.dof), model.for_radius()
     free[:2] = ["x" not in locked_base, "y" not in locked_base]

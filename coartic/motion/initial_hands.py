@@ -1,0 +1,188 @@
+"""Initial hands: the hand sequence of trial 0, and trials with only the corrective process."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Collection, Iterable, Mapping
+from functools import lru_cache
+
+import numpy as np
+
+from coartic.errors import NotApplicableError
+from coartic.internal.limits import brief_value
+from coartic.model import PAPER, MotionModel
+from coartic.motion.trial import (
+    COUNTED,
+    FAILURES,
+    compiled_task,
+    count_trials,
+    hand_codes,
+    make_trials,
+    reason_of_failure,
+)
+from coartic.robot import HANDS, Hand
+from coartic.tasks.task import WITHOUT_REACH, Task, letters_of
+
+MOST_SEQUENCES = 4096  # largest number of hand sequences that are all tried
+
+
+def ranked_sequences(
+    task: Task, sequences: Collection[str], *, model: MotionModel = PAPER
+) -> list[tuple[str, int | None, str, dict[str, int]]]:
+    """Make a trial with only the corrective process for each hand sequence, and rank them.
+
+    Parameters
+    ----------
+    task : Task
+    sequences : collection of str
+        Hand sequences, such as ``"RRLR"``.
+    model : MotionModel
+
+    Returns
+    -------
+    list of tuple
+        An entry for each sequence: the sequence, the reward (None if the trial failed), the reason
+        of the failure (or an empty string), and the counts of the trial by name (:data:`COUNTED`),
+        with one more evaluation for each goal tried. The order is
+
+        - by reward, the highest first and failed trials last;
+        - then by the number of changes of hand, the fewest first;
+        - then as in ``sequences``.
+    """
+    compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
+    targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
+    accounts = make_trials(compiled, codes, targets)
+    trials = []
+    for hands, goals, counts in zip(
+        sequences, accounts.goals[..., 0], accounts.counts, strict=True
+    ):
+        spent = dict(zip(COUNTED, counts.tolist(), strict=True))
+        # coartic.execute also evaluates the position of the hand at each goal that is tried.
+        spent["forward_kinematics"] += int(goals["hit"].sum()) + spent["failed_trials"]
+        reward = None if spent["failed_trials"] else -spent["movement_ticks"]
+        trials.append((hands, reward, reason_of_failure(compiled, goals), spent))
+    return sorted(
+        trials,
+        key=lambda trial: (
+            math.inf if trial[1] is None else -trial[1],
+            changes_of_hand(trial[0]),
+        ),
+    )
+
+
+def changes_of_hand(sequence: str) -> int:
+    """Count how often the hand changes between successive goals: 3 for ``"LRLR"``."""
+    return sum(a != b for a, b in itertools.pairwise(sequence))
+
+
+def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
+    """List all sequences of ``hands`` for a number of goals in alphabetical order.
+
+    The sequences are strings such as ``"LRLR"``. Raises NotApplicableError, which names ``task``,
+    if there are more than 4096.
+    """
+    ordered = [hand for hand in HANDS if hand in hands]
+    if reason := too_many_sequences(task, goals, len(ordered)):
+        raise NotApplicableError(reason)
+    return [letters_of(sequence) for sequence in itertools.product(ordered, repeat=goals)]
+
+
+def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
+    """Return a sentence if a task has more than 4096 hand sequences, otherwise None.
+
+    ``task`` is its name, ``goals`` and ``hands`` are numbers of goals and hands.
+    """
+    count = hands**goals
+    if count <= MOST_SEQUENCES:
+        return None
+    return f"task {task!r} has {count} hand sequences; at most {MOST_SEQUENCES} are tried"
+
+
+def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
+    """Return ``hands`` as a tuple, or all hands of the task for None.
+
+    Raises ValueError if ``hands`` is empty or names a hand that the task does not have.
+    """
+    if hands is None:
+        return task.hands
+    chosen = tuple(hands) if isinstance(hands, Iterable) else ()
+    if not chosen or not all(isinstance(hand, str) and hand in task.hands for hand in chosen):
+        raise ValueError(
+            f"hands is {brief_value(hands)}; it must be a list of hands of task {task.name!r}, "
+            f"which are {' and '.join(map(repr, task.hands))}"
+        )
+    return chosen
+
+
+def search_initial_hands(
+    task: Task,
+    hands: tuple[Hand, ...] | None = None,
+    *,
+    model: MotionModel = PAPER,
+) -> tuple[str, Mapping[str, int]]:
+    """Find the hand sequence of trial 0, and count what the search took.
+
+    If the task names a sequence, it is returned with no counts. If the task names a policy, trials
+    with only the corrective process are made: with ``"best-single-hand"`` for sequences of one
+    hand, otherwise for all. The best of :func:`ranked_sequences` is returned.
+
+    These trials are counted (:func:`count_trials`), even if the result comes from the cache, but
+    not if the search fails.
+
+    Parameters
+    ----------
+    task : Task
+    hands : tuple of {"left", "right"}, optional
+        Hands among which a policy chooses; the task's by default.
+    model : MotionModel
+
+    Returns
+    -------
+    sequence : str
+        The hand sequence, such as ``"RRRR"``.
+    counts : mapping
+        Counts by the names of :class:`~coartic.method.Meter`. They are cached: do not change them.
+
+    Raises
+    ------
+    NotApplicableError
+        No sequence tried completes the task, or there are more than 4096 to try.
+    ValueError
+        ``hands`` is empty or names a hand that the task does not have.
+    """
+    allowed = hands_among(task, hands)
+    if not task.initial_is_policy:
+        return task.initial_hands, {}
+    ordered = tuple(hand for hand in HANDS if hand in allowed)
+    chosen, spent = _search_by_policy(task.model_dump_json(), ordered, model)
+    count_trials(spent["initial_trials"])
+    return chosen, spent
+
+
+@lru_cache(maxsize=64)
+def _search_by_policy(
+    task_json: str, hands: tuple[Hand, ...], model: MotionModel
+) -> tuple[str, Mapping[str, int]]:
+    """Search the initial hands of a task with a policy.
+
+    The last 64 results are cached. The task is passed as JSON, and ``hands`` in order, so that they
+    can be keys. The caller counts the trials. The result is as in :func:`search_initial_hands`.
+    """
+    task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
+    goals = len(task.goals)
+    if task.initial_hands == "best-single-hand":
+        candidates = [letters_of([hand] * goals) for hand in hands]
+    else:
+        candidates = sequences_with(hands, goals, task.name)
+    ranked = ranked_sequences(task, candidates, model=model)
+    count_trials(-len(ranked))  # the caller counts them, each time
+    best, reward, reason, _ = ranked[0]
+    if reward is None:
+        raise NotApplicableError(
+            f"task {task.name!r}: the corrective process does not complete it with any hand "
+            f"sequence that initial_hands = {task.initial_hands!r} allows; with {best}, {reason}"
+        )
+    spent = {name: sum(counts[name] for *_, counts in ranked) for name in COUNTED[:FAILURES]}
+    spent["jacobians"] = spent["corrective_iterations"]
+    return best, {"initial_trials": len(ranked), **spent}
