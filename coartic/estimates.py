@@ -218,7 +218,8 @@ def mean_of_means(
         return Estimate(value, value - width, value + width, n=n)
     large = max(n) > LARGE
     resamples = min(resamples, FEWER_RESAMPLES) if large else resamples
-    batches: Iterable[list[Any]] = (_drawn_once if sum(n) <= LARGE else drawn)(n, resamples)
+    indices_for = _cached_indices if sum(n) <= LARGE else resample_indices
+    batches: Iterable[list[Any]] = indices_for(n, resamples)
     resampled = np.concatenate([
         sum(weight * sample.take(indices).mean(axis=1)
             for (sample, weight), indices in zip(parts, batch, strict=True))
@@ -239,7 +240,7 @@ def mean_of_means(
     return Estimate(value, low, high, n=n)
 
 
-def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
+def resample_indices(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
     """Yield the indices of the values drawn in batches of at most 1,000 resamples.
 
     A batch is a list with an array for each sample, shape ``(batch, size)``; ``sizes`` are the
@@ -253,12 +254,15 @@ def drawn(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int6
 
 
 @lru_cache(maxsize=8)  # samples often have equal sizes
-def _drawn_once(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.uint16]]]:
-    """Return a cached list of all batches of :func:`drawn`; do not change it.
+def _cached_indices(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.uint16]]]:
+    """Return a cached list of all batches of :func:`resample_indices`; do not change it.
 
     It takes a quarter of the memory of the batches themselves.
     """
-    return [[indices.astype(np.uint16) for indices in batch] for batch in drawn(sizes, resamples)]
+    return [
+        [indices.astype(np.uint16) for indices in batch]
+        for batch in resample_indices(sizes, resamples)
+    ]
 
 
 def standard_deviation(values: Array) -> float:

@@ -387,7 +387,7 @@ def drift(
 def aim(
     n: int,
     number: int,
-    before: int,
+    previous: int,
     table: Any,
     explore: bool,
     robot: RobotRecord,
@@ -402,9 +402,9 @@ def aim(
     True, the hand is explored (:func:`choose_hand`), and drift and noise η are added to the target.
 
     ``n`` is the index of the run in ``workspace.batch.runs``, ``number`` the index of the goal,
-    ``before`` the previous hand (0 left, 1 right, 2 none), and ``table`` as in :func:`prefer`.
+    ``previous`` the previous hand (0 left, 1 right, 2 none), and ``table`` as in :func:`prefer`.
     """
-    run, entries = workspace.batch.runs[n], table[number, before]
+    run, entries = workspace.batch.runs[n], table[number, previous]
     run.hand = choose_hand(n, entries, explore, robot, learner, rng, workspace)
     stored = entries[run.hand]
     prefer(run, number, table, learner)
@@ -454,9 +454,9 @@ def make_trial(
                 if run.going:
                     aim_at(run, learner.first_targets[number])
             elif run.going:
-                before = accounts[n, number - 1].hand if number > 0 else NO_HAND
+                previous = accounts[n, number - 1].hand if number > 0 else NO_HAND
                 rng = generator_at(rngs, n)
-                aim(n, number, before, tables[n], explore, robot, learner, rng, workspace)
+                aim(n, number, previous, tables[n], explore, robot, learner, rng, workspace)
         move_runs(runs, robot, batch)
         for n in range(runs):
             accounts[n, number].moved = batch.runs[n].ticks
@@ -529,8 +529,8 @@ def _learn_from(
             _find_returns(trial, learner, workspace.returns)
         for goal in range(len(trial)):
             credit = workspace.returns[goal] if learner.by_subtask else float(reward)
-            before = trial[goal - 1].hand if goal > 0 else NO_HAND
-            learned = tables[n, goal, before, trial[goal].hand]
+            previous = trial[goal - 1].hand if goal > 0 else NO_HAND
+            learned = tables[n, goal, previous, trial[goal].hand]
             if credit > learned.value:
                 learned.value = credit
                 fill_row(learned.target, trial[goal].q)

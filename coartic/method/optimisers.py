@@ -461,8 +461,8 @@ class Objective:
                 accounts = self._session._make_trials(hand_codes, self._targets_of(points))
                 np.minimum(-accounts.rewards, FAILED, out=part_costs)
                 if part_costs.min() < self._best_cost:
-                    before = np.minimum.accumulate(np.append(self._best_cost, part_costs))[:-1]
-                    for n in np.flatnonzero(part_costs < before).tolist():
+                    best_costs = np.minimum.accumulate(np.append(self._best_cost, part_costs))[:-1]
+                    for n in np.flatnonzero(part_costs < best_costs).tolist():
                         cost, evaluations = float(part_costs[n]), self._evaluations + n + 1
                         self._note_best(cost, evaluations, points[n], hand_codes[n], accounts, n)
                 self._evaluations += len(points)
@@ -528,18 +528,18 @@ class Objective:
         """Number of trials left in the budget; above 10^18 if there is no budget."""
         return self._end - self._session.trials_made
 
-    def _trials_left(self, wanted: int) -> int:
-        """Return how many of ``wanted`` trials the budget allows.
+    def _trials_left(self, count: int) -> int:
+        """Return how many of ``count`` trials the budget allows.
 
-        Raises BudgetError if ``wanted`` is above 0 and no trial is left, and CoarticError in
+        Raises BudgetError if ``count`` is above 0 and no trial is left, and CoarticError in
         another process.
         """
         if os.getpid() != self._process:
             raise CoarticError(NO_COPIES)
         left = self.trials_left
-        if left <= 0 < wanted:
+        if left <= 0 < count:
             raise BudgetError("the budget has no trial left")
-        return min(wanted, left)
+        return min(count, left)
 
 
 def objective(

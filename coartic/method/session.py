@@ -288,7 +288,7 @@ class Session:
         return self._task.robot
 
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
-        """Return the position of a hand as a CasADi expression (:meth:`Robot.symbolic_hand`).
+        """Return the position of a hand as a CasADi expression.
 
         The method counts its evaluations itself (:meth:`spend`).
 
@@ -610,10 +610,10 @@ class Session:
             ``hands`` is empty, or names a hand that is not the task's.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
-        chosen, spent = search_initial_hands(self._task, hands, model=self.model)
-        count_trials(-spent.get("initial_trials", 0) * self._of_run)
-        self._meter.add(**spent)
-        return chosen
+        sequence, counts = search_initial_hands(self._task, hands, model=self.model)
+        count_trials(-counts.get("initial_trials", 0) * self._of_run)
+        self._meter.add(**counts)
+        return sequence
 
     def _count(
         self,
@@ -629,9 +629,9 @@ class Session:
         ``rewards`` has :data:`NO_REWARD` for each failed trial; all other arguments are sums over
         the trials. An iteration counts as a Jacobian as well.
         """
-        before, meter = len(self._rewards), self._meter
+        made, meter = len(self._rewards), self._meter
         self._rewards.frombytes(rewards.tobytes())
-        meter.trials += len(self._rewards) - before
+        meter.trials += len(self._rewards) - made
         meter.movement_ticks += ticks
         meter.forward_kinematics += evaluations
         meter.corrective_iterations += iterations
@@ -695,8 +695,8 @@ class Session:
         try:
             yield
         finally:
-            spent = getattr(self._meter, counter) + time.perf_counter() - clock
-            setattr(self._meter, counter, spent)
+            total = getattr(self._meter, counter) + time.perf_counter() - clock
+            setattr(self._meter, counter, total)
 
     # Only for this project's compiled methods.
 

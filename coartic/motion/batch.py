@@ -332,16 +332,16 @@ def winding(q: Any, slot: int) -> float:
 
 
 @inner
-def are_near(slots: SlotArrays, count: int) -> bool:
+def have_small_angles(slots: SlotArrays, count: int) -> bool:
     """Return whether all link angles in the first ``count`` slots are certainly below 1e5 rad.
 
     Angles are absolute, from +x (:func:`winding`). Slots that pad the count are included
     (:func:`padded_count`).
     """
-    far = 0
+    large = 0
     for i in range(padded_count(count)):
-        far += 0 if winding(slots.q, i) < LARGEST else 1
-    return far == 0
+        large += 0 if winding(slots.q, i) < LARGEST else 1
+    return large == 0
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
@@ -364,13 +364,13 @@ _far_chains = _chains_by(cosine, sine)
 
 
 @inner
-def find_positions(slots: SlotArrays, count: int, near: bool) -> None:
+def find_positions(slots: SlotArrays, count: int, small_angles: bool) -> None:
     """Fill ``x`` and ``y`` of the first ``count`` slots for the configurations ``q``, in place.
 
     These are the positions of shoulder, joints and hand, length unit. Slots that pad the count are
-    filled as well. Pass ``near`` as True only if all absolute link angles are below 1e5 rad.
+    filled as well. ``small_angles`` may be True only if all absolute link angles are below 1e5 rad.
     """
-    if near:
+    if small_angles:
         _near_chains(slots, padded_count(count))
     else:
         _far_chains(slots, padded_count(count))

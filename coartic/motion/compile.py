@@ -291,11 +291,11 @@ def _keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
     """
     folder, config = _cache_folder(), import_numba().config
     if folder is not None:
-        before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+        previous, config.CACHE_DIR = config.CACHE_DIR, str(folder)
         try:
             compiled._cache = _MachineCode(function)
         finally:
-            config.CACHE_DIR = before
+            config.CACHE_DIR = previous
     return compiled
 
 
@@ -359,32 +359,32 @@ class _MachineCode:
         self.name = function.__name__
         self.lock: IO[bytes] | None = None  # held while this process compiles
 
-    def load_overload(self, *wanted: Any) -> Any:
+    def load_overload(self, *signature: Any) -> Any:
         """Return a signature's machine code, or None if this process is to compile it.
 
         It waits for another process that compiles the same code (:meth:`wait_for_lock`). The first
-        time that code is to be compiled, a message is logged. ``wanted`` is the signature as Numba
+        time that code is to be compiled, a message is logged. ``signature`` is as Numba
         passes it.
         """
         self.unlock()
-        code = self.load(*wanted)
+        code = self.load(*signature)
         if code is None and self.wait_for_lock():
-            code = self.load(*wanted)  # another process may have compiled it meanwhile
+            code = self.load(*signature)  # another process may have compiled it meanwhile
             if code is not None:
                 self.unlock()
         if code is None:
             _log_once("Compiling (once): this takes up to a minute.")
         return code
 
-    def load(self, *wanted: Any) -> Any:
+    def load(self, *signature: Any) -> Any:
         """Return the machine code of a signature from disk, or None if there is none.
 
         If the file cannot be opened or is damaged, the index of the function's code is emptied.
-        ``wanted`` is the signature as Numba passes it.
+        ``signature`` is as Numba passes it.
         """
         try:
             # Not load_overload, which first lists everything that Numba could compile.
-            return self.files._load_overload(*wanted)
+            return self.files._load_overload(*signature)
         except Exception:  # an unpickler may raise any error
             with contextlib.suppress(OSError):
                 self.files.flush()

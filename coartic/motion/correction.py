@@ -25,10 +25,10 @@ from coartic.motion.batch import (
     Batch,
     RobotRecord,
     SlotArrays,
-    are_near,
     arm_of,
     compact,
     find_positions,
+    have_small_angles,
     load,
     padded_count,
     robot_parameters,
@@ -84,7 +84,7 @@ def descend(
     whether all link angles are certainly below 1e5 rad in size afterwards.
     """
     ended = 0
-    far = 0
+    large = 0
     tip = len(slots.length)
     gain, free_x, free_y = robot.model.gain, robot.free_x, robot.free_y
     if pull is not None:
@@ -102,18 +102,18 @@ def descend(
         slots.q[1, i] = y if going else slots.q[1, i]
         for k in range(tip):
             dx, dy = joint_lever(slots.x[:, i], slots.y[:, i], k, tip)
-            before = slots.q[BASE_DOF + k, i]
-            turned = before + gain * (dx * error_x + dy * error_y)
+            angle = slots.q[BASE_DOF + k, i]
+            turned = angle + gain * (dx * error_x + dy * error_y)
             if pull is not None:
                 turned += slots.pull[BASE_DOF + k, i]
-            moved |= turned != before
-            slots.q[BASE_DOF + k, i] = turned if going else before
+            moved |= turned != angle
+            slots.q[BASE_DOF + k, i] = turned if going else angle
         # A stationary point outside the goal, which the process will not leave.
         stuck = going & (not moved)
         slots.status[i] = _STUCK if stuck else slots.status[i]
         ended += 0 if (going & moved) | (i >= count) else 1
-        far += 0 if winding(slots.q, i) < trigonometry.LARGEST else 1
-    return ended, far == 0
+        large += 0 if winding(slots.q, i) < trigonometry.LARGEST else 1
+    return ended, large == 0
 
 
 @inlined
@@ -134,13 +134,13 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
     """
     slots, iteration = batch.slots[0], 0
     square = largest_square(robot.model.correction_tolerance)
-    near = are_near(slots, count)
+    small_angles = have_small_angles(slots, count)
     while count > 0:
-        find_positions(slots, count, near)
+        find_positions(slots, count, small_angles)
         _find_statuses(slots, count, square)
         ended = count
         if iteration < robot.model.max_iterations:
-            ended, near = descend(slots, count, robot, batch.runs, pull)
+            ended, small_angles = descend(slots, count, robot, batch.runs, pull)
         if ended > 0:
             for slot in range(count - 1, -1, -1):
                 if slots.status[slot] == GOING and iteration < robot.model.max_iterations:

@@ -155,9 +155,9 @@ def search_initial_hands(
     if not task.initial_is_policy:
         return task.initial_hands, {}
     ordered = tuple(hand for hand in HANDS if hand in allowed)
-    chosen, spent = _search_by_policy(task.model_dump_json(), ordered, model)
-    count_trials(spent["initial_trials"])
-    return chosen, spent
+    sequence, counts = _search_by_policy(task.model_dump_json(), ordered, model)
+    count_trials(counts["initial_trials"])
+    return sequence, counts
 
 
 @lru_cache(maxsize=64)

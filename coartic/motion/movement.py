@@ -118,10 +118,10 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
     distance = np.sqrt(_single(square))
     gap = distance * _LESS - _single(rim)
     toward, turn = _single(closing), _single(bend) * distance
-    twice = (gap + gap) * distance
-    root = np.sqrt(toward * toward + turn * twice)
+    double = (gap + gap) * distance
+    root = np.sqrt(toward * toward + turn * double)
     approaching = toward > _NOTHING
-    path = twice if approaching else root - toward
+    path = double if approaching else root - toward
     rate = toward + root if approaching else turn
     curved = path / (rate + _UNDERFLOW)
     steps = max(gap * _single(slowness), curved) * _FEWER
@@ -136,7 +136,7 @@ def divide_steps(slots: SlotArrays, count: int, step: float) -> bool:
     which :func:`start` has filled with its square, becomes the distance. Return whether all link
     angles certainly stay below 1e5 rad in size (:func:`winding`).
     """
-    far = 0
+    large = 0
     for i in range(padded_count(count)):
         distance = math.sqrt(slots.distance[i])
         per_step = step / distance if distance > 0.0 else 0.0
@@ -157,12 +157,12 @@ def divide_steps(slots: SlotArrays, count: int, step: float) -> bool:
         slots.step[i], slots.last[i] = 0.0, last if last < math.inf else 0.0
         # A joint turns at most as far as at the farther end, plus a step if it overshoots.
         angle = winding(slots.start, i) + winding(slots.target, i) + step * len(slots.length)
-        far += 0 if angle < trigonometry.LARGEST else 1
+        large += 0 if angle < trigonometry.LARGEST else 1
         size = reach * (1.0 + angle) + step
         for j in range(BASE_DOF):
             size += abs(slots.start[j, i]) + abs(slots.target[j, i]) + abs(slots.shoulder[j, i])
         slots.clearance[i] = _CLEARANCE + _ROUNDING * len(slots.x) * size
-    return far == 0
+    return large == 0
 
 
 @inner
@@ -216,8 +216,8 @@ def check(slots: SlotArrays, count: int, stop_on_arrival: bool, rims: Any, squar
         status = _MISSED if stop else GOING
         status = _IN_GOAL if to_goal <= squares[0] else status
         # The hand is outside both discs at every step up to step + clear.
-        after = min(slots.step[i] + 1.0 + np.floor(min(clear, slots.last[i])), slots.last[i])
-        slots.step[i] = after if status == GOING else slots.step[i]
+        next_step = min(slots.step[i] + 1.0 + np.floor(min(clear, slots.last[i])), slots.last[i])
+        slots.step[i] = next_step if status == GOING else slots.step[i]
         slots.status[i] = status
         ended += 0 if (status == GOING) | (i >= count) else 1
     return ended
@@ -233,17 +233,17 @@ def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotReco
     slots, evaluations, step = batch.slots[0], 0, robot.model.step
     rims = robot.radius, robot.model.arrival_tolerance
     squares = largest_square(rims[0]), largest_square(rims[1])
-    near = divide_steps(slots, count, step)
+    small_angles = divide_steps(slots, count, step)
     if stop_on_arrival:
         for j in range(len(slots.q)):
             fill_row(slots.q[j], slots.target[j])
-        find_positions(slots, count, near)
+        find_positions(slots, count, small_angles)
         fill_row(slots.end[0], slots.x[-1])
         fill_row(slots.end[1], slots.y[-1])
         evaluations += 1
     while count > 0:
         _place_between(slots, count, step)
-        find_positions(slots, count, near)
+        find_positions(slots, count, small_angles)
         evaluations += 1
         ended = check(slots, count, stop_on_arrival, rims, squares)
         if ended == 0:

@@ -283,7 +283,7 @@ def movements_in(
         movements: list[Movement] = []
         of_goals = zip(of_trial, *[column[n] for column in columns], strict=True)
         for g, (of_goal, side, hit, total, corrections, moved) in enumerate(of_goals):
-            goal, hand, before = g + 1, HANDS[side], len(movements)
+            goal, hand, start = g + 1, HANDS[side], len(movements)
             for m, movement in enumerate(of_goal):
                 if movement is not None and moved[m]:
                     target = targets[n, g, m]
@@ -294,7 +294,7 @@ def movements_in(
                 movements.append(Movement(goal, hand, "corrective", corrected, ticks))
             if not hit:
                 break
-            if len(movements) == before:  # hit without a movement: record the hand
+            if len(movements) == start:  # hit without a movement: record the hand
                 movements.append(
                     Movement(goal, hand, "corrective", accounts["q"][n, g, 0, :dof], 0)
                 )
@@ -309,7 +309,7 @@ def _execute_with_paths(compiled: CompiledTask, plan: Plan) -> Execution:
     model = compiled.model.for_radius(task.radius)
     executed, goals = list[Movement](), np.zeros(len(plan), account_type(width_of(task.robot)))
     for number, (goal, movements) in enumerate(zip(task.goals, plan, strict=True), 1):
-        hand, before = movements[0].hand, len(executed)
+        hand, start = movements[0].hand, len(executed)
         aim, checks = (hand, goal, task.radius), movements[0].kind == "corrective"
         iterations, evaluations = 0, int(checks)
         hit = checks and move(task.robot, q, q, *aim, model=model).hit
@@ -330,7 +330,7 @@ def _execute_with_paths(compiled: CompiledTask, plan: Plan) -> Execution:
             q, hit, evaluations = moved.q, moved.hit, evaluations + moved.evaluations
             if hit or movement.target is None:
                 break
-        if hit and len(executed) == before:  # hit without a movement: record the hand
+        if hit and len(executed) == start:  # hit without a movement: record the hand
             executed.append(Movement(number, hand, "corrective", q.copy(), 0))
         account = goals[number - 1]
         account["q"][: len(q)], account["hand"], account["hit"] = q, HANDS.index(hand), hit
@@ -376,15 +376,15 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
     reached : ndarray, shape (G, dof)
         The configuration at each hit.
     """
-    travel, before = 0.0, task.q0
+    travel, previous = 0.0, task.q0
     for hand, q in zip(hands, reached, strict=True):
         joints = task.robot.joints("right" if hand == "left" else "left")
         square = 0.0
         # Added in this order, because the rounding of a BLAS dot product depends on the processor.
-        for difference in (q[joints] - before[joints]).tolist():
+        for difference in (q[joints] - previous[joints]).tolist():
             square += difference * difference
         travel += math.sqrt(square)
-        before = q
+        previous = q
     return travel
 
 
@@ -450,8 +450,8 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
     if waypoints is not None:
         raise SolutionError(f"a {kind} movement cannot have waypoints; only a path can")
     if target is not None:
-        held = _check_point(task, target)
-        return movement if held is target else replace(movement, target=held)
+        point = _check_point(task, target)
+        return movement if point is target else replace(movement, target=point)
     if kind != "corrective":
         raise SolutionError(f"a {kind} movement needs a target")
     return movement
@@ -468,11 +468,11 @@ def _check_point(task: Task, point: Any) -> Array:
     # The length is quick to compute; with a NaN entry it is not below any limit.
     if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
         point = configuration(task.robot, point)
-    held: Array = point
+    array: Array = point
     for k in map("xy".index, task.locked_base):
-        if held[k] != task.q0[k]:
-            return _hold_base(task, held.copy())
-    return held
+        if array[k] != task.q0[k]:
+            return _hold_base(task, array.copy())
+    return array
 
 
 def _hold_base(task: Task, points: Array) -> Array:

@@ -299,12 +299,12 @@ def _are_within(targets: Any) -> bool:
     ``targets`` has shape ``(G, M, dof)``; NaN, a joint that stays, is within
     (:data:`LARGEST_ENTRY`).
     """
-    far = 0
+    large = 0
     for g in range(targets.shape[0]):
         for m in range(targets.shape[1]):
             for j in range(targets.shape[2]):
-                far += abs(targets[g, m, j]) > LARGEST_ENTRY
-    return far == 0
+                large += abs(targets[g, m, j]) > LARGEST_ENTRY
+    return large == 0
 
 
 @inlined
