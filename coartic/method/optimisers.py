@@ -152,14 +152,14 @@ class Objective:
         sequences = sequences_of(session) if hands is None else [hands]
         sequences = sequences[: self._trials_left(len(sequences))]
         shape = (len(sequences), session.goals_count, session.dof)
-        trials = session.trials(sequences, np.full(shape, np.nan))
-        best = int(trials.rewards.argmax())
-        if not trials.completed[best]:
+        outcomes = session.trials(sequences, np.full(shape, np.nan))
+        best = int(outcomes.rewards.argmax())
+        if not outcomes.completed[best]:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
         self._hands = sequences[best]
         self.joints = np.tile(explored_joints(session), (session.goals_count, 1))
         """True for entries that have a target in a point, shape ``(G, dof)``."""
-        self.configurations: Array = trials.reached[best].copy()
+        self.configurations: Array = outcomes.reached[best].copy()
         """Configurations in which the corrective process on its own hits the goals, shape ``(G,
         dof)``."""
         self._codes = session.hand_codes(self.hands, 1)
@@ -170,10 +170,10 @@ class Objective:
         self.bounds: Array = self.x0[:, None] + np.array([-half_width, half_width])
         """A box to search in, shape ``(dim, 2)``; points outside the box are evaluated as well."""
         self._evaluations = 0
-        self._best_cost = float(min(-trials.rewards[best], FAILED))
+        self._best_cost = float(min(-outcomes.rewards[best], FAILED))
         self._best_hands = self.hands
         self._best_x: Array = np.full(self.dim, np.nan)
-        self._best_targets = trials.targets[best].copy()
+        self._best_targets = outcomes.targets[best].copy()
         self._improvements = [(0, self._best_cost)]
 
     def __reduce__(self) -> Any:
