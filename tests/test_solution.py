@@ -76,7 +76,7 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
         ([Movement(1, "right", "jump", np.zeros(10))], "kind of a movement is 'jump'"),
         ([Movement(1, "right", "path", waypoints=[])], "a path needs waypoints"),
         ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),
-        ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "must be None or its last waypoint"),
+        ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "or its last waypoint"),
         (
             [Movement(1, "right", "planned", WAY[0], waypoints=WAY)],
             "movement cannot have waypoints",

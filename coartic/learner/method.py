@@ -224,9 +224,9 @@ class CustomDualProcess(DualProcess):
     )
 
     def rules(self) -> ExplorationCondition:
-        """Return the paper's condition that ``base`` names with the fields that are not None.
+        """Return the paper's condition ``base`` with the changed fields.
 
-        Its id is such as ``EC4, changed,``.
+        Fields whose parameter is None are not changed. The id is for example ``EC4, changed,``.
         """
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
         return _condition_of(base, self.parameters)

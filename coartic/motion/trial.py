@@ -359,7 +359,7 @@ def _reach_lot(
 
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any) -> None:
-    """Let every arm reach for its goals, as many at once as a batch has runs.
+    """Let every arm reach for its goals, as many at once as the batch holds.
 
     ``goals``, ``counts`` and ``rewards`` are the entries of :class:`Accounts`, filled in place; the
     caller sets ``counts`` to 0. ``arrays`` are the entries of :class:`Requests`, followed by the

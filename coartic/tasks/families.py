@@ -374,8 +374,9 @@ def instance_of(family: Family, address: Address) -> Task:
 def instance(name: str) -> Task:
     """Return an instance of a family, a task, by its name.
 
-    The name is such as ``two-armed/v1/i017``, or ``mine.v1.toml/i017`` for the family of a file.
-    The last 4096 instances are cached. Raises TaskError if the instance does not exist.
+    Examples of names are ``two-armed/v1/i017`` and, for the family of a file,
+    ``mine.v1.toml/i017``. The last 4096 instances are cached. Raises TaskError if the instance does
+    not exist.
     """
     family, _, short = name.rpartition("/")
     address = address_of(f"{load_family(family).name}/{short}" if is_file(family) else name)

@@ -206,7 +206,7 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family with its version, if the task is named as an instance.
+        """Name of the family with its version, if the task has the name of an instance.
 
         Otherwise None.
         """
