@@ -290,8 +290,8 @@ class Trial {
 function make_trial(problem, hands, targets) {
   const trial = new Trial(problem);
   for (let goal = 0; trial.going && goal < problem.goals.length; goal += 1) {
-    const given = targets[goal];
-    const target = given && given.map((value, j) => (Number.isNaN(value) ? trial.q[j] : value));
+    const requested = targets[goal];
+    const target = requested && requested.map((value, j) => (Number.isNaN(value) ? trial.q[j] : value));
     trial.reaches(goal, hands[goal], target);
   }
   return trial;

@@ -146,8 +146,8 @@ class Play {
   stored(who) {
     const run = (this.preset.runs || []).find(({ id }) => id === who);
     const { goals, others } = this.state;
-    const kept = same(goals, this.preset.task.goals) && (!others || same(others, this.preset.others));
-    return run && kept ? run : null;
+    const unchanged = same(goals, this.preset.task.goals) && (!others || same(others, this.preset.others));
+    return run && unchanged ? run : null;
   }
 
   /* The learner's condition. */
@@ -241,8 +241,8 @@ class Play {
   /* What each run of a robot has learned after the trials shown. Unfinished runs other than the first are left out. */
   practised(k) {
     const keys = Array.from({ length: SEEDS }, (_, seed) => `${k} run ${seed}`);
-    const there = keys.filter((each, seed) => this.fresh.has(each) && (this.results.get(each).done || !seed));
-    return there.map((each) => this.snapshot(each)).filter(Boolean);
+    const finished = keys.filter((key, seed) => this.fresh.has(key) && (this.results.get(key).done || !seed));
+    return finished.map((key) => this.snapshot(key)).filter(Boolean);
   }
 
   get shown() {
@@ -558,8 +558,8 @@ class Play {
     if (!difference) return [""];
     const { deviations, distance, runs } = difference;
     if (distance < 0.005) return ["At goal 1 both robots have the same posture."];
-    const several = state.who === "learner" || (this.stored(state.who) && runs > 1);
-    if (!several) return [`At goal 1 the posture difference is ${short(distance)}.`, far];
+    const hasRuns = state.who === "learner" || (this.stored(state.who) && runs > 1);
+    if (!hasRuns) return [`At goal 1 the posture difference is ${short(distance)}.`, far];
     const by_chance = this.stored(state.who) && this.preset.by_chance;
     const random = Number.isFinite(by_chance) ? ` (random search: ${by_chance.toFixed(1)})` : "";
     return [
@@ -661,8 +661,8 @@ class Play {
       return Object.assign(handle, { at, move });
     });
     const layer = this.find("handles");
-    const there = [...layer.children];
-    if (there.length !== shown.length || shown.some((handle, k) => handle !== there[k])) layer.replaceChildren(...shown);
+    const current = [...layer.children];
+    if (current.length !== shown.length || shown.some((handle, k) => handle !== current[k])) layer.replaceChildren(...shown);
   }
 
   handle(name) {
@@ -745,8 +745,8 @@ class Play {
     const free = problem.free.flatMap((each, axis) => (each ? [axis] : []));
     /* Use the joints beyond the part that was moved, or otherwise all joints. */
     const settle = (from) => [joints(mine, from, mine.links.length), [...free, ...joints(mine, 0, mine.links.length)]].some((some) => {
-      const there = [...q];
-      return bring_within(problem, there, problem.goals[goal], hand, some, 0.9 * problem.radius) && Object.assign(q, there);
+      const posture = [...q];
+      return bring_within(problem, posture, problem.goals[goal], hand, some, 0.9 * problem.radius) && Object.assign(q, posture);
     });
     if (part === "base") {
       free.forEach((axis) => { q[axis] = to[axis]; });
@@ -813,9 +813,9 @@ class Play {
     on("announced", "click", () => {
       const { moved, state } = this;
       const [from, to] = state.goals.slice(moved - 1);
-      const way = [to[0] - from[0], to[1] - from[1]];
-      const length = Math.hypot(...way) / this.unit || 1;
-      Object.assign(state, { goals: state.goals.with(moved, this.within([to[0] - way[1] / length, to[1] + way[0] / length])), others: null, announced: [to], tick: -1 });
+      const path = [to[0] - from[0], to[1] - from[1]];
+      const length = Math.hypot(...path) / this.unit || 1;
+      Object.assign(state, { goals: state.goals.with(moved, this.within([to[0] - path[1] / length, to[1] + path[0] / length])), others: null, announced: [to], tick: -1 });
       this.playing = false;
       this.ask();
       this.keep();
@@ -864,13 +864,13 @@ class Play {
      reach of the robot and not too close to another goal. */
   spot(list, wish) {
     const [stride, last, before = [last[0] - 1, last[1]]] = [STRIDE * this.problems[0].scale, list.at(-1), list.at(-2)];
-    const way = Math.atan2(last[1] - before[1], last[0] - before[0]);
-    const turned = [2, -2, 3, -3, 1, -1, 4, -4, 0, 5, -5, 6].map((k) => way + (k * Math.PI) / 6);
-    const taken = [...this.state.goals, ...(this.state.others || []), ...list];
-    const places = [...(wish ? [wish] : []), ...turned.map((angle) => [last[0] + stride * Math.cos(angle), last[1] + stride * Math.sin(angle)])].map((to) => this.within(to));
+    const angle = Math.atan2(last[1] - before[1], last[0] - before[0]);
+    const turned = [2, -2, 3, -3, 1, -1, 4, -4, 0, 5, -5, 6].map((k) => angle + (k * Math.PI) / 6);
+    const goals = [...this.state.goals, ...(this.state.others || []), ...list];
+    const places = [...(wish ? [wish] : []), ...turned.map((direction) => [last[0] + stride * Math.cos(direction), last[1] + stride * Math.sin(direction)])].map((to) => this.within(to));
     return places.find((place) => {
       const problem = problem_of(this.taskWith([...list, place]));
-      return taken.every((goal) => Math.hypot(goal[0] - place[0], goal[1] - place[1]) >= stride / 2) && corrective_trial(problem, initial_hands(problem)).going;
+      return goals.every((goal) => Math.hypot(goal[0] - place[0], goal[1] - place[1]) >= stride / 2) && corrective_trial(problem, initial_hands(problem)).going;
     }) || places[0];
   }
 
@@ -880,8 +880,8 @@ class Play {
     const { state } = this;
     if (!this.data.presets[state.preset]) state.preset = this.first.preset;
     const { task, others = null } = this.preset;
-    const most = Math.max(MOST_GOALS, task.goals.length);
-    const places = (name) => state[name] && state[name].filter((row) => row.length === 2).slice(0, most).map((place) => this.within(place));
+    const limit = Math.max(MOST_GOALS, task.goals.length);
+    const places = (name) => state[name] && state[name].filter((row) => row.length === 2).slice(0, limit).map((place) => this.within(place));
     const [goals, second, announced] = ["goals", "others", "announced"].map(places);
     state.goals = goals && goals.length ? goals : task.goals;
     state.others = second ? (second.length && state.goals.length > 1 ? second : null) : others;
@@ -914,7 +914,7 @@ class Play {
     state.edited = Math.max(1, Math.min(Math.round(state.edited), state.goals.length));
     const { who, goals, others, explores, trials, drift, ahead, edited } = state;
     const runs = preset.runs || [];
-    const one = preset.task.hands.length < 2;
+    const hasOneHand = preset.task.hands.length < 2;
     const changed = !same([goals, others], [preset.task.goals, preset.others || null]);
     fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
     fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => counted(ticks, "tick")).join(" and ")}`])]);
@@ -931,8 +931,8 @@ class Play {
     this.find("why").textContent = (few && "The only goal cannot be removed, and has no next goal.") || (full && `A task can have at most ${MOST_GOALS} goals here.`) || "";
     const other = who !== "learner";
     this.set("hidden", {
-      runs: !runs.length, dial: other, "for-learner": other, "for-dial": other, "for-two": other || one,
-      "for-plan": who !== "plan", "for-you": who !== "you", "by-hand": one,
+      runs: !runs.length, dial: other, "for-learner": other, "for-dial": other, "for-two": other || hasOneHand,
+      "for-plan": who !== "plan", "for-you": who !== "you", "by-hand": hasOneHand,
     });
   }
 
