@@ -131,8 +131,8 @@ def mean(values: ArrayLike) -> Estimate:
     Returns
     -------
     Estimate
-        The mean with the interval of :func:`mean_of_means`; its ends are NaN for fewer than three
-        values.
+        The mean with the interval of :func:`mean_of_means`; its ends are NaN for fewer than
+        :data:`FEWEST` values.
 
     Raises
     ------
