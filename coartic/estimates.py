@@ -160,7 +160,7 @@ def difference_of_means(first: ArrayLike, second: ArrayLike) -> Estimate:
     -------
     Estimate
         The difference with the interval of :func:`mean_of_means`; its ends are NaN if a sample has
-        fewer than three values.
+        fewer than :data:`FEWEST` values.
 
     Raises
     ------
