@@ -178,7 +178,7 @@ def run_blocks(name, description, folder, text, method_files=()):
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(f"{head}runs = 3\ntrials = 10_000\ntime_limit_s = 3600\n{text}", "utf-8")
     registered = registry(method_files)
-    print(perform(plan(load_suite(file), request_for(), registered), folder), flush=True)
+    print(perform(plan(load_suite(str(file)), request_for(), registered), folder), flush=True)
     return load(folder)
 
 
@@ -266,9 +266,9 @@ def main(folder="results/noise"):
     folder = Path(folder)
     for suite in ("comparison", "families"):
         execute_order(shipped(suite, folder), folder / "order")
-    execute_why(shipped("families", folder), folder / "why")
     run_memory(folder / "memory")
     run_learning(folder / "learning")
+    execute_why(shipped("families", folder), folder / "why")
 
 
 if __name__ == "__main__":
