@@ -27,6 +27,13 @@ OPEN_LOOP = "posture QP"
 HEADLINE = ("CMA-ES", "learner")
 
 
+def is_paper_condition(rows):
+    """Return for each row True unless the learner has the condition of the other number of arms:
+    EC1 is for one-armed tasks, EC4 for the others."""
+    one_arm = rows.task.isin(["ascending", "descending"]) | rows.task.str.startswith("one-armed/")
+    return ~(rows.method.str.contains("EC4") & one_arm | rows.method.str.contains("EC1") & ~one_arm)
+
+
 def read(folder):
     """Return the executions of the methods in :data:`NAMES`, with the gap of each run in per cent
     of the best known ticks without noise.
@@ -39,9 +46,7 @@ def read(folder):
     rows["name"] = rows.method.map(NAMES)
     rows["family"] = rows.task.str.partition("/")[0].where(rows.task.str.contains("/"))
     rows["group"] = np.where(rows.family.isna(), "paper", "families")
-    one_arm = rows.task.isin(["ascending", "descending"]) | (rows.family == "one-armed")
-    wrong = rows.method.str.contains("EC4") & one_arm | rows.method.str.contains("EC1") & ~one_arm
-    rows = rows[~wrong].copy()
+    rows = rows[is_paper_condition(rows)].copy()
     gap = 100 * (rows.ticks + rows.best_known) / -rows.best_known
     rows["gap"] = gap.where(rows.failures == 0)
     noise = ["group", "motor_noise", "signal_dependent"]
