@@ -19,7 +19,7 @@ def read(folder):
     rows = rows[rows.setting.isna() & is_paper_condition(rows)]
     ticks = rows.ticks.where(rows.failures == 0)
     column = rows.target + np.where(rows.motor_noise > 0, "1", "0")
-    table = rows.assign(ticks=ticks, column=column).pivot(
+    table = rows.assign(ticks=ticks, column=column).pivot(  # noqa: PD010
         index=["run_id", "task", "method", "off"], columns="column", values="ticks"
     )
     return table.reset_index().assign(
