@@ -107,3 +107,18 @@ def tabulate_pairs(rows, resamples=RESAMPLES):
     table["verdict"] = [*map(common, table.constant, table.dependent)]
     table["open_loop"] = table.index.str.contains(OPEN_LOOP)
     return table
+
+
+def tabulate_families(rows):
+    """Return by how much CMA-ES is ahead of the learner in each family at each level of constant
+    noise: percentage points of gap with an interval for other tasks, the median task, and on how
+    many tasks it is ahead. This is a description: the rules judge all families together."""
+    rows, table = rows[(rows.group == "families") & ~rows.signal_dependent], []
+    for level, of_level in rows.groupby("motor_noise"):
+        gaps = of_level.pivot_table("gap", ["family", "task"], "name")
+        for family, of_family in (gaps["learner"] - gaps["CMA-ES"]).groupby("family", sort=False):
+            lead = other_tasks({family: [np.array([value]) for value in of_family]})
+            row = {"family": family, "motor_noise": level} | lead.columns("lead")
+            ahead = int((of_family > 0).sum())
+            table.append(row | {"median": of_family.median(), "ahead": ahead, "tasks": lead.n[0]})
+    return pd.DataFrame(table)
