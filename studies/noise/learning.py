@@ -93,7 +93,7 @@ def read_learning(folder):
     The best reward is that of any run of the study at s = 0 on random tasks, and the best known on
     the paper's tasks. A run with failed executions has the largest gap of its group.
     """
-    rows = _rows(folder)
+    rows = pd.concat([_rows(folder / part) for part in ("learning-executed", "handler-executed")])
     stages = rows.setting.str.extract(r"stages=(\d+)")[0].fillna("")
     rows["name"] = (rows.method + " " + stages).str.strip().map(METHODS)
     noisy = rows.setting.str.contains(r"noise_sd|sigma")

@@ -237,12 +237,20 @@ def run_learning(folder, instances="i160..i169"):
                           grid=f"{{ motor_noise = [0.0, {AFTER}] }}")  # fmt: skip
     files = [HERE / "in_noise.py"]
     study = run_blocks("noise-learning", "Learning in motor noise", folder, text, files)
+    execute_learned(study, folder.parent / "learning-executed")
     told = study.runs[(study.runs.method == "cma-es/in-noise") & (study.runs.setting == "")]
+    text = ""
     for task, of_task in told.groupby("task", sort=False):
         hands = of_task.hands.value_counts().index[0]
         text += block([task], "cma-es/noise-handler", runs=len(of_task),
                       parameters=f'{{ hands = "{hands}" }}')  # fmt: skip
-    study = run_blocks("noise-learning", "Learning in motor noise", folder, text, files)
+    folder = folder.with_name("handler")
+    study = run_blocks("noise-handler", "Learning with a noise handler", folder, text, files)
+    execute_learned(study, folder.parent / "handler-executed")
+
+
+def execute_learned(study, folder):
+    """Execute the best trials and the next actions of a study's runs (question 4)."""
     replays = study.movements("replay")
 
     def rows_of(task, solutions):
@@ -258,7 +266,7 @@ def run_learning(folder, instances="i160..i169"):
             ]
         )
 
-    by_task(study, folder.parent / "learning-executed", lambda method: True, rows_of)
+    by_task(study, folder, lambda method: True, rows_of)
 
 
 def main(folder="results/noise"):
@@ -266,9 +274,9 @@ def main(folder="results/noise"):
     folder = Path(folder)
     for suite in ("comparison", "families"):
         execute_order(shipped(suite, folder), folder / "order")
+    execute_why(shipped("families", folder), folder / "why")
     run_memory(folder / "memory")
     run_learning(folder / "learning")
-    execute_why(shipped("families", folder), folder / "why")
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ def executions_of(folder):
     with the ``question`` that asks for it."""
     parts = {"order": "order", "why": "why"}
     parts |= {"memory-executed": "memory", "learning-executed": "learning"}
+    parts |= {"handler-executed": "learning"}
     tables = []
     for part, question in parts.items():
         rows = pd.concat([pd.read_csv(path) for path in sorted((folder / part).glob("*.csv"))])
@@ -50,7 +51,7 @@ def measure(folder):
     learner = runs[runs.method.str.startswith("dual-process/")]
     values = learning.read_memory(folder / "memory-executed", learner)
     memory, verdicts = learning.tabulate_memory(values)
-    learned = learning.read_learning(folder / "learning-executed")
+    learned = learning.read_learning(folder)
     pairs = learning.tabulate_learning_pairs(learned)
     return {
         "runs": executions_of(folder),
@@ -60,10 +61,10 @@ def measure(folder):
         "pairs": order.tabulate_pairs(rows),
         "why": why.tabulate_why(why.read(folder / "why")),
         "memory": memory.set_index("group"),
-        "memory-verdicts": verdicts,
+        "memory_verdicts": verdicts,
         "learning": learning.tabulate_learning(learned).set_index("group"),
         "practice": learning.tabulate_practice(learned).set_index("group"),
-        "learning-pairs": pairs,
+        "learning_pairs": pairs,
     }
 
 

@@ -270,7 +270,9 @@ def learning_rows(gaps):
 
 def test_planted_practice_and_order_are_found(tmp_path):
     rows = learning_rows({"CMA-ES": (10.0, 40.0), "learner": (20.0, 30.0)})
-    rows.to_csv(tmp_path / "rows.csv", index=False)
+    for part, some in (("learning", rows[10:]), ("handler", rows[:10])):
+        (tmp_path / f"{part}-executed").mkdir()
+        some.to_csv(tmp_path / f"{part}-executed" / "rows.csv", index=False)
     made = LEARNING.read_learning(tmp_path)
     assert (made[made.motor_noise == 0].groupby("task").gap.min() == 0).all()
     assert set(made.groupby("name").practice.nunique()) == {2}
