@@ -331,7 +331,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
           ``"cma-es/bandit noise=0.1"``;
         - ``ranked_as``: names of rows, in place of ``method`` and ``setting``;
         - ``corrective_best``: for shares;
-        - ``budget``: the number of trials that was asked for, missing for a method without trials.
+        - ``budget``: the number of trials that was asked for, missing for a method without trials;
+        - ``noisy_ticks``: mean ticks of the run's solution with motor noise, missing if executions
+          fail.
 
         ``load(folder).runs`` has all of them.
 
@@ -347,6 +349,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - ``share``, ``share_low``, ``share_high``: share of the possible gain (:func:`shares`), a
           mean over the tasks on which something can be gained, and ``without_gain``, the number of
           other tasks; only for a frame with ``corrective_best``;
+        - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: the gap of ``noisy_ticks`` to the
+          best known reward *without* noise, a mean like ``gap``; NaN if a run has none; only for a
+          frame with ``noisy_ticks``;
         - ``tasks``: number of tasks that it solved in every run; ``runs`` and ``failed``: numbers
           of runs and of failed runs;
         - ``why``: why it is not ranked, ``"1 of 2 tasks"`` or ``"6 of 9 runs failed"``; empty for a
@@ -376,7 +381,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     if "ranked_as" in there:
         frame = frame.drop(columns=["method", "setting"], errors="ignore")
         frame = frame.rename(columns={"ranked_as": "method"})
-    runs = _scored_runs(frame, *["budget"] * ("budget" in there))
+    runs = _scored_runs(frame, *(name for name in ("budget", "noisy_ticks") if name in there))
+    if "noisy_ticks" in runs:
+        runs["noisy_gap"] = gap_share(-runs.noisy_ticks, runs.best_known)
     asked = sorted(runs.budget.dropna().unique()) if "budget" in there else []
     if len(asked) > 1:
         budgets = [f"{budget:.0f}" for budget in asked]
@@ -406,6 +413,10 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
             parts = [part for _, part in solved.dropna(subset="share").groupby("task").share]
             row |= (Estimate(np.nan) if why or not parts else task_mean(parts)).columns("share")
             row["without_gain"] = len(by_task) - len(parts)
+        if "noisy_gap" in runs:
+            parts = [part for _, part in solved.groupby("task").noisy_gap]
+            fails = bool(why) or solved.noisy_gap.isna().any()
+            row |= (Estimate(np.nan) if fails else task_mean(parts)).columns("noisy_gap")
         counts = {"tasks": len(by_task), "runs": len(of_method)}
         rows.append(row | counts | {"failed": int(of_method.reward.isna().sum()), "why": why})
     methods = pd.Index([*runs.method.unique()], name="method", tupleize_cols=False)

@@ -14,6 +14,7 @@ from coartic.analysis.frames import ranking
 from coartic.analysis.methods import BY_TRIAL
 from coartic.analysis.study import Study
 from coartic.analysis.words import listed, number
+from coartic.internal.text import counted
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
@@ -98,11 +99,12 @@ def standings(study: Study) -> pd.DataFrame:
     Ranked are the methods that solved all of :func:`ranked_tasks` with :func:`ranking_budget`, the
     smallest gap first. The others follow, with the reason in ``why``; one with another number of
     trials has a gap if it solved all tasks. ``note`` says how many trials a method from a file made
-    if these are not as many as it was asked for.
+    if these are not as many as it was asked for, and of how many runs the solution can fail with
+    motor noise.
     """
     runs, budget = compared_runs(study), ranking_budget(study)
     if not len(runs):
-        return pd.DataFrame(columns=["gap", "runs", "why", "note", *study.methods])
+        return pd.DataFrame(columns=["gap", "noisy_gap", "runs", "why", "note", *study.methods])
     by_method = runs_by_method(study)
     rows = ranking(runs.drop(columns="budget")).loc[[*by_method]].join(study.methods)
     reasons, notes = [], []
@@ -115,7 +117,13 @@ def standings(study: Study) -> pd.DataFrame:
         reasons.append("; ".join(filter(None, [row.why, trials])))
         made, due = int(of_method.trials.fillna(0).max()), max([*asked, budget or 0])
         is_told = not row.built_in and row.information == BY_TRIAL and due and made != due
-        notes.append(f"made {number(made)} of {number(due)} trials" if is_told else "")
+        fragile = int((of_method.reward.notna() & of_method.noisy_ticks.isna()).sum())
+        note = [
+            f"made {number(made)} of {number(due)} trials" * bool(is_told),
+            f"{fragile} of {counted(len(of_method), 'solution')} can fail with motor noise"
+            * bool(fragile),
+        ]
+        notes.append("; ".join(filter(None, note)))
     rows = rows.assign(why=reasons, note=notes)
     return rows.sort_values(["why", "gap"], key=lambda of: of != "" if of.name == "why" else of)
 

@@ -47,6 +47,7 @@ UNITS = {
     **dict.fromkeys(["reward", "replay_reward", "initial_reward", "best_known"], "ticks"),
     **dict.fromkeys(["build_s", "solve_s", "wall_s", "cpu_s", "time_limit_s"], "s"),
     "movement_ticks": "ticks",
+    "noisy_ticks": "ticks",
     "gap": "share of the best known reward",
     "other_arm_travel": "rad",
     "process_peak_mb": "MiB",

@@ -443,7 +443,14 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
         }
         entries |= {f"on {task}": gaps.get(task, math.nan) for task in single}
         if ranked:
-            names = "share", "share_low", "share_high", "without_gain"
+            names = (
+                "without_gain",
+                *(
+                    f"{name}{end}"
+                    for name in ("share", "noisy_gap")
+                    for end in ("", "_low", "_high")
+                ),
+            )
             entries |= {name: row[name] for name in names} | {"gap_early": early[label]}
             entries |= {name: runs[name].mean() for name in ("forward_kinematics", "cpu_s")}
         else:
@@ -452,11 +459,13 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
 
 
 @table(
-    "Gap and share of the possible gain, means over {tasks}, and gap on each",
+    "Gap and share of the possible gain, means over {tasks}, and gap on each. Motor noise is added "
+    "when a solution is executed, and the gap then is to the {reference} without noise",
     """
     method             | method                            |   | tex
     gap[]              | gap (%)                           | 1 | tex
     share[]            | share of the gain (%)             | 0 | tex
+    noisy_gap[]        | gap with motor noise 0.01 (%)     | 1 | tex
     information        | use of the reward
     better             | better than the learner on (tasks)
     worse              | worse on (tasks)

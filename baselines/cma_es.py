@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
@@ -67,19 +68,20 @@ class Strategy:
         self.reward = float(first.rewards[0])
         """Best reward so far; -inf where **A** did not complete the sequence."""
         self._mean: Array = first.reached[0, attempts.explored]
-        self._evolution: EvolutionStrategy | None = None
+        self.evolution: EvolutionStrategy | None = None
+        """The present strategy; None before the first generation."""
 
     def generation(self) -> None:
         """Make the trials of one generation of CMA-ES, or as many as are left (at least one must
         be), and, if the generation is complete, update CMA-ES from their rewards. Where CMA-ES has
         ended, it first restarts with twice the population. To be called only if the corrective
         process completes the hand sequence."""
-        evolution = self._evolution
+        evolution = self.evolution
         if evolution is None or evolution.has_ended():
             default = 4 + int(3 * math.log(len(self._mean)))
             size = default if evolution is None else 2 * evolution.size
             evolution = EvolutionStrategy(self._mean, self.sigma, size, self._rng)
-            self._evolution = evolution
+            self.evolution = evolution
         values = evolution.ask()[: self._attempts.left]
         rewards = self._attempts.around(self.hands, values).rewards
         self.generations += 1
@@ -89,6 +91,27 @@ class Strategy:
             completed = rewards > -math.inf
             worst = rewards[completed].min() if completed.any() else 0.0
             evolution.tell(values, np.where(completed, -rewards, 1.0 - worst))
+
+
+def spend_trials(strategies: Sequence[Strategy], attempts: Attempts, exploration: float) -> None:
+    """Let strategies make generations until no trial of ``attempts`` is left.
+
+    The next generation comes from the strategy with the highest upper confidence bound (UCB1). Its
+    c is ``exploration`` times the range of the strategies' first rewards. Strategies whose hand
+    sequence the corrective process did not complete make no generation.
+    """
+    promising = [strategy for strategy in strategies if strategy.reward > -math.inf]
+    rewards = [strategy.reward for strategy in promising] or [0.0]
+    width = exploration * max(max(rewards) - min(rewards), 1.0)
+    generations = len(promising)
+
+    def bound(strategy: Strategy) -> float:
+        doubt = math.sqrt(2.0 * math.log(generations) / strategy.generations)
+        return strategy.reward + width * doubt
+
+    while promising and attempts.left > 0:
+        max(promising, key=bound).generation()
+        generations += 1
 
 
 class CMAES(Method):
@@ -116,18 +139,7 @@ class CMAES(Method):
                 Strategy(session, attempts, hands, self.parameters.sigma)
                 for hands in sequences_of(session)[: attempts.left]
             ]
-            promising = [s for s in strategies if s.reward > -math.inf]
-            first = [strategy.reward for strategy in promising] or [0.0]
-            width: float = self.parameters.exploration * max(max(first) - min(first), 1.0)
-            generations = len(promising)
-
-            def bound(strategy: Strategy) -> float:
-                doubt = math.sqrt(2.0 * math.log(generations) / strategy.generations)
-                return strategy.reward + width * doubt
-
-            while promising and attempts.left > 0:
-                max(promising, key=bound).generation()
-                generations += 1
+            spend_trials(strategies, attempts, self.parameters.exploration)
         return attempts.result(trials={s.hands: s.trials for s in strategies})
 
 

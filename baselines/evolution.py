@@ -108,6 +108,16 @@ class EvolutionStrategy:
         self._best, self._best_point = math.inf, 0
         self._flat = 0
 
+    @property
+    def mean(self) -> Array:
+        """Mean of the next generation, shape ``(dim,)``."""
+        return self._mean.copy()
+
+    @property
+    def costs(self) -> Array:
+        """Costs of the last generation that was told, sorted, shape ``(size,)``; empty before."""
+        return self._costs
+
     def ask(self) -> Array:
         """Draw and return the points of the next generation, shape ``(size, dim)``."""
         if self._generation >= self._decomposed + self._gap:

@@ -116,8 +116,8 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
 
 def compare_runs(a: Run, b: Run) -> list[str]:
     """Return the differences between the results of two runs, in words, an empty list for equal
-    results: status, reason, details, counts, movements and rewards. Rewards that a run does not
-    keep do not count."""
+    results: status, reason, details, counts, ticks with motor noise, movements and rewards. Rewards
+    that a run does not keep do not count."""
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
     first, second = (
@@ -127,7 +127,7 @@ def compare_runs(a: Run, b: Run) -> list[str]:
     )
     changes = [
         f"{name}: {brief_value(first[name])} against {brief_value(second[name])}"
-        for name in ("status", "reason", "details", *Meter.COUNTS)
+        for name in ("status", "reason", "details", "noisy_ticks", *Meter.COUNTS)
         if first[name] != second[name]
     ]
     for part in PARTS:

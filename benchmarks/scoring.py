@@ -5,11 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from coartic.benchmarks.provenance import current_environment, now
 from coartic.internal.text import LONGEST_REASON, plain
+from coartic.motion.noise import execute_noisy
 from coartic.motion.solution import Execution, other_arm_travel
 from coartic.runs.plan import Job
-from coartic.runs.record import Outcome, Run, Score, execute_all
+from coartic.runs.record import (
+    MOTOR_NOISE,
+    NOISY_EXECUTIONS,
+    Outcome,
+    Run,
+    Score,
+    execute_all,
+)
 from coartic.tasks.task import Task, hands_of
 
 
@@ -34,7 +44,31 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
         )
         scores = {part: _score_of(task, part, each) for part, each in parts.items() if is_ok}
         runs.append(Run(replace(job, numbers=(number,)), final, scores, now()))
-    return runs
+    return with_noise(runs)
+
+
+def with_noise(runs: Sequence[Run]) -> list[Run]:
+    """Return runs of one task whose solutions have ``noisy_ticks``.
+
+    Each solution is executed with motor noise from a seed that is made from the id of its run, so
+    the number does not depend on the other runs.
+    """
+    solved = {run.id: run for run in runs if "solution" in run.scores}
+    seeds = [int(run_id.partition("-")[0], 16) for run_id in solved]
+    solutions = [run.solution.movements for run in solved.values()]
+    noisy = dict[str, float]()
+    if solved:
+        task = runs[0].cell.task
+        ticks = execute_noisy(task, solutions, MOTOR_NOISE, NOISY_EXECUTIONS, seeds)
+        noisy = dict(zip(solved, ticks.mean(axis=1).tolist(), strict=True))
+    scored = []
+    for run in runs:
+        if run.id in noisy:
+            mean = None if np.isnan(noisy[run.id]) else noisy[run.id]
+            solution = run.solution._replace(noisy_ticks=mean)
+            run = replace(run, scores=run.scores | {"solution": solution})
+        scored.append(run)
+    return scored
 
 
 def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:

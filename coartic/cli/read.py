@@ -83,6 +83,7 @@ def say_ranking(study: Study, folder: Path) -> None:
     from coartic.analysis.report.sections import limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
+    from coartic.runs.record import MOTOR_NOISE
 
     every, what = standings(study), limits(study)
     names = [
@@ -91,10 +92,11 @@ def say_ranking(study: Study, folder: Path) -> None:
     ]
     every = every.assign(name=names)
     rows, others = every[every.why == ""], every[every.why != ""]
-    heads = ["method", "gap (%)", "share (%)", "runs"] + ["note"] * any(rows.note)
+    heads = ["method", "gap (%)", "share (%)", "noisy gap (%)", "runs"]
+    heads += ["note"] * any(rows.note)
     cells = [
         [row["name"], interval(row, "gap", scale=100), interval(row, "share", 0, 100),
-         number(row["runs"]), row["note"]][: len(heads)]
+         interval(row, "noisy_gap", scale=100), number(row["runs"]), row["note"]][: len(heads)]
         for row in rows.to_dict("records")
     ]  # fmt: skip
     say_table(heads, cells)
@@ -103,7 +105,9 @@ def say_ranking(study: Study, folder: Path) -> None:
         for why, of_reason in others.groupby("why", sort=False)
     ]
     if len(rows):
-        pairs.append(("Reference", f"gaps are to the {reference(study, ranked_tasks(study))}"))
+        known = f"gaps are to the {reference(study, ranked_tasks(study))}"
+        noise = f"noisy gaps, too, of solutions executed with motor noise {MOTOR_NOISE}"
+        pairs.append(("Reference", f"{known}; {noise}"))
     if what["own"]:
         known = f"of {listed(what['own'])} only the best reward of this folder is known"
         again = "repeat the command with optimum/search among its --methods"

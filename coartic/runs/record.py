@@ -32,6 +32,11 @@ PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 """Prefixes of columns by the part of a run that the columns score: ``solution``, ``initial`` (the
 first trial of a learner) and ``replay`` (one noiseless greedy trial after learning)."""
 PARTS = tuple(PREFIXES)
+MOTOR_NOISE = 0.01
+"""Standard deviation of the motor noise with which each solution is executed when it is scored, rad
+and length unit (:func:`coartic.execute_noisy`)."""
+NOISY_EXECUTIONS = 100
+"""Number of these executions."""
 UNREPEATED = "made_again"
 """Entry of the details of a run that was made again with another result: what differs."""
 _MOST_MOVEMENTS = 10_000
@@ -56,6 +61,9 @@ class Score(NamedTuple):
     """Corrective movements that a solution needed."""
     other_arm_travel: float | None = None
     """Joint travel of the arm that a solution does not choose, rad."""
+    noisy_ticks: float | None = None
+    """Mean ticks of a solution over :data:`NOISY_EXECUTIONS` executions with motor noise of
+    standard deviation :data:`MOTOR_NOISE`; None if one of them fails."""
 
 
 @dataclass(frozen=True)
@@ -233,6 +241,9 @@ COLUMNS = (
     ("reason", "TEXT NOT NULL", "outcome.reason", "why the run is not ok"),
     ("hands", "TEXT", "solution.hands", "hand of each goal in the solution, such as `LRLR`"),
     ("reward", "INTEGER", "solution.reward", "of the solution; of a learner its best trial"),
+    ("noisy_ticks", "REAL", "solution.noisy_ticks",
+     "mean ticks of 100 executions of the solution with [motor noise](model.md#motor-noise) 0.01; "
+     "missing if one of them fails"),
     ("replay_reward", "INTEGER", "replay.reward",
      "of one more trial of a learner, greedy and without noise"),
     ("replay_hands", "TEXT", "replay.hands", "hand of each goal in that trial"),

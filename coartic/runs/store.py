@@ -80,7 +80,7 @@ CREATE TABLE environments (id TEXT PRIMARY KEY, content TEXT NOT NULL, "commit" 
     packages TEXT);
 CREATE TABLE results (cell TEXT NOT NULL REFERENCES cells, suite_seed INTEGER NOT NULL,
     environment TEXT NOT NULL REFERENCES environments, details TEXT NOT NULL,
-    movements TEXT NOT NULL, rewards BLOB, noisy_ticks REAL, {_STORED},
+    movements TEXT NOT NULL, rewards BLOB, {_STORED},
     UNIQUE (cell, suite_seed, run));
 CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, method, setting,
     information, parameters, code, "commit", packages
@@ -90,8 +90,7 @@ CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, meth
 CREATE VIEW runs AS SELECT {_IN_VIEW} FROM asked ORDER BY position, run;
 CREATE VIEW solutions AS {_SOLUTIONS};
 PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"""
-"""Statements that make the tables and views. ``noisy_ticks`` has room for the mean ticks of the
-solution under motor noise."""
+"""Statements that make the tables and views."""
 
 WAIT_S = 5.0  # wait for another program before the user is told
 _ROWS_AT_ONCE = 5_000  # of a frame, as objects
@@ -333,6 +332,7 @@ class Store:
                 scores["solution"] = scores["solution"]._replace(
                     corrections=row["solution_corrections"],
                     other_arm_travel=row["other_arm_travel"],
+                    noisy_ticks=row["noisy_ticks"],
                 )
             cell = _cell_from(row["cell"], row["cell_content"])
             job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])

@@ -12,11 +12,14 @@ import pandas as pd
 from coartic.analysis import TABLES, interval, load
 
 README = Path(__file__).parents[2] / "README.md"
+COLUMNS = ("gap", "noisy_gap", "share")
+"""Columns of the ranking that the table of README has, in order."""
 
 
 def rows_of(text: str) -> dict[str, tuple[str, ...]]:
-    """Return gap and share as printed, in per cent, by the name of the row."""
-    row = r"^\| \**(.+?)\**(?: of the paper|:.*?)? \| .+? \| (.+?%.*?) \| (.+?) \|$"
+    """Return gap, gap with motor noise and share as printed, in per cent, by the name of the
+    row."""
+    row = r"^\| \**(.+?)\**(?: of the paper|:.*?)? \| .+? \| (.+?%.*?) \| (.+?%.*?) \| (.+?) \|$"
     rows = re.findall(row, text, re.MULTILINE)
     return {name: tuple(cell.replace("*", "") for cell in cells) for name, *cells in rows}
 
@@ -33,10 +36,10 @@ def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
         row, decimals = ranking.loc[titles[0]], (cell.split()[0].partition(".") for cell in printed)
         there = tuple(
             interval(row, column, len(digits), 100, " %")
-            for column, (*_, digits) in zip(("gap", "share"), decimals, strict=True)
+            for column, (*_, digits) in zip(COLUMNS, decimals, strict=True)
         )
         if there != printed:
-            lines.append(f"{name}: gap {there[0]}, share {there[1]}")
+            lines.append(f"{name}: gap {there[0]}, with motor noise {there[1]}, share {there[2]}")
     return len(rows), lines
 
 

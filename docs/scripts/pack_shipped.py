@@ -1,5 +1,6 @@
 """Pack shipped results: ``python docs/scripts/pack_shipped.py FOLDER`` packs a results folder whose
-runs have the same results as the shipped runs.
+runs have the same results as the shipped runs. ``--noise`` in place of folders executes the shipped
+solutions with motor noise again and packs the new ticks; no method runs.
 
 The rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`): 5 MB in place of
 150 MB.
@@ -12,15 +13,17 @@ import hashlib
 import lzma
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import compare_runs
+from coartic.benchmarks.scoring import with_noise
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.runs import shipped
-from coartic.runs.store import RUNS_FILE, open_store, writing
+from coartic.runs.record import Run
+from coartic.runs.store import RUNS_FILE, Store, open_store, writing
 
 
 def changed_runs(folder: Path) -> Iterator[str]:
@@ -50,13 +53,21 @@ def changed_runs(folder: Path) -> Iterator[str]:
                     yield f"run {run_id}: {change}"
 
 
-def pack(folder: Path, out: Path) -> None:
-    """Write the downsampled results of a folder, and the hashes of all results, into ``out``."""
-    with open_store(folder) as source, tempfile.TemporaryDirectory() as made:
+def runs_with_noise(source: Store) -> Iterator[Run]:
+    """Yield the runs of a folder, whose solutions are executed with motor noise again."""
+    ids = iter(source.runs().run_id)
+    for job in source.plan():
+        yield from with_noise([source.run(next(ids)) for _ in job.numbers])
+
+
+def pack(source: Store, runs: Iterable[Run], out: Path) -> None:
+    """Write runs, downsampled, and the plan of ``source``, and the hashes of all packed results,
+    into the folder ``out``."""
+    with tempfile.TemporaryDirectory() as made:
         plan = source.plan()
         with writing(Path(made)) as target:
             target.replace_plan(plan, source.made_with())
-            target.write(source.run(run_id).downsample() for run_id in source.runs().run_id)
+            target.write(run.downsample() for run in runs)
         content = lzma.compress((Path(made) / RUNS_FILE).read_bytes(), preset=9)
     (out / f"{plan[0].suite}{shipped.PACKED}").write_bytes(content)
     packed = sorted(out.glob(f"*{shipped.PACKED}"))
@@ -68,8 +79,16 @@ def main() -> int:
     """Pack the folders of the command line, unless a shipped result would change."""
     parser = argparse.ArgumentParser(prog="python docs/scripts/pack_shipped.py")
     parser.add_argument("--changed", action="store_true", help="pack results that have changed")
-    parser.add_argument("folders", nargs="+", type=folder_named, metavar="FOLDER")
+    parser.add_argument("--noise", action="store_true", help="pack noisy ticks made again")
+    parser.add_argument("folders", nargs="*", type=folder_named, metavar="FOLDER")
     given = parser.parse_args()
+    if given.noise == bool(given.folders):
+        parser.error("name the folders to pack, or --noise")
+    if given.noise:
+        for suite in shipped.shipped_hashes():
+            with shipped.open_shipped(suite) as source:
+                pack(source, runs_with_noise(source), shipped.SHIPPED_FOLDER)
+        return 0
     try:
         changes = {folder: list(changed_runs(folder)) for folder in given.folders}
     except CoarticError as error:
@@ -82,7 +101,9 @@ def main() -> int:
         print("Nothing is packed. If results change on purpose, add --changed.")
         return 1
     for folder in given.folders:
-        pack(folder, shipped.SHIPPED_FOLDER)
+        with open_store(folder) as source:
+            runs = map(source.run, source.runs().run_id)
+            pack(source, runs, shipped.SHIPPED_FOLDER)
     return 0
 
 

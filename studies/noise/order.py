@@ -27,6 +27,13 @@ OPEN_LOOP = "posture QP"
 HEADLINE = ("CMA-ES", "learner")
 
 
+def is_paper_condition(rows):
+    """Return for each row True unless the learner has the condition of the other number of arms:
+    EC1 is for one-armed tasks, EC4 for the others."""
+    one_arm = rows.task.isin(["ascending", "descending"]) | rows.task.str.startswith("one-armed/")
+    return ~(rows.method.str.contains("EC4") & one_arm | rows.method.str.contains("EC1") & ~one_arm)
+
+
 def read(folder):
     """Return the executions of the methods in :data:`NAMES`, with the gap of each run in per cent
     of the best known ticks without noise.
@@ -39,9 +46,7 @@ def read(folder):
     rows["name"] = rows.method.map(NAMES)
     rows["family"] = rows.task.str.partition("/")[0].where(rows.task.str.contains("/"))
     rows["group"] = np.where(rows.family.isna(), "paper", "families")
-    one_arm = rows.task.isin(["ascending", "descending"]) | (rows.family == "one-armed")
-    wrong = rows.method.str.contains("EC4") & one_arm | rows.method.str.contains("EC1") & ~one_arm
-    rows = rows[~wrong].copy()
+    rows = rows[is_paper_condition(rows)].copy()
     gap = 100 * (rows.ticks + rows.best_known) / -rows.best_known
     rows["gap"] = gap.where(rows.failures == 0)
     noise = ["group", "motor_noise", "signal_dependent"]
@@ -102,3 +107,18 @@ def tabulate_pairs(rows, resamples=RESAMPLES):
     table["verdict"] = [*map(common, table.constant, table.dependent)]
     table["open_loop"] = table.index.str.contains(OPEN_LOOP)
     return table
+
+
+def tabulate_families(rows):
+    """Return by how much CMA-ES is ahead of the learner in each family at each level of constant
+    noise: percentage points of gap with an interval for other tasks, the median task, and on how
+    many tasks it is ahead. This is a description: the rules judge all families together."""
+    rows, table = rows[(rows.group == "families") & ~rows.signal_dependent], []
+    for level, of_level in rows.groupby("motor_noise"):
+        gaps = of_level.pivot_table("gap", ["family", "task"], "name")
+        for family, of_family in (gaps["learner"] - gaps["CMA-ES"]).groupby("family", sort=False):
+            lead = other_tasks({family: [np.array([value]) for value in of_family]})
+            row = {"family": family, "motor_noise": level} | lead.columns("lead")
+            ahead = int((of_family > 0).sum())
+            table.append(row | {"median": of_family.median(), "ahead": ahead, "tasks": lead.n[0]})
+    return pd.DataFrame(table)

@@ -1,11 +1,18 @@
-"""Execute the shipped solutions with motor noise (question 1).
+"""Make the runs and executions of study noise.
 
     python studies/noise/protocols.py results/noise
 
-The solutions are those of the suites ``comparison`` and ``families`` as they ship. Each is executed
-100 times at each level of noise, with constant and with signal-dependent noise. The rows of a task
-are one file in ``results/noise/order``. Tasks that have their file are not done again, so a run
-that was interrupted goes on.
+1. ``order``: the shipped solutions of the suites ``comparison`` and ``families``, executed with
+   motor noise.
+2. ``why``: those of them that move straight, as they aim, to the postures in which they hit, and to
+   these postures moved to the goal's centre.
+3. ``memory``: random search in stages, and the learner whose hands it has; best trials executed.
+4. ``learning``: methods that practise without noise and with it; best trials and next actions
+   executed.
+
+Each solution is executed 100 times. The rows of a task are one file. What has its file, or its run
+in a results folder, is not done again, so a run that was interrupted goes on. All of it takes about
+an hour of CPU time.
 """
 
 import lzma
@@ -15,15 +22,31 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from coartic import execute_noisy
+from coartic import Movement, correct, execute, execute_noisy
 from coartic.analysis import load
+from coartic.benchmarks.planning import plan, request_for
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.runner import perform
+from coartic.benchmarks.suites import load_suite
 
+HERE = Path(__file__).parent
 LEVELS = (0.0, 0.002, 0.005, 0.01, 0.02)
 """Standard deviations of the motor noise, rad and length units."""
+AFTER = 0.01
+"""Motor noise of questions 2 and 4."""
 REPEATS = 100
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
-SHIPPED = Path(__file__).parents[2] / "benchmarks" / "shipped"
+SHIPPED = HERE.parents[1] / "benchmarks" / "shipped"
 NO_METHOD = "optimum/search"
+STRAIGHT = (
+    *("dual-process/EC1", "dual-process/EC4", "dual-process/EC1-informed"),
+    *("dual-process/EC4-informed", "hill-climbing", "random-search", "cma-es/bandit"),
+    "posture-based/two-goals",
+)
+"""Methods of question 2, which aim at configurations and move straight."""
+STAGES = (1, 2, 4, 10, 30, 100, 1_000)
+COLUMNS = ["task", "method", "setting", "run", "reward", "best_known"]
+"""Columns of runs that their executions have, too."""
 
 
 def shipped(suite, folder):
@@ -42,13 +65,13 @@ def seed_of(run_id):
     return int(run_id.partition("-")[0], 16)
 
 
-def executions(task, solutions, levels, repeats=REPEATS):
+def executions(task, solutions, levels, repeats=REPEATS, kinds=(False, True), **more):
     """Return a row for each of the solutions, by run id, at each level and kind of noise: mean and
     standard deviation of the ticks over executions that did not fail, and the number of failures.
-    """
+    ``more`` are further columns."""
     seeds, rows = [*map(seed_of, solutions)], []
     for level in levels:
-        for dependent in (False, True) if level else (False,):
+        for dependent in kinds if level else (False,):
             ticks = execute_noisy(
                 task, solutions.values(), level, repeats, seeds, signal_dependent=dependent
             )
@@ -59,6 +82,7 @@ def executions(task, solutions, levels, repeats=REPEATS):
                         "run_id": run_id,
                         "motor_noise": level,
                         "signal_dependent": dependent,
+                        **more,
                         "ticks": made.mean() if made.size else np.nan,
                         "sd": made.std() if made.size else np.nan,
                         "failures": repeats - made.size,
@@ -67,9 +91,40 @@ def executions(task, solutions, levels, repeats=REPEATS):
     return pd.DataFrame(rows)
 
 
-def execute_study(study, folder, levels=LEVELS, repeats=REPEATS):
-    """Write the executions of a study's solutions, a file for each task that has none."""
-    runs, movements = study.runs[study.runs.method != NO_METHOD], study.movements()
+def to_postures(task, solution, *, at_centre):
+    """Return movements straight to the postures in which a solution hits the goals.
+
+    ``at_centre``: to these postures moved by the corrective process until the hand is at the goal's
+    centre, to its tolerance of 0.01; a posture from which it does not converge stays as it is.
+    """
+    made = execute(task, solution)
+    movements = []
+    for goal, (q, hand, place) in enumerate(
+        zip(made.configurations, made.hands, task.goals, strict=True), start=1
+    ):
+        side = {"L": "left", "R": "right"}[hand]
+        if at_centre:
+            found = correct(task.robot, q, side, place, locked_base=task.locked_base)
+            q = found.q if found.converged else q
+        movements.append(Movement(goal, side, "learned", q))
+    return tuple(movements)
+
+
+def off_centre(task, solution):
+    """Return the median distance from the goal's centre at which a solution's movements aim, in
+    radii."""
+    aims = [
+        np.hypot(*task.robot.forward_kinematics(each.target, each.hand) - task.goals[each.goal - 1])
+        for each in solution
+        if each.kind != "corrective" and each.target is not None
+    ]
+    return float(np.median(aims)) / task.radius if aims else np.nan
+
+
+def by_task(study, folder, methods, rows_of):
+    """Write the rows that ``rows_of(task, solutions)`` makes of the solutions of ``methods``, by
+    run id, a file for each task that has none."""
+    runs, movements = study.runs[study.runs.method.map(methods)], study.movements()
     folder.mkdir(parents=True, exist_ok=True)
     for name, task in study.tasks.items():
         file = folder / f"{name.replace('/', '.')}.csv"
@@ -77,19 +132,151 @@ def execute_study(study, folder, levels=LEVELS, repeats=REPEATS):
             continue
         of_task = runs[(runs.task == name) & (runs.status == "ok")].set_index("run_id")
         solutions = {run_id: movements[run_id] for run_id in of_task.index}
-        made = executions(task, solutions, levels, repeats)
-        columns = ["task", "method", "setting", "run", "reward", "best_known"]
-        rows = made.join(of_task[columns], on="run_id")
+        if not solutions:
+            continue
+        rows = rows_of(task, solutions).join(of_task[COLUMNS], on="run_id")
         unfinished = file.with_suffix(".part")
         rows.to_csv(unfinished, index=False)
         unfinished.replace(file)
-        print(name, len(solutions), flush=True)
+        print(folder.name, name, len(solutions), flush=True)
+
+
+def execute_order(study, folder, levels=LEVELS, repeats=REPEATS):
+    """Execute all solutions of a study at all levels of noise (question 1)."""
+    by_task(
+        study,
+        folder,
+        lambda method: method != NO_METHOD,
+        lambda task, solutions: executions(task, solutions, levels, repeats),
+    )
+
+
+def execute_why(study, folder, repeats=REPEATS):
+    """Execute straight solutions as they aim (T), to the postures in which they hit (P), and to
+    these postures moved to the goal's centre (C) (question 2)."""
+
+    def rows_of(task, solutions):
+        targets = {
+            "T": solutions,
+            "P": {k: to_postures(task, each, at_centre=False) for k, each in solutions.items()},
+            "C": {k: to_postures(task, each, at_centre=True) for k, each in solutions.items()},
+        }
+        rows = [
+            executions(task, of_kind, (0.0, AFTER), repeats, (False,), target=kind)
+            for kind, of_kind in targets.items()
+        ]
+        off = {run_id: off_centre(task, each) for run_id, each in solutions.items()}
+        return pd.concat(rows).assign(off=lambda of: of.run_id.map(off))
+
+    by_task(study, folder, lambda method: method in STRAIGHT, rows_of)
+
+
+def run_blocks(name, description, folder, text, method_files=()):
+    """Run the missing runs of a suite with these blocks, and return its study."""
+    head = f'name = "{name}"\ntitle = "{description}"\ndescription = "{description}"\n'
+    file = folder.with_suffix(".toml")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(f"{head}runs = 3\ntrials = 10_000\ntime_limit_s = 3600\n{text}", "utf-8")
+    registered = registry(method_files)
+    print(perform(plan(load_suite(str(file)), request_for(), registered), folder), flush=True)
+    return load(folder)
+
+
+def block(tasks, method, **how):
+    """Return a block of a suite."""
+    names = ", ".join(f'"{task}"' for task in tasks)
+    lines = [f"{key} = {value}" for key, value in how.items()]
+    return "\n".join(["\n[[blocks]]", f"tasks = [{names}]", f'methods = ["{method}"]', *lines, ""])
+
+
+def run_memory(folder, instances="i160..i179"):
+    """Run the learner, then random search in stages with the learner's hands, as often, and execute
+    the best trials (question 3)."""
+    tasks = {
+        "EC1": ["ascending", "descending", f"one-armed/v1/{instances}"],
+        "EC4": [f"two-armed/v1/{instances}"],
+    }
+    text = "".join(block(names, f"dual-process/{rule}") for rule, names in tasks.items())
+    study = run_blocks("noise-memory", "Stages of random search", folder, text)
+    learner = study.runs[study.runs.method.str.startswith("dual-process/")]
+    for task, of_task in learner.groupby("task", sort=False):
+        hands = sorted({*of_task.hands.dropna()})
+        names = "[" + ", ".join(f'"{each}"' for each in hands) + "]"
+        for grid in (f"hands = {names}", f"hands = {names}, stages = {[*STAGES[1:]]}, "
+                     'keep = ["postures", "targets"]'):  # fmt: skip
+            text += block([task], "random-search", grid=f"{{ {grid} }}")
+    study = run_blocks("noise-memory", "Stages of random search", folder, text)
+    by_task(
+        study,
+        folder.parent / "memory-executed",
+        lambda method: method == "random-search",
+        lambda task, solutions: executions(
+            task, solutions, (0.0, 0.005, 0.01, 0.02), kinds=[False]
+        ),
+    )
+
+
+def run_learning(folder, instances="i160..i169"):
+    """Run methods that practise at both levels of noise, and execute their best trials and next
+    actions (question 4)."""
+    noisy = float(np.hypot(0.05, AFTER))
+    one_arm = [["ascending", "descending"], [f"one-armed/v1/{instances}"]]
+    two_arms = [["two-armed-1", "two-armed-2"]]
+    two_arms.append([f"{family}/v1/{instances}" for family in FAMILIES if family != "one-armed"])
+    text = ""
+    for rule, groups in (("EC1", one_arm), ("EC4", two_arms)):
+        for runs, tasks in zip((20, 3), groups, strict=True):
+            text += block(tasks, f"dual-process/{rule}", runs=runs,
+                          grid=f"{{ noise_sd = [0.05, {noisy!r}] }}")  # fmt: skip
+            text += block(
+                tasks, "hill-climbing", runs=runs, grid=f"{{ sigma = [0.05, {noisy!r}] }}"
+            )
+            stages = f"sigma = [0.05, {noisy!r}], stages = [1, 100, 1_000]"
+            text += block(tasks, "random-search", runs=runs, grid=f"{{ {stages} }}")
+            text += block(tasks, "cma-es/in-noise", runs=runs,
+                          grid=f"{{ motor_noise = [0.0, {AFTER}] }}")  # fmt: skip
+    files = [HERE / "in_noise.py"]
+    study = run_blocks("noise-learning", "Learning in motor noise", folder, text, files)
+    execute_learned(study, folder.parent / "learning-executed")
+    told = study.runs[(study.runs.method == "cma-es/in-noise") & (study.runs.setting == "")]
+    text = ""
+    for task, of_task in told.groupby("task", sort=False):
+        hands = of_task.hands.value_counts().index[0]
+        text += block([task], "cma-es/noise-handler", runs=len(of_task),
+                      parameters=f'{{ hands = "{hands}" }}')  # fmt: skip
+    folder = folder.with_name("handler")
+    study = run_blocks("noise-handler", "Learning with a noise handler", folder, text, files)
+    execute_learned(study, folder.parent / "handler-executed")
+
+
+def execute_learned(study, folder):
+    """Execute the best trials and the next actions of a study's runs (question 4)."""
+    replays = study.movements("replay")
+
+    def rows_of(task, solutions):
+        following = {
+            run_id: replays.get(run_id) or to_postures(task, solution, at_centre=False)
+            for run_id, solution in solutions.items()
+        }
+        parts = {"best trial": solutions, "next action": following}
+        return pd.concat(
+            [
+                executions(task, of_kind, (0.0, AFTER), kinds=[False], action=kind)
+                for kind, of_kind in parts.items()
+            ]
+        )
+
+    by_task(study, folder, lambda method: True, rows_of)
 
 
 def main(folder="results/noise"):
-    """Execute both suites, one after the other."""
+    """Make all runs and executions, one question after the other."""
+    folder = Path(folder)
     for suite in ("comparison", "families"):
-        execute_study(shipped(suite, Path(folder)), Path(folder) / "order")
+        execute_order(shipped(suite, folder), folder / "order")
+    execute_why(shipped("families", folder), folder / "why")
+    run_memory(folder / "memory")
+    run_learning(folder / "learning")
 
 
 if __name__ == "__main__":

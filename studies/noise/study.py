@@ -11,36 +11,81 @@ README.md has all hypotheses and rules.
 import sys
 from pathlib import Path
 
-from order import read, tabulate_gaps, tabulate_pairs
+import learning
+import order
+import pandas as pd
+import why
 
-from coartic.analysis import figures
+from coartic.analysis import figures, load
 from common.writing import write_study
 
 GROUPS = {"paper": "the paper's tasks", "families": "200 random tasks"}
+_KEPT = [
+    *("run_id", "task", "method", "setting", "run", "best_known", "motor_noise"),
+    *("signal_dependent", "target", "action", "ticks", "failures"),
+]
+"""Columns of the executions that ship."""
+
+
+def executions_of(folder):
+    """Return all executions of the study, a row for each run, level of noise and kind of target,
+    with the ``question`` that asks for it."""
+    parts = {"order": "order", "why": "why"}
+    parts |= {"memory-executed": "memory", "learning-executed": "learning"}
+    parts |= {"handler-executed": "learning"}
+    tables = []
+    for part, question in parts.items():
+        rows = pd.concat([pd.read_csv(path) for path in sorted((folder / part).glob("*.csv"))])
+        if question == "order":
+            rows = rows[rows.method.isin(order.NAMES) & rows.setting.isna()]
+        tables.append(rows.reindex(columns=_KEPT).assign(question=question))
+    rows = pd.concat(tables).set_index("run_id")
+    return rows.assign(ticks=rows.ticks.round(2))
 
 
 def measure(folder):
-    """Return the tables of question 1 by name."""
-    rows = read(Path(folder) / "order")
+    """Return the tables of the study by name."""
+    folder = Path(folder)
+    rows = order.read(folder / "order")
+    runs = load(folder / "memory").runs
+    learner = runs[runs.method.str.startswith("dual-process/")]
+    values = learning.read_memory(folder / "memory-executed", learner)
+    memory, verdicts = learning.tabulate_memory(values)
+    learned = learning.read_learning(folder)
+    pairs = learning.tabulate_learning_pairs(learned)
     return {
-        "runs": rows.set_index("run_id"),
-        "results": tabulate_gaps(rows),
-        "pairs": tabulate_pairs(rows),
+        "runs": executions_of(folder),
+        "hands": learner.groupby("task").hands.value_counts().reset_index().set_index("task"),
+        "results": order.tabulate_gaps(rows).set_index("group"),
+        "families": order.tabulate_families(rows).set_index("family"),
+        "pairs": order.tabulate_pairs(rows),
+        "why": why.tabulate_why(why.read(folder / "why")),
+        "memory": memory.set_index("group"),
+        "memory_verdicts": verdicts,
+        "learning": learning.tabulate_learning(learned).set_index("group"),
+        "practice": learning.tabulate_practice(learned).set_index("group"),
+        "learning_pairs": pairs,
     }
 
 
 @figures.styled
 def draw(results):
     """Draw the gap by motor noise, a panel for each group of tasks."""
-    figure, panels = figures.panels((1, 2), (figures.TWO, 3))
-    for axes, (group, title) in zip(panels.flat, GROUPS.items(), strict=True):
+    figure, panels = figures.panels((1, 2), (figures.TWO, 3.2))
+    results = results.reset_index()
+    for axes, (group, title) in zip(panels, GROUPS.items(), strict=True):
         of_group = results[(results.group == group) & ~results.signal_dependent]
-        for name, of_method in of_group.groupby("name", sort=False):
-            figures.means(axes, of_method, x="motor_noise", y="gap", label=name)
-        axes.set_title(title)
-        axes.set_xlabel("motor noise (rad)")
-    panels.flat[0].set_ylabel("gap (%)")
-    panels.flat[0].legend()
+        for number, name in enumerate(dict.fromkeys(order.NAMES.values())):
+            repeats, color = divmod(number, len(figures.PALETTE))
+            look = {"color": figures.PALETTE[color], "marker": "os"[repeats], "label": name}
+            look |= {"linestyle": "--"} if repeats else {}
+            figures.means(axes, of_group[of_group.name == name], x="motor_noise", y="gap", **look)
+        axes.set(title=title, xlabel="motor noise s (rad, length units)", yscale="log")
+        axes.set_xticks([0, 0.005, 0.01, 0.02])
+        axes.set_yticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
+        axes.set_yticks([], minor=True)
+    panels[0].set_ylabel("gap (%), log scale")
+    figures.legend(figure, panels[0].get_legend_handles_labels()[0], 4)
     return figure
 
 
