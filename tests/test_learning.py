@@ -4,6 +4,7 @@ import itertools
 import math
 import re
 from dataclasses import replace
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import numpy.testing as npt
@@ -24,6 +25,7 @@ from coartic import (
     load_task,
     movements_of,
 )
+from coartic.learner.conditions import EVERY_CONDITION
 from coartic.learner.method import METHODS
 from coartic.method import Information, MethodError, Session
 from coartic.motion.batch import SLOTS
@@ -80,6 +82,16 @@ def assert_equals_reference(task, condition, trials, seed=11, model=SOON_FAILED,
         values[place], targets[place] = value, slow.targets[(goal, before), hand]
     npt.assert_array_equal(fast.values, values)
     npt.assert_allclose(fast.targets, targets, atol=1e-9)
+    replayed = None
+    if slow.replay is not None:
+        hands, ticks = slow.replay
+        replayed = -sum(ticks)
+        made = [[m for m in fast.replay if m.goal == goal] for goal in range(1, len(hands) + 1)]
+        assert [{m.hand for m in each} for each in made] == [{hand} for hand in hands]
+        assert [sum(m.ticks for m in each) for each in made] == ticks
+    assert (fast.replay_reward, fast.replay == ()) == (replayed, slow.replay is None)
+    best = slow.rewards[slow.completed].max(initial=-(10**9)) if slow.completed.any() else None
+    assert fast.reward == (replayed if condition.learned == "replay" else best)
     return slow
 
 
@@ -176,6 +188,50 @@ def test_informed_conditions_equal_the_slow_learner_trial_by_trial(fields, direc
         plain = learn(task, CONDITIONS[condition], seed=7, trials=4, model=SOON_FAILED)
         differ += not np.array_equal(plain.rewards.data, slow.rewards)
     assert differ > 0
+
+
+EACH_FIELD = [
+    ("EC4", {"hands": ("right",)}),
+    ("EC4", {"modify_chosen": False}),
+    ("EC3", {"modify_other": True}),
+    *(("EC4", {"hand_exploration": each, "epsilon": 0.6})
+      for each in ("none", "closest", "nearest-posture")),
+    ("EC4", {"epsilon": 0.9}),
+    ("EC4", {"noise_sd": 0.3}),
+    ("EC4", {"corrects": False, "noise_sd": 0.02}),
+    ("EC4", {"learned": "replay"}),
+    ("EC4", {"learned": "replay", "credit": "subtask"}),
+    ("EC4-subtask", {"discount": 0.5}),
+    ("EC4-subtask", {"discount": 0.5, "counted": "all"}),
+    *(("EC4", {"drift": drift}) for drift in (0.5, (0.0, 1.0))),
+    ("EC4", {"pull": 0.05}),
+    *(("EC4-informed", {"direction": each}) for each in ("stay", "start")),
+]  # fmt: skip
+"""Of each field of a condition each value, or several, with what it needs of other fields."""
+
+
+@pytest.mark.parametrize(("base", "changes"), EACH_FIELD)
+def test_every_field_equals_the_slow_learner_and_makes_a_difference(base, changes):
+    plain, task = EVERY_CONDITION[base], load_task("two-armed-1")
+    changed = replace(plain, **changes)
+    slow = assert_equals_reference(task, changed, trials=6, seed=5)
+    if "learned" in changes:
+        assert slow.replay is not None
+        assert -sum(slow.replay[1]) != slow.rewards.max()
+        plain = replace(plain, learned="replay")
+    if changed != plain:
+        other = reference.learn(task, plain, seed=5, trials=6, model=SOON_FAILED)
+        assert repr(slow.targets) != repr(other.targets)
+
+
+def test_no_field_of_a_condition_is_without_a_case():
+    """Nor any value of one that has few."""
+    seen = [EVERY_CONDITION[base] for base, _ in EACH_FIELD]
+    seen += [replace(EVERY_CONDITION[base], **changes) for base, changes in EACH_FIELD]
+    for name, kind in get_type_hints(ExplorationCondition).items():
+        values = {getattr(condition, name) for condition in seen}
+        assert len(values) > 1, name
+        assert set(get_args(kind)) <= values or get_origin(kind) is not Literal, name
 
 
 def test_without_information_an_informed_condition_is_the_papers():

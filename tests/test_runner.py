@@ -1,12 +1,14 @@
 """Plans performed: seeds, ids, failures and scores of runs, whoever performs them."""
 
 import hashlib
+import subprocess
 import time
 import warnings
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from coartic import (
@@ -18,7 +20,7 @@ from coartic import (
 )
 from coartic.analysis import TABLES
 from coartic.analysis.study import load
-from coartic.benchmarks import reproduce
+from coartic.benchmarks import provenance, reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform, plan_suite
@@ -117,6 +119,39 @@ def test_long_runs_begin_first(tmp_path):
 @pytest.mark.process
 def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
     same_results(run_and_write(tmp_path, executor=Local(2)), results)
+
+
+def test_a_run_in_a_checkout_has_its_commit(tmp_path, monkeypatch):
+    """With a plus if tracked files were changed since; also where a caller sets other places."""
+    folder = tmp_path / "checkout"
+    folder.mkdir()
+    (folder / "tracked").touch()
+
+    def git(*words):
+        me = ["-c", "user.name=me", "-c", "user.email=me"]
+        return subprocess.check_output(["git", "-C", folder, *me, *words], text=True).strip()
+
+    def commit_of_run(name):
+        provenance.current_environment.cache_clear()
+        (commit,) = run_and_write(tmp_path / name, [ALONE], runs=1).runs.commit
+        return commit
+
+    for words in ("init -q", "add tracked", "commit -q -m first"):
+        git(*words.split())
+    monkeypatch.setattr(provenance, "PACKAGE", folder / "coartic")
+    monkeypatch.setattr(provenance, "arithmetic", lambda: "")
+    (folder / "untracked").touch()
+    commit = git("rev-parse", "HEAD")
+    monkeypatch.setenv("GIT_DIR", str(tmp_path))
+    try:
+        assert commit_of_run("clean") == commit
+        (folder / "tracked").write_text("changed")
+        assert commit_of_run("changed") == f"{commit}+"
+        monkeypatch.setattr(provenance, "PACKAGE", folder / "packages" / "coartic")
+        (folder / "packages").mkdir()
+        assert pd.isna(commit_of_run("installed"))
+    finally:
+        provenance.current_environment.cache_clear()
 
 
 def test_seeds_are_paired_by_task_and_run(results):
