@@ -34,15 +34,6 @@ def test_conditions_are_shown_as_they_are_written():
         assert eval(repr(condition), {**vars(coartic)}) == condition
 
 
-def test_errors_can_be_imported():
-    """But for those of a folder below, which stay within it."""
-    errors = [coartic.CoarticError]
-    for error in errors:
-        errors += error.__subclasses__()
-    names = {error.__name__ for error in errors if error.__module__.count(".") == 1}
-    assert names <= {*coartic.__all__}
-
-
 PUBLIC = [getattr(coartic, name) for name in coartic.__all__]
 OF_A_ROBOT = [Robot.forward_kinematics, Robot.joint_positions, Robot.jacobian, Robot.base_outline]
 

@@ -59,17 +59,6 @@ def test_settings_of_numba_in_a_folder_are_not_read(tmp_path):
     assert done.stdout.split() == ["/ours", "0"]
 
 
-def test_variables_that_numba_refuses_get_a_sentence(tmp_path):
-    code = """if True:
-        from coartic.motion.compile import entry
-        try:
-            entry(abs)(1.0)
-        except Exception as error:
-            print(type(error).__name__, error)"""
-    done = python("-c", code, cwd=tmp_path, NUMBA_NUM_THREADS="0")
-    assert done.stdout.startswith("CoarticError Numba cannot begin (Number of threads")
-
-
 def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
     """Another file than the cached function's changes; the result follows. A full disk, say, cuts
     the index short, or the code."""

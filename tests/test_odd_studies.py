@@ -5,17 +5,14 @@ import math
 import pandas as pd
 
 from coartic import load_task
-from coartic.analysis import FIGURES, TABLES
+from coartic.analysis import TABLES
 from coartic.analysis.control import with_control
 from coartic.analysis.optima import BestKnown
-from coartic.analysis.report import sections
-from coartic.analysis.report.sections import SECTIONS
 from coartic.analysis.tables import is_setting, shown_columns
-from tests.support.made_up import runs_of, study_of, study_of_trials
+from tests.support.made_up import runs_of, study_of
 
 ONE, TWO, THREE = "ascending", "two-armed-1", "two-armed-2"
 BEST = {ONE: -292, TWO: -465, THREE: -306, "descending": -292}
-SECTION = {section.id: section for section in SECTIONS}
 
 
 def behind(tasks, method, *ticks, **more):
@@ -45,28 +42,6 @@ def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
     table = TABLES["differences"](study)
     assert (is_setting(study, table) == (table.against == "mine sigma=0.1")).all()
     assert 0 < is_setting(study, table).sum() == len(table) / 2
-
-
-def test_a_setting_without_its_method_is_drawn():
-    rows = [
-        *behind([TWO, THREE], "cma-es/bandit", 10, 11, None),
-        *behind([TWO, THREE], "cma-es/bandit", 20, 21, 22, setting="sigma=0.1"),
-        *behind([TWO, THREE], "hill-climbing", 15, 14, 13),
-    ]
-    drawn = FIGURES["ranking"](planted(rows)).data.method
-    assert [*drawn] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
-
-
-def test_the_sentence_of_the_ranking_is_of_methods_on_all_tasks():
-    """An own method that solved more tasks, but not all, is not among them."""
-    methods = "random-search", "hill-climbing", "cma-es/bandit"
-    study = planted(
-        *(behind([ONE, TWO, THREE], method, 15, 14, 13) for method in methods),
-        behind([ONE, TWO], "mine", 5, 4, 3),
-    )
-    (said,) = [line for line in sections.finding(study, SECTION["ranking"]) if "trial" in line]
-    assert "hill climbing" in said
-    assert "mine" not in said
 
 
 def test_a_task_without_a_solution_of_every_run_is_not_solved():
@@ -102,12 +77,3 @@ def test_hands_of_many_runs_are_shares_of_those_that_are_executed():
     values = pd.Series([1.0] * 500 + [math.nan] * 1500, study.runs.index)
     object.__setattr__(study, "signature", lambda *_: values)
     assert [*with_control(study, "first", TWO, "hill-climbing")] == ["LRLR", "RRRR"]
-
-
-def test_a_method_without_evaluations_has_its_name_in_the_figure_of_costs():
-    rewards = {(TWO, "mine"): [[-520, -480, -470]] * 3, (TWO, "hill-climbing"): [[-520, -490]] * 3}
-    study = study_of_trials(rewards, [], forward_kinematics=5)
-    study.runs.loc[study.runs.method == "mine", "forward_kinematics"] = 0
-    plot = FIGURES["runtimes"](study)
-    texts = [text.get_text() for axes in plot.figure.axes for text in axes.texts]
-    assert {"mine", "hill climbing"} <= {*texts}

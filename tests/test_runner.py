@@ -2,7 +2,6 @@
 
 import hashlib
 import subprocess
-import time
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,6 @@ import pandas as pd
 import pytest
 
 from coartic import (
-    CoarticError,
     Movement,
     corrective_trial,
     initial_hands,
@@ -23,13 +21,13 @@ from coartic.analysis.study import load
 from coartic.benchmarks import provenance, reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.runner import perform, plan_suite
+from coartic.benchmarks.runner import perform
 from coartic.benchmarks.scoring import score
-from coartic.benchmarks.worker import fail, perform_job
+from coartic.benchmarks.worker import fail
 from coartic.method import Meter
 from coartic.motion.batch import SLOTS
 from coartic.runs.plan import Job, run_seed
-from coartic.runs.record import Outcome, Times, too_long
+from coartic.runs.record import Outcome, Times
 from tests.support.strategies import STUCK, tiny_task
 from tests.support.suites import (
     BROKEN,
@@ -40,7 +38,6 @@ from tests.support.suites import (
     planned,
     run_and_write,
     same_results,
-    suite_of,
 )
 
 LEARNER = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])
@@ -91,29 +88,6 @@ def results(tmp_path_factory):
 @pytest.fixture(scope="module")
 def methods():
     return registry([BROKEN, EXAMPLES / "differential_evolution.py"])
-
-
-def test_long_runs_begin_first(tmp_path):
-    begun, planner = [], "posture-qp/current-goal"
-
-    class Watched(InProcess):
-        def perform(self, jobs):
-            begun.extend((job.cell.method.name, len(job.numbers)) for job in jobs)
-            return super().perform(jobs)
-
-    suite_of(
-        tmp_path,
-        'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\nruns = 2',
-        f'tasks = ["ascending", "descending"]\nmethods = ["{planner}"]',
-        'tasks = ["ascending"]\nmethods = ["dual-process/EC1-subtask"]\nruns = 4',
-    )
-    perform(plan_suite(tmp_path / "own.toml"), tmp_path / "results", executor=Watched(2))
-    assert begun == [
-        (planner, 1),
-        (planner, 1),
-        ("dual-process/EC1-subtask", 4),
-        ("dual-process/EC1", 2),
-    ]
 
 
 @pytest.mark.process
@@ -259,31 +233,10 @@ def test_the_runs_of_a_batch_are_scored():
     assert downsampled.outcome.rewards == [None, -310, -319, None]
 
 
-def test_the_runs_of_a_batch_share_its_time():
-    cell = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"], trials=50)
-    begun = time.perf_counter(), time.process_time()
-    outcomes = perform_job(Job(cell, 0, range(8)))
-    wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
-    assert 0 < sum(each.times.wall_s for each in outcomes) <= wall
-    assert 0 < sum(each.times.cpu_s for each in outcomes) <= cpu
-
-
 def test_a_solution_that_misses_a_goal_is_infeasible():
     job = Job(cell_on(STUCK, KNOWN["corrective-alone/given"]), 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
     assert (run.outcome.status, run.scores) == ("infeasible", {})
-
-
-def test_ten_thousand_movements_are_not_too_many():
-    task, move = load_task("ascending"), Movement(1, "right", "corrective")
-    assert too_long(task, [move] * 10_000) is None
-    assert "10001 movements" in str(too_long(task, [move] * 10_001))
-    still = [Movement(1, "right", "path", waypoints=np.tile(task.q0, (count, 1)))
-             for count in (39_999, 40_000)]  # fmt: skip
-    assert too_long(task, still[:1]) is None
-    assert "400010 numbers; at most 400000" in str(too_long(task, still[1:]))
-    far = Movement(1, "right", "planned", np.full(10, 1e308))
-    assert "its path has inf steps" in str(too_long(task, [far]))
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -295,12 +248,6 @@ def test_some_runs_of_every_cell_are_performed_again(results):
         ["task", "method", "setting"]
     )
     assert len(cells) == len(again) == len(results.cells)
-
-
-def test_a_folder_of_another_suite_is_refused(results):
-    plan = [replace(job, suite="quick") for job in planned()]
-    with pytest.raises(CoarticError, match="holds results of suite 'paper'"):
-        perform(plan, results.folder, executor=InProcess())
 
 
 @pytest.mark.usefixtures("in_this_process")

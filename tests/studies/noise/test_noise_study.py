@@ -12,7 +12,7 @@ from tests.support.suites import unpacked
 RULES, PROTOCOLS, ORDER = programs("noise", "rules", "protocols", "order")
 
 
-FEWER = 9_999
+FEWER = 1_999
 """Resamples of tests."""
 
 
