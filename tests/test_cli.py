@@ -182,11 +182,6 @@ def test_a_new_file_can_be_imported_and_hides_no_module(coartic, tmp_path, monke
     compile(f"import {file.stem}", "", "exec")
 
 
-def test_help_has_a_short_name(coartic):
-    for command in ((), ("run",), ("report",)):
-        assert coartic(*command, "-h") == coartic(*command, "--help") == coartic("help", *command)
-
-
 @pytest.mark.process
 def test_modules_in_the_working_folder_are_not_imported(tmp_path):
     """By no process of a command that is installed, whatever a method's file starts."""
@@ -237,21 +232,6 @@ def test_draw(coartic, tmp_path, monkeypatch):
     files = [tmp_path / "mine.toml", tmp_path / "other" / "mine.toml"]
     assert "two tasks are called 'mine'" in coartic("draw", *files, "--out", tmp_path / "two")[2]
     assert coartic("draw", tmp_path / "mine.toml", "--out", tmp_path / "own.svg")[0] == 0
-
-
-def test_play(coartic, tmp_path, monkeypatch):
-    shown = []
-    monkeypatch.setattr("webbrowser.open", lambda address: not shown.append(address))
-    page = tmp_path / "page.html"
-    assert coartic("play", "descending", "--out", page)[:2] == (
-        0,
-        f"{page}: {len(page.read_bytes()) // 1000} kB.\n",
-    )
-    assert shown == [page.as_uri()]
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    assert "open it in a browser" in coartic("play", "--no-open")[1]
-    assert len(shown) == 1
-    assert len([*tmp_path.iterdir()]) == 2
 
 
 @pytest.mark.process

@@ -77,16 +77,6 @@ def test_nobody_at_an_address(tmp_path):
                 perform(planned(CELLS), tmp_path, executor=Dask(address))
 
 
-def test_a_cluster_without_workers(distributed, tmp_path, monkeypatch):
-    messages = []
-    monkeypatch.setattr(cluster_module, "WORKERS_S", 0.5)
-    with distributed.LocalCluster(n_workers=0, processes=False, **QUIET) as cluster:
-        executor = Dask(cluster.scheduler_address, say=messages.append)
-        with pytest.raises(CoarticError, match="had no workers.*Finished runs are"):
-            perform(planned(CELLS), tmp_path, executor=executor)
-    assert len(messages) == 1
-
-
 def test_a_scheduler_that_is_lost(distributed, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster_module, "Local", InProcess)
     cluster = distributed.LocalCluster(n_workers=1, processes=False, protocol="tcp://", **QUIET)

@@ -186,22 +186,3 @@ def test_packed_results_say_the_same(packed, tmp_path):
     assert full.runs.best_trial.equals(downsampled.runs.best_trial)
     with open_store(tmp_path) as store:
         assert store.run(full.runs.query("trials > 1").run_id.iloc[0]).is_downsampled
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_command(packed, parts, tmp_path, coartic):
-    """A method is written by a command, run beside the shipped results, and there when that is
-    repeated; a colleague includes the folder with another one, without the method's file."""
-    mine, out = tmp_path / "my_search.py", tmp_path / "out"
-    small = ("--runs", 2, "--trials", 40, "--tasks", "ascending,descending")
-    assert coartic("new", "my-search", "--out", mine)[0] == 0
-    own = ("--method-file", mine, "--include", "shipped", "--out", out)
-    code, text, _ = coartic("run", "paper", *own, *small)
-    assert (code, text[:16]) == (0, "8 runs (4 reused")
-    assert coartic("run", "paper", *own, *small)[1].startswith("8 runs (8 reused)")
-    theirs = load(packed).runs
-    assert set(load(out).runs.method) == {"my-search", *theirs.method}
-    assert set(theirs.run_id) < set(load(out).runs.run_id)
-    both = ("--include", out, "--include", parts[0], "--out", tmp_path / "both", *small)
-    code, text, _ = coartic("run", "paper", "--methods", "EC1", *both)
-    assert (code, text[:19]) == (0, "10 runs (10 reused)")

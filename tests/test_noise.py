@@ -42,14 +42,14 @@ SHORT = MotionModel(max_iterations=120)
 @pytest.mark.parametrize("name", TASKS)
 def test_executions_are_those_of_the_slow_implementation(name, signal_dependent):
     rng, options = np.random.default_rng(7), {"signal_dependent": signal_dependent}
-    solutions = [random_solution(TASKS[name], SHORT, rng) for _ in range(12)]
+    solutions = [random_solution(TASKS[name], SHORT, rng) for _ in range(8)]
     seen = []
     for motor_noise in (0.01, 0.1):
-        case = (TASKS[name], solutions, motor_noise, 5, 3, SHORT)
+        case = (TASKS[name], solutions, motor_noise, 3, 3, SHORT)
         made = execute_noisy(*case, **options)
         np.testing.assert_array_equal(made, reference.execute_noisy(*case, **options))
         seen.append(made)
-    assert len({*np.ravel(seen)} - {np.nan}) > 20
+    assert len({*np.ravel(seen)} - {np.nan}) > 10
 
 
 def test_many_robots_execute_as_one_after_the_other():

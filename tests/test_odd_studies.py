@@ -4,11 +4,10 @@ import math
 
 import pandas as pd
 
-from coartic import load_task
 from coartic.analysis import TABLES
 from coartic.analysis.control import with_control
 from coartic.analysis.optima import BestKnown
-from coartic.analysis.tables import is_setting, shown_columns
+from coartic.analysis.tables import is_setting
 from tests.support.made_up import runs_of, study_of
 
 ONE, TWO, THREE = "ascending", "two-armed-1", "two-armed-2"
@@ -54,21 +53,6 @@ def test_a_task_without_a_solution_of_every_run_is_not_solved():
     others = TABLES["not-ranked"](study)
     assert others.tasks.to_dict() == {"hill-climbing": 1, "mine": 1}
     assert (others.why == "2 of 9 runs failed").all()
-
-
-def test_names_of_tasks_may_end_as_columns_of_intervals_do():
-    base, names = load_task(TWO), ("reach", "reach_low", "reach_high", "reach_sd")
-    tasks = [base.model_copy(update={"name": name, "title": name}) for name in names]
-    rows = []
-    for place, name in enumerate(names):
-        rows += runs_of(name, "mine", [-470 - 10 * place] * 3)
-        rows += runs_of(name, "hill-climbing", [-480] * 3)
-    study = study_of(rows, tasks, optima={name: BestKnown(-465, -465) for name in names})
-    table = TABLES["ranking"]
-    frame = table(study)
-    columns = shown_columns(table, study, frame)
-    assert {f"on {name}" for name in names} <= columns.keys()
-    assert columns["on reach"].texts == ["3.2", "1.1"]
 
 
 def test_hands_of_many_runs_are_shares_of_those_that_are_executed():

@@ -4,7 +4,6 @@ import copy
 import multiprocessing
 import pickle
 import re
-import runpy
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
@@ -170,18 +169,6 @@ def test_the_examples_are_methods(path, in_this_process, monkeypatch):
     assert session.meter.trials == len(session.rewards) == 300
     reward = execute("ascending", solution).reward
     assert reward == max(session.rewards)
-
-
-def test_hands_are_chosen_by_the_program_of_the_page(monkeypatch, capsys):
-    costs = []
-    monkeypatch.setattr(coartic, "objective", lambda *a: costs.append(objective(*a)) or costs[-1])
-    runpy.run_path(str(EXAMPLES / "choose_hands.py"), run_name="__main__")
-    ticks, hands = re.search(r"([0-9.]+) ticks with hands (\w+)", capsys.readouterr().out).groups()
-    assert len(costs) == 16
-    assert sum(cost.evaluations + 1 for cost in costs) <= 10_000
-    found = min(cost.best_cost for cost in costs)
-    assert float(ticks) == found <= 1.09 * costs[0].best_known
-    assert objective("two-armed-2").hands != hands
 
 
 def test_frames_are_points_in_the_order_of_their_columns():

@@ -117,11 +117,6 @@ def test_a_file_that_is_no_table_is_refused(read, sentence):
         read(NO_TABLE[sentence])
 
 
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(CoarticError, match=r"none.csv cannot be read: No such file"):
-        read_hits(tmp_path / "none.csv", BOTH)
-
-
 def test_durations_are_ticks_of_their_unit(people, read):
     seconds = people.assign(duration=people.ticks / 100).drop(columns="ticks")
     with pytest.warns(UserWarning, match="median movement of . takes 0.01 times") as warned:

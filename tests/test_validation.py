@@ -148,26 +148,6 @@ def test_the_nearest_name_is_said():
     assert did_you_mean("qqq", ["descending", "ascending"]) == ""
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        (["draw", "ascending", "--out", ""], "is empty"),
-        (["run", "paper", "--runs", "two"], "runs is 'two'"),
-        (["run"], "name a suite: ablations, "),
-        (["report", "nowhere"], "there is no folder nowhere"),
-        (["play", "--out", "x.txt"], ".html"),
-    ],
-)
-def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monkeypatch, coartic):
-    monkeypatch.chdir(tmp_path)
-    code, text, error = coartic(*command)
-    (line,) = error.splitlines()
-    assert (code, text) == (2, "")
-    assert line.startswith("Error: ")
-    assert words in line
-    assert not [*tmp_path.iterdir()]
-
-
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
 Trials = coartic.Optimiser.Parameters
 TASK, ROBOT = load_task("ascending"), Robot()
