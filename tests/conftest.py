@@ -213,14 +213,6 @@ def visited(browser, pages):
     assert problems == []
 
 
-@pytest.fixture
-def page_without_scripts(browser):
-    """An empty page, on which scripts do not run."""
-    context = browser.new_context(java_script_enabled=False)
-    yield context.new_page()
-    context.close()
-
-
 FIRST = (
     *("test_conformance", "test_pool", "test_cli", "test_method_files", "test_runner"),
     *("test_cluster", "test_report_page", "test_play_page", "test_report", "test_figures"),

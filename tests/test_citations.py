@@ -6,10 +6,9 @@ import unicodedata
 import pytest
 
 from coartic import load_task
-from coartic.analysis.citations import STATISTICS, THE_PAPER, bibliography, references
+from coartic.analysis.citations import STATISTICS, THE_PAPER, references
 from coartic.analysis.methods import KNOWN_METHODS
-from coartic.benchmarks.registry import METHOD_NAME, NAMES, built_in, registry
-from coartic.runs.method_info import MethodInfo
+from coartic.benchmarks.registry import built_in, registry
 from tests.support.suites import BROKEN, ROOT, cell_on, edit, run_and_write
 
 
@@ -54,46 +53,11 @@ def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
         assert title in text.lower() or key in ("kanoun2011", THE_PAPER)
 
 
-def test_no_file_may_take_a_name_that_people_read():
-    """Of those that could be an id, and are none."""
-    read = {text for row in KNOWN_METHODS.values() for text in (row.name, row.algorithm)}
-    assert {*filter(METHOD_NAME.fullmatch, read)} - {*KNOWN_METHODS} == {*NAMES}
-
-
 def test_every_method_has_a_row_and_every_entry_is_used():
     assert list(KNOWN_METHODS) == [method.name for method in BUILT_IN]
     behind_methods = {key for row in KNOWN_METHODS.values() for key in (*row.works, *row.solvers)}
     text = (ROOT / "analysis" / "references.bib").read_text(encoding="utf-8")
     assert {THE_PAPER, *STATISTICS} | behind_methods == set(BIB) == set(keys_in(text))
-
-
-def declared(title, citation, origin="built in"):
-    return MethodInfo(title, title, citation, (), True, {}, origin, "")
-
-
-def test_each_work_once_with_the_methods_that_rest_on_it():
-    text = bibliography({m.name: declared(m.title, m.citation) for m in BUILT_IN})
-    keys = keys_in(text)
-    assert keys[:2] == ["coartic", THE_PAPER]
-    assert sorted(keys) == sorted({"coartic", *BIB} - {*STATISTICS})
-    both = "% cma-es/bandit, cma-es/goal-by-goal"
-    assert f"{both}\n{references()['hansen2016']}\n" in text
-    assert set(keys_in(bibliography({}, analysis=True))) == {"coartic", THE_PAPER, *STATISTICS}
-
-
-def test_methods_of_others_cite_themselves():
-    text = bibliography({
-        "cma-es/bold": declared("Bold & fast", "A. B. C_d, me@here, 5 %\n of {x}.", "mine.py"),
-        "lab/silent": declared("Silent", "", "mine.py"),
-        "dual-process/EC9": declared("Of another version", "Ours (2030)."),
-    })  # fmt: skip
-    assert keys_in(text) == ["coartic", THE_PAPER, "method-cma-es-bold", "method-dual-process-ec9"]
-    note = r"A. B. C\_d, me@here, 5 \% of \textbraceleft{}x\textbraceright{}."
-    assert f"  note = {{{note}}}," in text
-    assert "% dual-process/EC9 cites: Ours (2030).\n" in text
-    assert "% lab/silent: it declares no citation; ask its authors what to cite\n" in text
-    comments = re.findall("^%.*", text, re.MULTILINE)
-    assert not any("@" in comment for comment in comments)  # BibTeX would read on there
 
 
 @pytest.mark.usefixtures("in_this_process")

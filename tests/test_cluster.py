@@ -1,7 +1,5 @@
 """Runs on a Dask cluster: the same results, and a sentence for whatever is wrong with it."""
 
-from dataclasses import replace
-
 import pytest
 
 from coartic import CoarticError, load_task
@@ -69,13 +67,6 @@ def test_a_method_of_a_file_runs_on_workers_that_are_processes(distributed, tmp_
             run_and_write(tmp_path / "other", [cell], executor=dask)
 
 
-def test_a_worker_with_another_version_is_refused(address, tmp_path, monkeypatch):
-    others = {name: replace(info, code="9.9") for name, info in registry().items()}
-    monkeypatch.setattr(cluster_module, "built_in", lambda: others)
-    with pytest.raises(CoarticError, match=r"is 9.9 on a Dask worker.*install the same"):
-        perform(planned(CELLS), tmp_path, executor=Dask(address))
-
-
 @pytest.mark.usefixtures("distributed")
 def test_nobody_at_an_address(tmp_path):
     import dask
@@ -84,33 +75,6 @@ def test_nobody_at_an_address(tmp_path):
         for address in ("tcp://127.0.0.1:1", "nonsense://x"):
             with pytest.raises(CoarticError, match=f"no Dask scheduler at {address}.*8786"):
                 perform(planned(CELLS), tmp_path, executor=Dask(address))
-
-
-def test_a_cluster_without_workers(distributed, tmp_path, monkeypatch):
-    messages = []
-    monkeypatch.setattr(cluster_module, "WORKERS_S", 0.5)
-    with distributed.LocalCluster(n_workers=0, processes=False, **QUIET) as cluster:
-        executor = Dask(cluster.scheduler_address, say=messages.append)
-        with pytest.raises(CoarticError, match="had no workers.*Finished runs are"):
-            perform(planned(CELLS), tmp_path, executor=executor)
-    assert len(messages) == 1
-
-
-def test_a_glance_without_workers_is_none(address, tmp_path, monkeypatch):
-    messages, glances = [], [{}]
-    executor = Dask(address, say=messages.append)
-    client = executor._client()
-    monkeypatch.setattr(cluster_module, "_RETURN_S", 0.0)
-    monkeypatch.setattr(executor, "_client", lambda: client)
-    monkeypatch.setattr(client, "nthreads", lambda: glances.pop() if glances else {"somewhere": 1})
-    perform(planned(CELLS, runs=1, trials=5), tmp_path, executor=executor)
-    assert (messages, glances) == ([], [])
-
-
-def test_what_is_no_executor(tmp_path):
-    with pytest.raises(CoarticError, match="executor is 2; .* Local .* Dask"):
-        perform(planned(CELLS), tmp_path, executor=2)
-    assert [*tmp_path.iterdir()] == []
 
 
 def test_a_scheduler_that_is_lost(distributed, tmp_path, monkeypatch):

@@ -1,12 +1,10 @@
 """The names of ``coartic``: what they take, what they refuse, and how they show themselves."""
 
-import inspect
-
 import numpy as np
 import pytest
 
 import coartic
-from coartic import Robot, load_task
+from coartic import load_task
 from coartic.method import Information, Session
 
 TASK = load_task("two-armed-2")
@@ -32,26 +30,3 @@ def test_a_wrong_hand_sequence_is_refused_with_the_choices(call):
 def test_conditions_are_shown_as_they_are_written():
     for condition in (coartic.CONDITIONS | coartic.ABLATIONS).values():
         assert eval(repr(condition), {**vars(coartic)}) == condition
-
-
-def test_errors_can_be_imported():
-    """But for those of a folder below, which stay within it."""
-    errors = [coartic.CoarticError]
-    for error in errors:
-        errors += error.__subclasses__()
-    names = {error.__name__ for error in errors if error.__module__.count(".") == 1}
-    assert names <= {*coartic.__all__}
-
-
-PUBLIC = [getattr(coartic, name) for name in coartic.__all__]
-OF_A_ROBOT = [Robot.forward_kinematics, Robot.joint_positions, Robot.jacobian, Robot.base_outline]
-
-
-@pytest.mark.parametrize("function", [*filter(inspect.isfunction, PUBLIC), *OF_A_ROBOT])
-def test_docstrings_say_what_goes_in_and_what_comes_out(function):
-    text = inspect.getdoc(function)
-    parameters = {*inspect.signature(function).parameters} - {"self"}
-    for parameter in parameters:
-        assert f"\n{parameter} : " in text.partition("Parameters\n---")[2], parameter
-    assert "\nReturns\n-------\n" in text
-    assert "\nRaises\n------\n" in text or not parameters

@@ -1,6 +1,5 @@
 """Compiled code is never older than the sources it comes from."""
 
-import logging
 import os
 import shutil
 import sys
@@ -59,17 +58,6 @@ def test_settings_of_numba_in_a_folder_are_not_read(tmp_path):
     assert done.stdout.split() == ["/ours", "0"]
 
 
-def test_variables_that_numba_refuses_get_a_sentence(tmp_path):
-    code = """if True:
-        from coartic.motion.compile import entry
-        try:
-            entry(abs)(1.0)
-        except Exception as error:
-            print(type(error).__name__, error)"""
-    done = python("-c", code, cwd=tmp_path, NUMBA_NUM_THREADS="0")
-    assert done.stdout.startswith("CoarticError Numba cannot start (Number of threads")
-
-
 def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
     """Another file than the cached function's changes; the result follows. A full disk, say, cuts
     the index short, or the code."""
@@ -89,35 +77,6 @@ def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
         text.replace("xs[tip] - xs[joint]\n", "xs[tip] - 0.5 * xs[joint]\n"), encoding="utf-8"
     )
     assert apart(lever, tmp_path) == (6.0, 0)
-
-
-def waiting(folder):
-    """What is said, and computed, where somebody holds the lock until that is said."""
-    fcntl, said = pytest.importorskip("fcntl"), []
-    forget("coartic")
-    (place,) = (folder / "coartic" / "__pycache__").rglob("across.lock")
-    for path in place.parent.glob("*.nb?"):
-        path.unlink()
-    with place.open("wb", 0) as held:
-        fcntl.flock(held, fcntl.LOCK_EX)
-        held.write(b"1234")
-
-        def hears(record):
-            said.append(record.getMessage())
-            held.close()
-
-        logging.getLogger("coartic").setLevel(logging.INFO)
-        logging.getLogger("coartic").addFilter(hears)
-        return said, lever(folder), place.read_text() == str(os.getpid())
-
-
-def test_whoever_waits_is_told_for_which_process(tmp_path):
-    write_kernel(tmp_path)
-    assert apart(lever, tmp_path) == (5.5, 0)
-    (first, *_), result, is_ours = apart(waiting, tmp_path)
-    assert first.startswith("Waiting for process 1234, which compiles")
-    assert first.endswith("across.lock")
-    assert (result, is_ours) == ((5.5, 0), True)
 
 
 SLOTS = """

@@ -48,27 +48,6 @@ def test_what_is_not_ours_is_in_the_way_before_anything_is_written(tmp_path):
         publish(tmp_path / "b.txt", {"a.txt": b"1"})
 
 
-@pytest.mark.parametrize(
-    "listed", ["", "tables/thesis.tex", "tables/b.csv", "report.html", "a/b/c"]
-)
-def test_nothing_is_written_or_removed_by_way_of_links(tmp_path, listed):
-    """A folder from somebody else, whose listing says that all of it is ours."""
-    mine, folder = tmp_path / "mine", tmp_path / "report"
-    (mine / "b").mkdir(parents=True)
-    for name in ("thesis.tex", "b.csv", "report.html", "b/c"):
-        (mine / name).write_text("mine")
-    folder.mkdir()
-    for name in ("tables", "a"):
-        (folder / name).symlink_to(mine)
-    (folder / "report.html").symlink_to(mine / "report.html")
-    (folder / LISTING).write_text(f"{listed}\n../mine/thesis.tex\n{mine}/thesis.tex\n")
-    before = content(mine)
-    for what in (publish, make_folder):
-        with pytest.raises(CoarticError, match=r"by a link|did not write there"):
-            what(folder, {"tables/b.csv": b"1", "report.html": b"2"})
-    assert content(mine) == before
-
-
 def test_a_listing_that_leads_elsewhere_is_refused(tmp_path):
     (tmp_path / ".coartic-9-mine").write_text("mine")
     (tmp_path / "report").mkdir()
@@ -77,17 +56,6 @@ def test_a_listing_that_leads_elsewhere_is_refused(tmp_path):
         with pytest.raises(CoarticError, match="leads out of"):
             publish(tmp_path / "report", {"a.txt": b"1"})
     assert (tmp_path / ".coartic-9-mine").read_text() == "mine"
-
-
-def test_links_in_place_of_what_is_written_beside_are_not_followed(tmp_path):
-    (tmp_path / "mine").write_text("mine")
-    folder = tmp_path / "report"
-    folder.mkdir()
-    for name in (LISTING, f".coartic-{os.getpid()}-a.txt", f".coartic-{os.getpid()}-{LISTING}"):
-        (folder / name).symlink_to(tmp_path / "mine")
-    publish(folder, {"a.txt": b"1"})
-    assert (tmp_path / "mine").read_text() == "mine"
-    assert content(folder) == {"a.txt": b"1"}
 
 
 def test_what_fails_leaves_the_old_file(tmp_path, monkeypatch):

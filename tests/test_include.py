@@ -2,7 +2,6 @@
 
 import lzma
 import shutil
-import sys
 from dataclasses import replace
 
 import pack_shipped
@@ -19,7 +18,6 @@ from coartic.runs.plan import size_of
 from coartic.runs.store import RUNS_FILE, open_store, writing
 from tests.support.suites import (
     KNOWN,
-    Failing,
     InProcess,
     cell_on,
     edit,
@@ -97,35 +95,6 @@ def test_what_no_folder_has_is_performed(parts, left, tmp_path):
     assert joined([tmp_path / "more", parts[0]], tmp_path / "most", LEFT).present == 3 + 1
     with pytest.warns(UserWarning, match=rf"right has 2 runs of {EC1} on descending; 3 are asked"):
         joined(parts[1:], tmp_path / "few", LEFT, runs=3)
-
-
-def test_crashed_runs_of_a_source_are_performed_again(tmp_path):
-    run_and_write(tmp_path / "crashed", LEFT, executor=Failing(0), **OPTIONS)
-    assert joined([tmp_path / "crashed"], tmp_path / "whole", LEFT).present == 2
-    assert set(load(tmp_path / "whole").runs.status) == {"ok"}
-
-
-def test_a_folder_gives_what_it_has_and_is_asked_for_no_more(parts, left, tmp_path):
-    """Whatever it was asked for itself: nobody else's plan says how much is performed here."""
-    edit(left, "UPDATE cells SET runs = 1000000 WHERE position = 0")
-    with pytest.warns(UserWarning, match=f"left is not finished: it lacks runs of {EC1} on asc"):
-        progress = joined([left], tmp_path / "more", RIGHT[2:])
-    assert (progress.present, progress.done, progress.total) == (2 + 1, 1, 4)
-    edit(left, f"DELETE FROM results WHERE {OF_EC1}")  # the second one follows a gap
-    with pytest.warns(UserWarning, match="lacks runs of"):
-        progress = joined([left], tmp_path / "less", RIGHT[2:])
-    assert (progress.present, progress.done, progress.total) == (1, 1, 2)
-    assert check_runs(tmp_path / "more").wrong == check_runs(tmp_path / "less").wrong == []
-
-
-def test_runs_of_a_cell_under_two_limits_are_included(parts, left, tmp_path):
-    edit(left, f"UPDATE results SET time_limit_s = 50.0 WHERE {OF_EC1}")
-    assert joined([left], tmp_path / "whole", LEFT).present == 3
-
-
-def test_runs_of_a_method_that_is_not_here_are_refused(parts, tmp_path):
-    with open_store(parts[0]) as store, pytest.raises(CoarticError, match="with its method file"):
-        perform(store.plan(), tmp_path / "out", executor=InProcess())
 
 
 OF_EC1 = f"run = 0 AND cell IN (SELECT id FROM cells WHERE method = '{EC1}')"
@@ -217,51 +186,3 @@ def test_packed_results_say_the_same(packed, tmp_path):
     assert full.runs.best_trial.equals(downsampled.runs.best_trial)
     with open_store(tmp_path) as store:
         assert store.run(full.runs.query("trials > 1").run_id.iloc[0]).is_downsampled
-
-
-def test_results_are_packed_again_where_they_have_not_changed(
-    packed, tmp_path, monkeypatch, capsys
-):
-    def pack(folder, *options):
-        monkeypatch.setattr(sys, "argv", ["shipped", *options, str(folder)])
-        return pack_shipped.main(), capsys.readouterr().out
-
-    before = (tmp_path / "packed" / "SHA256SUMS").read_text()
-    for name, change, said in (
-        ("fewer", f"DELETE FROM results WHERE {OF_EC1}", "is missing"),
-        ("other", "UPDATE results SET trials = trials + 1", "trials: "),
-    ):
-        edit(shutil.copytree(packed, tmp_path / name), change)
-        code, text = pack(tmp_path / name)
-        assert (code, said in text, "--changed" in text) == (1, True, True)
-    assert (tmp_path / "packed" / "SHA256SUMS").read_text() == before
-    same = shutil.copytree(packed, tmp_path / "same")
-    edit(same, "UPDATE results SET cpu_s = 9")
-    assert pack(same) == (0, f"{same}: no differences to what is shipped\n")
-    assert pack(tmp_path / "other", "--changed")[0] == 0
-    with shipped.open_shipped("paper") as store:
-        assert (store.runs().trials == load(tmp_path / "other").runs.trials).all()
-    other = replace(KNOWN[EC1], code="0123456789ab")
-    run_and_write(tmp_path / "old", [cell_on(load_task("ascending"), other)], **OPTIONS)
-    with pytest.raises(SystemExit):  # whatever has changed
-        pack(tmp_path / "old", "--changed")
-    assert "has dual-process/EC1 0123456789ab" in capsys.readouterr().err
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_command(packed, parts, tmp_path, coartic):
-    """A method is written by a command, run beside the shipped results, and there when that is
-    repeated; a colleague includes the folder with another one, without the method's file."""
-    mine, out = tmp_path / "my_search.py", tmp_path / "out"
-    small = ("--runs", 2, "--trials", 40, "--tasks", "ascending,descending")
-    assert coartic("new", "my-search", "--out", mine)[0] == 0
-    own = ("--method-file", mine, "--include", "shipped", "--out", out)
-    code, text, _ = coartic("run", "paper", *own, *small)
-    assert (code, text[:16]) == (0, "8 runs (4 reused")
-    assert coartic("run", "paper", *own, *small)[1].startswith("8 runs (8 reused)")
-    theirs = load(packed).runs
-    assert set(load(out).runs.method) == {"my-search", *theirs.method}
-    assert set(theirs.run_id) < set(load(out).runs.run_id)
-    both = ("--include", out, "--include", parts[0], "--out", tmp_path / "both", *small)
-    code, text, _ = coartic("run", "paper", "--methods", "EC1", *both)
-    assert (code, text[:19]) == (0, "10 runs (10 reused)")

@@ -5,9 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from coartic import Movement, NotApplicableError, corrective_trial, load_task
-from coartic.benchmarks.registry import built_in
-from coartic.method import BudgetError, Information, Session, UndeclaredError, run_method
+from coartic import Movement, corrective_trial, load_task
+from coartic.method import BudgetError, Information, Session, UndeclaredError
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.motion.solution import movements_of
 from tests.support.strategies import make_trials, sample
@@ -29,13 +28,6 @@ def test_a_budget_that_ends_within_a_batch():
         session.trials(hands, targets)
 
 
-def test_a_method_is_not_run_on_a_task_to_which_it_does_not_apply():
-    two_armed = built_in()["dual-process/EC4"].configure({"trials": 1})
-    with pytest.raises(NotApplicableError, match="'ascending' has no left hand"):
-        run_method(two_armed, "ascending")
-    assert run_method(two_armed, "two-armed-1")[1].trials_made == 1
-
-
 def test_a_method_without_the_corrective_process_does_not_see_it():
     task = load_task("ascending")
     hands, targets = sample(task, 3)
@@ -53,20 +45,6 @@ def test_a_method_without_the_corrective_process_does_not_see_it():
         session.trials(hands, targets)
     with pytest.raises(UndeclaredError, match="reward by trial"):
         Session(task, 0, OPTIMISER_INFORMATION - BLIND).trials(hands, targets)
-
-
-@pytest.mark.parametrize(
-    ("name", "hands", "shape", "value", "message"),
-    [
-        ("ascending", "RRR", (3, 10), 0.0, "has shape"),
-        ("ascending", ["RRR"], (2, 3, 10), 0.0, "hand"),
-        ("ascending", "RRR", (1, 3, 10), np.inf, "infinite"),
-        ("two-armed-1", "RRRR", (1, 4, 10), 0.1, "moves the base in y"),
-    ],
-)
-def test_trials_that_cannot_be_made(name, hands, shape, value, message):
-    with pytest.raises(ValueError, match=message):
-        make_trials(load_task(name), hands, np.full(shape, value))
 
 
 def test_a_target_that_is_far_away_fails_its_trial_alone():
@@ -87,18 +65,6 @@ def test_a_target_that_is_far_away_fails_its_trial_alone():
     assert [session.rewards[n] for n in (0, 5, 11)] == [None] * 3
     assert session.meter.failed_trials == others.meter.failed_trials + 3
     assert session.meter.movement_ticks == others.meter.movement_ticks
-
-
-def test_no_number_of_threads_changes_a_trial(monkeypatch):
-    task = load_task("two-armed-1")
-    hands, targets = sample(task, 50)
-    hands, targets = [*hands] * 50, np.tile(targets, (50, 1, 1))
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    alone = make_trials(task, hands, targets)
-    for threads in ("2", "3,1"):
-        monkeypatch.setenv("OMP_NUM_THREADS", threads)
-        for one, other in zip(make_trials(task, hands, targets), alone, strict=True):
-            np.testing.assert_array_equal(one, other)
 
 
 def test_until_the_first_that_is_better():

@@ -1,8 +1,6 @@
 """Methods and tasks of the user's files, and the examples of the pages."""
 
-import re
 import signal
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +8,6 @@ import pytest
 
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
-from coartic.benchmarks.registry import built_in
 from tests.support.suites import ROOT
 
 METHOD = ROOT / "tests" / "methods" / "nearest_hand.py"
@@ -36,19 +33,6 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     code, _, error = coartic(*again)
     assert code == 2
     assert "unknown method 'nearest-hand': pass --method-file" in error
-
-
-def test_what_a_method_was_tuned_on_is_listed_and_changes_no_run(coartic, tmp_path):
-    assert all(info.tuned_on for info in built_in().values())
-    assert "Tuned on     the paper's tasks: twenty settings" in coartic("list", "cma-es/bandit")[1]
-    for text, said in (('tuned_on = "mine-0 to mine-9"', "mine-0 to mine-9"), ("", "not said")):
-        file = tmp_path / "nearest_hand.py"
-        file.write_text(
-            TEXT.replace("    stochastic = False\n", f"    stochastic = False\n    {text}\n")
-        )
-        assert f"Tuned on     {said}\n" in coartic("list", "nearest-hand", "--method-file", file)[1]
-    declared = built_in()["cma-es/bandit"]
-    assert replace(declared, tuned_on="other tasks") == declared
 
 
 HARMLESS = """os.chdir('/'); print('x' * 10**6)
@@ -81,12 +65,3 @@ def test_what_a_file_does_when_it_is_imported_is_no_matter_here(done, coartic, t
     assert AT_IMPORT[done] in error
     assert len(error.splitlines()) == (1 if AT_IMPORT[done] else 0)
     assert ("reluctance=0.0" in text) == (not AT_IMPORT[done])
-
-
-def test_the_pages_show_the_example_as_it_is():
-    pages = [ROOT / "docs" / "howto" / name for name in ("method.md", "task.md")]
-    text = "".join(page.read_text(encoding="utf-8") for page in pages)
-    shown = re.findall(r"```(?:python|toml)\n(.*?)```", text, re.DOTALL)
-    assert any(TEXT.strip() in block for block in shown)
-    task = METHOD.with_name("shelf.toml").read_text(encoding="utf-8").strip()
-    assert any(task in re.sub(r"\n?# shelf.toml\n", "", block) for block in shown)

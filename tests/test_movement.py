@@ -231,8 +231,3 @@ def test_a_correction_that_does_not_converge_has_a_reason():
             call(task)
     few = corrective_trial("ascending", "RRR", model=MotionModel(max_iterations=2))
     assert few.reason.endswith("in 2 iterations")
-
-
-def test_a_gain_that_is_too_large_does_not_converge():
-    large = MotionModel(gain=1e6, max_iterations=500)
-    assert not correct(ROBOT, np.full(10, 0.3), "right", (5.0, 1.0), model=large).converged

@@ -14,14 +14,20 @@ from coartic import (
     corrective_trial,
     execute,
     execute_noisy,
-    hand_sequences,
     load_task,
     movements_of,
 )
 from coartic.analysis.study import load
-from coartic.tasks.task import hands_of
 from tests.support import noise as reference
-from tests.support.strategies import STUCK, changed, failing_task, posture, tiny_task, uneven_task
+from tests.support.strategies import (
+    STUCK,
+    changed,
+    failing_task,
+    posture,
+    random_solution,
+    tiny_task,
+    uneven_task,
+)
 
 TASKS = {name: load_task(name) for name in ("ascending", "two-armed-1", "two-armed-2")}
 TASKS["uneven"] = uneven_task()
@@ -32,48 +38,18 @@ SHORT = MotionModel(max_iterations=120)
 """Corrections that take longer fail."""
 
 
-def random_solution(task, model, rng):
-    """Movements of all kinds, up to three for a goal, near what hits the goal and far from it; some
-    coordinates stay where the corrective process alone would have them before."""
-    hands = str(rng.choice(hand_sequences(task)))
-    alone = [task.q0, *corrective_trial(task, hands, model=model).configurations]
-    alone += [alone[-1]] * (len(task.goals) + 1 - len(alone))
-    locked = ["xy".index(coordinate) for coordinate in task.locked_base]
-
-    def configuration(goal):
-        q = alone[goal + 1] + rng.choice([0.0, 0.02, 0.3]) * rng.standard_normal(len(task.q0))
-        stays = rng.random(len(q)) < 0.2
-        q[stays] = alone[goal][stays]
-        q[locked] = task.q0[locked]
-        return q
-
-    def movement(goal, hand):
-        kind = str(rng.choice(["learned", "planned", "corrective", "path"]))
-        if kind == "path":
-            way = [configuration(goal) for _ in range(rng.integers(1, 4))]
-            return Movement(goal + 1, hand, kind, waypoints=np.array(way))
-        acts = kind == "corrective" and rng.random() < 0.5
-        return Movement(goal + 1, hand, kind, None if acts else configuration(goal))
-
-    return [
-        movement(goal, hand)
-        for goal, hand in enumerate(hands_of(hands))
-        for _ in range(rng.integers(1, 4))
-    ]
-
-
 @pytest.mark.parametrize("signal_dependent", [False, True])
 @pytest.mark.parametrize("name", TASKS)
 def test_executions_are_those_of_the_slow_implementation(name, signal_dependent):
     rng, options = np.random.default_rng(7), {"signal_dependent": signal_dependent}
-    solutions = [random_solution(TASKS[name], SHORT, rng) for _ in range(12)]
+    solutions = [random_solution(TASKS[name], SHORT, rng) for _ in range(8)]
     seen = []
     for motor_noise in (0.01, 0.1):
-        case = (TASKS[name], solutions, motor_noise, 5, 3, SHORT)
+        case = (TASKS[name], solutions, motor_noise, 3, 3, SHORT)
         made = execute_noisy(*case, **options)
         np.testing.assert_array_equal(made, reference.execute_noisy(*case, **options))
         seen.append(made)
-    assert len({*np.ravel(seen)} - {np.nan}) > 20
+    assert len({*np.ravel(seen)} - {np.nan}) > 10
 
 
 def test_many_robots_execute_as_one_after_the_other():
@@ -200,7 +176,7 @@ def test_an_execution_fails_where_the_corrective_process_does():
 def test_shipped_runs_without_noise_have_their_rewards():
     study, seen = load("shipped"), set()
     for task, method in study.cells:
-        executed = study.executed(task, method).runs[:2]
+        executed = study.executed(task, method).runs[:1]
         made = execute_noisy(task, [each.movements for each in executed], 0.0, 1, 0)
         assert made[:, 0].tolist() == [each.ticks for each in executed]
         seen |= {movement.kind for each in executed for movement in each.movements}
@@ -213,16 +189,13 @@ SOLUTION = corrective_trial("ascending", "RRR").movements
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        *(({"motor_noise": noise}, "motor_noise is") for noise in (-0.01, np.nan, np.inf, "0.01")),
-        *(({"repeats": repeats}, "repeats is") for repeats in (0, -1, 2.0)),
-        *(({"seed": seed}, "seed is") for seed in (-1, 0.5, None, [True])),
-        ({"seed": [1, 2]}, "seed has 2 entries; it must have one for each of the 1"),
-        ({"model": MotionModel(gain=0.0)}, "gain"),
-        ({"task": "two-armed-2"}, r"solutions\[0\]: task .* goals \[1, 2, 3\]"),
+        *(({"motor_noise": noise}, "motor_noise is") for noise in (-0.01, np.nan)),
+        ({"repeats": 0}, "repeats is"),
+        ({"seed": -1}, "seed is"),
+        ({"seed": [1, 2]}, "seed has 2 entries; it needs one for each of the 1 solutions"),
         ({"task": "descending"}, r"took 319 ticks; on task 'descending'.* of another task\?"),
         ({"task": changed("ascending", hands=["left"], initial_hands="LLL")}, "has no right hand"),
-        ({"task": uneven_task(goals=[[1.0, 2.0]] * 3, initial_hands="RRR")}, "configuration has"),
-        ({"solutions": SOLUTION}, r"solutions\[0\]: .* must be a list of movements"),
+        ({"solutions": SOLUTION}, r"solutions\[0\]: .* needed is a list of movements"),
     ],
 )
 def test_wrong_arguments_are_refused(change, words):

@@ -7,8 +7,8 @@ from xml.dom import minidom
 import numpy as np
 import pytest
 
-from coartic import Task, load_task
-from coartic.analysis import FIGURES, TABLES, load, ranking
+from coartic import load_task
+from coartic.analysis import TABLES, load, ranking
 
 
 def elements(page, name):
@@ -31,17 +31,6 @@ def test_a_task_is_a_picture_of_its_goals(name):
     assert {float(circle["r"]) for circle in circles} == {task.radius}
     due = np.diff(task.goal_array, axis=0) * [1, -1]  # y points down
     np.testing.assert_allclose(np.diff(places[: len(task.goals)], axis=0), due, atol=2e-3)
-
-
-def test_a_figure_is_shown_well_formed(traced):
-    plot = FIGURES["learning-curves"](traced)
-    ((_, caption),) = elements(plot._repr_html_(), "figcaption")
-    assert caption.startswith("Learning curves. ")
-
-
-def test_a_title_of_markup_stays_text():
-    task = Task(name="mine", title="<b>&", goals=[(3, 2)])
-    assert elements(task._repr_html_(), "b") == []
 
 
 def test_shipped_results_are_read_as_a_study(tmp_path, monkeypatch):

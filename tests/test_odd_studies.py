@@ -4,18 +4,14 @@ import math
 
 import pandas as pd
 
-from coartic import load_task
-from coartic.analysis import FIGURES, TABLES
+from coartic.analysis import TABLES
 from coartic.analysis.control import with_control
 from coartic.analysis.optima import BestKnown
-from coartic.analysis.report import sections
-from coartic.analysis.report.sections import SECTIONS
-from coartic.analysis.tables import is_setting, shown_columns
-from tests.support.made_up import runs_of, study_of, study_of_trials
+from coartic.analysis.tables import is_setting
+from tests.support.made_up import runs_of, study_of
 
 ONE, TWO, THREE = "ascending", "two-armed-1", "two-armed-2"
 BEST = {ONE: -292, TWO: -465, THREE: -306, "descending": -292}
-SECTION = {section.id: section for section in SECTIONS}
 
 
 def behind(tasks, method, *ticks, **more):
@@ -47,28 +43,6 @@ def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
     assert 0 < is_setting(study, table).sum() == len(table) / 2
 
 
-def test_a_setting_without_its_method_is_drawn():
-    rows = [
-        *behind([TWO, THREE], "cma-es/bandit", 10, 11, None),
-        *behind([TWO, THREE], "cma-es/bandit", 20, 21, 22, setting="sigma=0.1"),
-        *behind([TWO, THREE], "hill-climbing", 15, 14, 13),
-    ]
-    drawn = FIGURES["ranking"](planted(rows)).data.method
-    assert [*drawn] == ["hill-climbing", "cma-es/bandit sigma=0.1"]
-
-
-def test_the_sentence_of_the_ranking_is_of_methods_on_all_tasks():
-    """An own method that solved more tasks, but not all, is not among them."""
-    methods = "random-search", "hill-climbing", "cma-es/bandit"
-    study = planted(
-        *(behind([ONE, TWO, THREE], method, 15, 14, 13) for method in methods),
-        behind([ONE, TWO], "mine", 5, 4, 3),
-    )
-    (said,) = [line for line in sections.finding(study, SECTION["ranking"]) if "trial" in line]
-    assert "hill climbing" in said
-    assert "mine" not in said
-
-
 def test_a_task_without_a_solution_of_every_run_is_not_solved():
     study = planted(
         *(behind([ONE], method, 10, 11, 12) for method in ("mine", "hill-climbing")),
@@ -81,33 +55,9 @@ def test_a_task_without_a_solution_of_every_run_is_not_solved():
     assert (others.why == "2 of 9 runs failed").all()
 
 
-def test_names_of_tasks_may_end_as_columns_of_intervals_do():
-    base, names = load_task(TWO), ("reach", "reach_low", "reach_high", "reach_sd")
-    tasks = [base.model_copy(update={"name": name, "title": name}) for name in names]
-    rows = []
-    for place, name in enumerate(names):
-        rows += runs_of(name, "mine", [-470 - 10 * place] * 3)
-        rows += runs_of(name, "hill-climbing", [-480] * 3)
-    study = study_of(rows, tasks, optima={name: BestKnown(-465, -465) for name in names})
-    table = TABLES["ranking"]
-    frame = table(study)
-    columns = shown_columns(table, study, frame)
-    assert {f"on {name}" for name in names} <= columns.keys()
-    assert columns["on reach"].texts == ["3.2", "1.1"]
-
-
 def test_hands_of_many_runs_are_shares_of_those_that_are_executed():
     hands = ["RRRR", "LRLR", "LRLR", "LRLR"] * 500
     study = study_of(runs_of(TWO, "hill-climbing", [-470] * 2000, hands=hands))
     values = pd.Series([1.0] * 500 + [math.nan] * 1500, study.runs.index)
     object.__setattr__(study, "signature", lambda *_: values)
     assert [*with_control(study, "first", TWO, "hill-climbing")] == ["LRLR", "RRRR"]
-
-
-def test_a_method_without_evaluations_has_its_name_in_the_figure_of_costs():
-    rewards = {(TWO, "mine"): [[-520, -480, -470]] * 3, (TWO, "hill-climbing"): [[-520, -490]] * 3}
-    study = study_of_trials(rewards, [], forward_kinematics=5)
-    study.runs.loc[study.runs.method == "mine", "forward_kinematics"] = 0
-    plot = FIGURES["runtimes"](study)
-    texts = [text.get_text() for axes in plot.figure.axes for text in axes.texts]
-    assert {"mine", "hill climbing"} <= {*texts}

@@ -34,6 +34,12 @@ def test_the_base_is_locked_beside_the_task():
     assert caught.value.outcome == "infeasible"
 
 
+def test_the_fewest_ticks_of_all_plans_and_roundings_are_found():
+    """On a task where the shortest plan found is not the one with the fewest ticks."""
+    _, execution, _ = solve(OptimumSearch, "two-armed/v1/d000", graphs=1, chains=4, nodes=100)
+    assert execution.reward >= -735
+
+
 def test_a_hand_that_is_there_already_saves_a_tick():
     """The left hand stands in goal 2 from the start: it is hit as its turn comes."""
     task = changed("two-armed-2", goals=[[4.5, 1.0], [3.5, 0.1]], initial_hands="RL")

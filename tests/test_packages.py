@@ -102,20 +102,6 @@ def test_the_lowest_and_the_newest_versions(built, tmp_path, minor, versions):
     assert len([*(place / "results" / "report").rglob("*.tex")]) > 3
 
 
-def test_a_checkout_without_symbolic_links_gets_a_sentence(tmp_path):
-    clone, words = tmp_path / "clone", "has no symbolic links. Install the wheel, or"
-    do("git", "clone", "-q", "-c", "core.symlinks=false", ROOT, clone, cwd=tmp_path)
-    for command in (("make", "setup"), (sys.executable, "-m", "coartic", "list")):
-        done = subprocess.run([*command], cwd=clone, capture_output=True, text=True)
-        assert done.returncode
-        assert words in done.stdout + done.stderr
-        assert "Traceback" not in done.stderr
-    assert not (clone / ".venv").exists()
-    do("git", "config", "core.symlinks", "true", cwd=clone)
-    do("git", "checkout", "--", "coartic", cwd=clone)
-    assert (clone / "coartic" / "benchmarks").is_dir()
-
-
 def test_the_source_distribution_with_the_pinned_versions(built, tmp_path):
     pins = ROOT / "constraints.txt"
     environment, place = installed(sys.executable, tmp_path, "-c", pins, built[0])

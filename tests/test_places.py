@@ -12,46 +12,28 @@ from coartic.runs import store
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import ROOT, paper_cells, run_and_write
 
-RUN = "0" * 16
 LONG = "/".join(["long" * 30] * 5)  # SQLite takes no path of more than 512 letters
 COMMANDS = {
     "run": "run quick --tasks ascending --methods corrective-alone/given --jobs 1 --out {}",
     "include": "run paper --tasks ascending --methods EC1 --include {} --out new",
     "report": "report {}",
-    "report to": "report good --out {}",
     "verify": "verify {}",
-    "cite": "cite {}",
-    "film": f"draw {{}} --run {RUN} --out film.gif",
-    "film to": "draw good --run {run} --out {}/film.gif",
-    "verify run": f"verify {{}} --run {RUN}",
-    "draw to": "draw ascending --out {}",
-    "draw into": "draw ascending --out {}/tasks.svg",
-    "play": "play {}/task.toml --no-open --out page.html",
-    "play to": "play --no-open --out {}/page.html",
+    "draw": "draw ascending --out {}/tasks.svg",
     "new": "new my-search --out {}/mine.py",
-    "list": "list {}",
-    "list file": "list {}/task.toml",
-    "check": "check {}",
-    "check file": "check {}/task.toml",
-    "suite": "run {}/suite.toml --out new",
-    "task": "run paper --tasks {}/task.toml --out new",
-    "family": "run paper --family-file {}/task.toml --out new",
+    "task": "list {}/task.toml",
     "method": "list --method-file {}/mine.py",
 }
-READ_FILES = ("play", "list file", "check file", "suite", "task", "family", "method")
-READ = ("run", "include", "report", "verify", "cite", "film", "verify run")
-WRITE = ("report to", "draw to", "draw into", "film to", "play to", "new", "run")
-BOTH = (*READ, *WRITE, *READ_FILES, "list", "check")
+READ, WRITE = ("include", "report", "verify", "task", "method"), ("run", "draw", "new")
 PLACES = {
-    "file": BOTH,
-    "locked": BOTH,
-    "under": BOTH,
-    "unreadable": (*READ, *READ_FILES),
+    "file": READ,
+    "locked": (*READ, *WRITE),
+    "under": ("report", "new"),
+    "unreadable": READ,
     "closed": (*WRITE, "report"),
-    "empty": (*WRITE, "report"),
-    "folder": READ,
-    LONG: READ,
-    "missing": (*set(BOTH) - {"run", "report to", "draw to"},),
+    "empty": WRITE,
+    "folder": ("report", "run"),
+    LONG: ("report",),
+    "missing": (*READ, "draw"),
 }
 """Places, and the commands that cannot use them."""
 CALL = """
@@ -89,8 +71,7 @@ def without_rights():
 def said(tmp_path_factory):
     """What each command says of each place."""
     here = tmp_path_factory.mktemp("places")
-    study = run_and_write(here / "good", paper_cells(tasks=["ascending"]), runs=1, trials=5)
-    (run,) = study.runs.run_id
+    run_and_write(here / "good", paper_cells(tasks=["ascending"]), runs=1, trials=5)
     (here / "file").write_text("no folder")
     (here / "empty").mkdir()
     (here / "folder" / store.RUNS_FILE).mkdir(parents=True)
@@ -99,7 +80,7 @@ def said(tmp_path_factory):
         shutil.copytree(here / "good", here / name, dirs_exist_ok=True)
         (here / name / "report").mkdir(exist_ok=True)
         (here / name / "report" / ".coartic-files").write_text("report.html\n")
-        for file in ("task.toml", "suite.toml", "mine.py"):
+        for file in ("task.toml", "mine.py"):
             (here / name / file).write_text(GOOD)
             (here / name / file).chmod(0)
     os.symlink("over/under", here / "under")
@@ -108,7 +89,7 @@ def said(tmp_path_factory):
     for path in (*(here / "closed").rglob("*"), here / "closed", here / "empty"):
         path.chmod(0o555 if path.is_dir() else 0o444)
     calls = {
-        f"{command} {place}": COMMANDS[command].format(place, run=run[:8]).split()
+        f"{command} {place}": COMMANDS[command].format(place).split()
         for place, chosen in PLACES.items()
         for command in chosen
     }
@@ -132,4 +113,4 @@ def test_a_place_that_cannot_be_used_gets_a_sentence(said, place):
         assert words.startswith("Error: "), command
         assert len(words.splitlines()) == 1, words
         assert len(words) < 1200, command
-    assert place != "locked" or "Permission denied" in said["list locked"][1]
+    assert place != "locked" or "Permission denied" in said["report locked"][1]

@@ -9,7 +9,6 @@ from coartic.benchmarks import include, runner, template
 from coartic.benchmarks.planning import plan, plan_suite, request_for
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import load_suite
-from coartic.tasks.task import task_text
 from tests.support.suites import ROOT, suite_of
 
 MINE = Path(template.__file__).read_text(encoding="utf-8")
@@ -99,17 +98,6 @@ def test_a_method_file_that_is_named_runs():
     assert methods("own.toml") == ["first"]
 
 
-def test_a_part_of_one_run_has_the_run_of_a_method_without_a_seed():
-    alone = {"tasks": ["ascending"], "methods": ["corrective-alone/given"]}
-    assert plan_suite("paper", **alone, runs=range(1)) == plan_suite("paper", **alone)
-
-
-def test_a_method_file_may_declare_its_encoding(tmp_path):
-    text = "# coding: latin-1\n# \u00fc\n" + MINE.replace("NAME", "first")
-    (tmp_path / "mine.py").write_text(text, encoding="latin-1")
-    assert "first" in registry([tmp_path / "mine.py"])
-
-
 def test_the_command_outranks_a_grid_and_a_block(tmp_path):
     ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
     suite_of(tmp_path, ec1 + "grid = { trials = [5, 50] }", ec1 + "parameters = { trials = 500 }")
@@ -117,25 +105,6 @@ def test_the_command_outranks_a_grid_and_a_block(tmp_path):
     assert trials == [5, 50, 500]
     (job,) = plan_suite(tmp_path / "own.toml", trials=7)
     assert job.cell.parameters["trials"] == 7
-
-
-def test_a_task_file_of_a_suite_is_added_where_the_suite_has_another_form_of_it(tmp_path):
-    """Where a block has the task itself, its methods alone run on it."""
-    mine = tmp_path / "mine.toml"
-    mine.write_text(task_text(load_task("ascending").model_copy(update={"name": "mine"})))
-    block = f'tasks = ["{mine}"]\nmethods = ["corrective-alone/given"]\n'
-    other = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
-    alone, learner = "corrective-alone/given", "dual-process/EC1"
-    for form, methods in (
-        ("", [alone]),
-        ("move = { goal = 1, by = [[0.1, 0.0]] }\n", [alone, learner]),
-        ("goals = [9]\n", [learner]),
-    ):
-        suite_of(tmp_path, block + form, other)
-        jobs = plan_suite(tmp_path / "own.toml", tasks=[str(mine)])
-        assert [(job.cell.task.name, job.cell.method.name) for job in jobs] == [
-            ("mine", method) for method in methods
-        ]
 
 
 @pytest.mark.parametrize(

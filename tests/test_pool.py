@@ -12,10 +12,9 @@ from coartic import CoarticError, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import pool
 from coartic.benchmarks.pool import Local
-from coartic.benchmarks.processes import signal_name
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
-from tests.support.processes import comes, folders_of_session, python
+from tests.support.processes import comes, folders_of_session
 from tests.support.suites import KNOWN, cell_on, made_once, planned, run_and_write
 
 pytestmark = [pytest.mark.process, pytest.mark.usefixtures("not_repeated")]
@@ -121,24 +120,21 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.isna().reward if status != "ok" else run.reward == HONEST
 
 
-def test_a_signal_without_a_name_has_its_number():
-    assert [signal_name(9), signal_name(999)] == ["SIGKILL", "signal 999"]
-
-
 def test_a_run_that_waits_twice_is_stored_as_timed_out(tmp_path):
-    """In one command, which counts what it stored; a command with more time makes it again."""
+    """In one command, which counts what it stored; a command with more time makes it again. Wall
+    time is ample: on a busy machine a run that waits for nothing but its turn ends in time."""
     body = """if not os.path.exists(__file__ + '.NAME'):
             open(__file__ + '.once', 'w').close()
             time.sleep(999)
         return Result(corrected(session))"""
     once, twice = (body.replace("NAME", name) for name in ("once", "ready"))
     cells = cells_of(tmp_path, once=once, twice=twice)
-    executor, limits = Local(1, timeout_s=0.5), (0.3, 0.3, 0.31)
+    executor, limits = Local(1, timeout_s=4.1), (0.3, 0.3, 0.31)
     plans = [planned(cells, runs=1, time_limit_s=limit) for limit in limits]
     said = [str(perform(plan, tmp_path / "out", executor=executor)) for plan in plans[:2]]
     runs = load(tmp_path / "out").runs
     assert runs.status.tolist() == ["ok", "timeout"]
-    assert runs.reason[1] == "wall time limit of 1.4 s exceeded twice: it waited"
+    assert runs.reason[1] == "wall time limit of 5 s exceeded twice: it waited"
     assert said[0].startswith("2 runs in ")
     assert "1 failed" in said[0]
     assert said[1].startswith("2 runs (2 reused) in ")
@@ -197,15 +193,6 @@ def test_a_working_folder_that_is_gone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_without_a_place_for_temporary_files_the_suite_ends(monkeypatch):
-    def full(*_, **__):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(pool.tempfile, "TemporaryDirectory", full)
-    with pytest.raises(CoarticError, match="No space left .*Finished runs are kept: repeat"):
-        list(Local(1).perform(PLAN))
-
-
 def test_jobs_of_many_methods_are_at_work_side_by_side(tmp_path):
     """Each waits until the other has begun; two processes at once are all that there are."""
     body = """open(__file__ + "." + self.name[5:], "w").close()
@@ -228,13 +215,6 @@ def test_a_file_that_is_changed_after_the_plan_ends_the_suite(tmp_path):
 
 def test_other_methods_and_the_parent_notice_nothing(runs):
     assert runs.reward["test/again"] == runs.reward["corrective-alone/given"] == HONEST
-
-
-def test_what_keeps_workers_from_beginning_is_said_without_a_traceback(tmp_path):
-    words = ["run", "comparison", "--tasks", "two-armed-1", "--methods", "EC2", "--runs", "1"]
-    done = python("-m", "coartic", *words, cwd=tmp_path, fails=True, NUMBA_DISABLE_JIT="1")
-    assert "NUMBA_DISABLE_JIT is set: unset it" in done.stderr
-    assert "File" not in done.stderr
 
 
 SCRIPT = """
@@ -285,11 +265,6 @@ def test_workers_end_with_their_parent(script):
         assert process.poll() is None
     process.kill()
     assert comes(lambda: not folders_of_session(process.pid))
-
-
-def test_a_time_out_of_bounds():
-    with pytest.raises(ValueError, match="timeout_s is nan"):
-        Local(timeout_s=float("nan"))
 
 
 def test_jobs_that_are_dropped_leave_no_folder(tmp_path, monkeypatch):

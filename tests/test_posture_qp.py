@@ -9,7 +9,7 @@ from coartic import Robot, execute, load_task
 from coartic.baselines.cascade import DAMPING, LIMIT, SLACK, solve_cascade
 from coartic.baselines.controllers import Aim
 from coartic.baselines.posture_qp import FACES, METHODS, GoalsAhead, PostureController
-from coartic.method import MethodError, Session, outline_of
+from coartic.method import MethodError, Session
 from coartic.robot import directions
 from tests.support.strategies import TIED, least_cost, solve, steps_from, tiny_task
 
@@ -91,11 +91,6 @@ def test_every_sequence_keeps_the_best(method):
     assert result.details["sequences"] == 4
     assert result.details["simulated_movements"] < 2 * 4
     assert solve(method, TIED)[1].hands == "RRL"
-
-
-def test_tasks_with_too_many_hand_sequences_are_refused():
-    many = outline_of(tiny_task(goals=[[5.0, 1.0]] * 13))
-    assert "hand sequences" in GoalsAhead().why_not(many)
 
 
 def controller(task):

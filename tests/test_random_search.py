@@ -5,12 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from coartic import CoarticError, load_task
+from coartic import load_task
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands
 from coartic.method import Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
 from tests.support.strategies import solve
-from tests.support.suites import KNOWN
 
 HANDS = {"descending": "RRR", "two-armed-1": "RRLR"}
 
@@ -75,9 +74,3 @@ def test_every_hand_sequence_has_stages_of_its_own_share():
     assert session.rewards[:10] == given.rewards
     few, *_ = solve(RandomSearchHands, task, trials=20, stages=20)  # a trial or two a sequence
     assert few.details == {"sequences": 16}
-
-
-@pytest.mark.parametrize("method", ["random-search", "random-search/hands"])
-def test_stages_are_at_most_the_trials(method):
-    with pytest.raises(CoarticError, match="stages is 101; .* number of trials, 100"):
-        KNOWN[method].complete({"trials": 100, "stages": 101})

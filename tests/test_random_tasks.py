@@ -64,11 +64,6 @@ def test_gaps_are_to_the_best_known_reward():
     assert list(runs.family.unique()) == [*ONE, *TWO]
 
 
-def test_more_than_eight_instances_are_not_shown_singly():
-    for count, shown in ((8, 8), (9, 0)):
-        assert len(rewarded(RISING, families=ONE, count=count).individual_tasks) == shown
-
-
 def test_gaps_have_intervals_in_each_family():
     study = rewarded({**RISING, EC4: lambda n: -540 - n}, families=TWO, count=8)
     row = dict(tables.list_family_gaps.rows(study))[EC4]

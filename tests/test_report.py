@@ -6,20 +6,17 @@ import shutil
 import subprocess
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
-from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, Movement
+from coartic import CoarticError
 from coartic.analysis import FIGURES, TABLES, tables
 from coartic.analysis.figures import drawings
 from coartic.analysis.report import build, sections
 from coartic.analysis.report.build import stamp, write_report
-from coartic.analysis.report.player import methods_played, player
-from coartic.analysis.report.sections import SECTIONS, attempt, finding, limits
-from coartic.analysis.study import Study, load
-from tests.support.made_up import runs_of, study_of
+from coartic.analysis.report.sections import SECTIONS, attempt, finding
+from coartic.analysis.study import load
 from tests.support.processes import ROOT
 from tests.support.suites import cells_of, run_and_write
 
@@ -55,36 +52,6 @@ def test_a_report_is_stamped_with_the_results_of_its_runs(traced, report):
     stamps = [stamp(runs) for runs in (traced.runs, traced.runs[::-1], other)]
     page = (report / "report.html").read_text("utf-8")
     assert [f'name="coartic-runs" content="{each}"' in page for each in stamps] == [1, 1, 0]
-
-
-def test_the_folder_below_is_named_where_there_are_no_results(traced, coartic, tmp_path):
-    (tmp_path / "below").symlink_to(traced.folder)
-    code, _, error = coartic("report", tmp_path)
-    assert (code, f"did you mean {tmp_path / 'below'}?" in error) == (2, True), error
-
-
-def test_the_commonest_reasons_and_few_runs_are_said(traced):
-    """Fewer than the paper's twenty."""
-    reasons = ["rare", *["often"] * 4, *["twice"] * 2, *["thrice"] * 3]
-    runs = traced.runs.reset_index(drop=True)
-    runs.loc[: len(reasons) - 1, "status"] = "crashed"
-    runs.loc[: len(reasons) - 1, "reason"] = reasons
-    reported = limits(Study(traced.folder, traced.plan, traced.made_with, runs))
-    said = ["4 × often", "3 × thrice", "2 × twice", "1 for other reasons"]
-    assert (reported["failed"], reported["reasons"]) == (10, said)
-    for count, few in ((19, 19), (20, 0)):
-        runs = runs_of("ascending", "dual-process/EC1", [-300] * count, commit="c0de")
-        assert limits(study_of(runs))["few"] == few
-    counts = {"trials": [100, 10_000], "commit": "c0de"}
-    runs = runs_of("ascending", "dual-process/EC1", [-300, -300], **counts)
-    assert limits(study_of(runs))["trials"] == [100]
-
-
-def test_p_is_small_below_a_thousandth(traced):
-    table = TABLES["contexts"]
-    frame = pd.concat([table(traced)[:1]] * 3).assign(p_holm=[0.0009, 0.001, 0.0099])
-    shown = tables.shown_columns(table, traced, frame)
-    assert shown["p_holm"].texts == ["< 0.001", "0.001", "0.010"]
 
 
 def test_a_value_without_a_column_and_a_column_without_a_value_are_errors(traced):
@@ -201,24 +168,14 @@ def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
     best, other, *_ = means.sort_values().index
     rows = re.findall(r"^learner EC1 \(σ ([\d.]+)[^)]*\) ", printed, re.MULTILINE)
     assert [*map(float, rows)] == means.sort_values().index.tolist()
-    papers = {0.05: ", the paper's"}
-    begin = (
-        f"learner EC1 (σ {best}{papers.get(best, '')}) comes nearest to the optimum: its gap is "
-        f"{100 * means[best]:.1f} %"
-    )
     answer = " ".join(finding(seen, SECTIONS[0])).replace("\xa0", " ")
-    assert answer.startswith(begin)
-    assert f"Next is learner EC1 (σ {other}{papers.get(other, '')}), " in answer
+    assert f"(σ {best}" in answer.partition(f"(σ {other}")[0]
+    assert f"{100 * means[best]:.1f} %" in answer
     plot = FIGURES["ranking"](seen)
     assert plot.data.set_index("value").gap.to_dict() == pytest.approx(means.to_dict())
-    marked = [label.get_text() for label in plot.figure.axes[0].get_xticklabels()]
-    assert marked == ["0.02", "0.05\n(the paper's)", "0.1"]
     write_report(seen, tmp_path / "report", for_paper=False)
     written = (tmp_path / "report" / "report.html").read_text("utf-8")
     assert "<h1>Noise</h1>\n<p>How much exploration noise?</p>" in written
-    assert not [
-        part for part in ('class="setting"', "after_1000", str(tmp_path)) if part in written
-    ]
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
@@ -262,26 +219,3 @@ def test_a_part_that_fails_costs_no_other(tmp_path, coartic, monkeypatch):
     section = re.search(r'<section aria-labelledby="coarticulation">.*?</section>', text, re.S)
     assert "could not be made: IndexError: list index out of range" in section[0]
     assert {path.stem for path in report.glob("tables/*.csv")} >= {"ranking", "signatures", "tasks"}
-
-
-def test_methods_that_follow_paths_are_left_out():
-    kinds = "corrective", "path"
-    rows = [run for kind in kinds for run in runs_of("ascending", kind, [-300], run_id=[kind])]
-    stored = {kind: [Movement(1, "right", kind)] for kind in kinds}
-    both, paths = (study_of(runs, movements=lambda _: stored) for runs in (rows, rows[1:]))
-    assert [run["id"] for run in methods_played(both, ["ascending"])] == ["corrective"]
-    assert player(paths) == ""
-
-
-def test_commands_name_a_folder_without_the_way_to_it(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    shown = {"a/b": "a/b", "../a": "a", ".": tmp_path.name, f"{tmp_path}/b c": "'b c'", "/a/b": "b"}
-    for folder, name in shown.items():
-        assert Study(Path(folder), [], {}, pd.DataFrame()).folder_in_commands == name
-
-
-def test_a_method_to_compare_with_is_meant_by_label_id_or_title(traced):
-    for name in ("dual-process/EC1", "EC1", traced.methods.title["dual-process/EC1"]):
-        assert load(traced.folder, against=name).against == "dual-process/EC1"
-    with pytest.raises(CoarticError, match="unknown method 'EC7'"):
-        load(traced.folder, against="EC7")

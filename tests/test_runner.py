@@ -1,16 +1,16 @@
 """Plans performed: seeds, ids, failures and scores of runs, whoever performs them."""
 
 import hashlib
-import time
+import subprocess
 import warnings
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from coartic import (
-    CoarticError,
     Movement,
     corrective_trial,
     initial_hands,
@@ -18,16 +18,16 @@ from coartic import (
 )
 from coartic.analysis import TABLES
 from coartic.analysis.study import load
-from coartic.benchmarks import reproduce
+from coartic.benchmarks import provenance, reproduce
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
-from coartic.benchmarks.runner import perform, plan_suite
+from coartic.benchmarks.runner import perform
 from coartic.benchmarks.scoring import score
-from coartic.benchmarks.worker import fail, perform_job
+from coartic.benchmarks.worker import fail
 from coartic.method import Meter
 from coartic.motion.batch import SLOTS
 from coartic.runs.plan import Job, run_seed
-from coartic.runs.record import Outcome, Times, too_long
+from coartic.runs.record import Outcome, Times
 from tests.support.strategies import STUCK, tiny_task
 from tests.support.suites import (
     BROKEN,
@@ -38,7 +38,6 @@ from tests.support.suites import (
     planned,
     run_and_write,
     same_results,
-    suite_of,
 )
 
 LEARNER = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])
@@ -91,32 +90,42 @@ def methods():
     return registry([BROKEN, EXAMPLES / "differential_evolution.py"])
 
 
-def test_long_runs_begin_first(tmp_path):
-    begun, planner = [], "posture-qp/current-goal"
-
-    class Watched(InProcess):
-        def perform(self, jobs):
-            begun.extend((job.cell.method.name, len(job.numbers)) for job in jobs)
-            return super().perform(jobs)
-
-    suite_of(
-        tmp_path,
-        'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\nruns = 2',
-        f'tasks = ["ascending", "descending"]\nmethods = ["{planner}"]',
-        'tasks = ["ascending"]\nmethods = ["dual-process/EC1-subtask"]\nruns = 4',
-    )
-    perform(plan_suite(tmp_path / "own.toml"), tmp_path / "results", executor=Watched(2))
-    assert begun == [
-        (planner, 1),
-        (planner, 1),
-        ("dual-process/EC1-subtask", 4),
-        ("dual-process/EC1", 2),
-    ]
-
-
 @pytest.mark.process
 def test_results_do_not_depend_on_executor_or_workers(results, tmp_path):
     same_results(run_and_write(tmp_path, executor=Local(2)), results)
+
+
+def test_a_run_in_a_checkout_has_its_commit(tmp_path, monkeypatch):
+    """With a plus if tracked files were changed since; also where a caller sets other places."""
+    folder = tmp_path / "checkout"
+    folder.mkdir()
+    (folder / "tracked").touch()
+
+    def git(*words):
+        me = ["-c", "user.name=me", "-c", "user.email=me"]
+        return subprocess.check_output(["git", "-C", folder, *me, *words], text=True).strip()
+
+    def commit_of_run(name):
+        provenance.current_environment.cache_clear()
+        (commit,) = run_and_write(tmp_path / name, [ALONE], runs=1).runs.commit
+        return commit
+
+    for words in ("init -q", "add tracked", "commit -q -m first"):
+        git(*words.split())
+    monkeypatch.setattr(provenance, "PACKAGE", folder / "coartic")
+    monkeypatch.setattr(provenance, "arithmetic", lambda: "")
+    (folder / "untracked").touch()
+    commit = git("rev-parse", "HEAD")
+    monkeypatch.setenv("GIT_DIR", str(tmp_path))
+    try:
+        assert commit_of_run("clean") == commit
+        (folder / "tracked").write_text("changed")
+        assert commit_of_run("changed") == f"{commit}+"
+        monkeypatch.setattr(provenance, "PACKAGE", folder / "packages" / "coartic")
+        (folder / "packages").mkdir()
+        assert pd.isna(commit_of_run("installed"))
+    finally:
+        provenance.current_environment.cache_clear()
 
 
 def test_seeds_are_paired_by_task_and_run(results):
@@ -224,31 +233,10 @@ def test_the_runs_of_a_batch_are_scored():
     assert downsampled.outcome.rewards == [None, -310, -319, None]
 
 
-def test_the_runs_of_a_batch_share_its_time():
-    cell = cell_on(load_task("ascending"), KNOWN["dual-process/EC1"], trials=50)
-    begun = time.perf_counter(), time.process_time()
-    outcomes = perform_job(Job(cell, 0, range(8)))
-    wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
-    assert 0 < sum(each.times.wall_s for each in outcomes) <= wall
-    assert 0 < sum(each.times.cpu_s for each in outcomes) <= cpu
-
-
 def test_a_solution_that_misses_a_goal_is_infeasible():
     job = Job(cell_on(STUCK, KNOWN["corrective-alone/given"]), 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
     assert (run.outcome.status, run.scores) == ("infeasible", {})
-
-
-def test_ten_thousand_movements_are_not_too_many():
-    task, move = load_task("ascending"), Movement(1, "right", "corrective")
-    assert too_long(task, [move] * 10_000) is None
-    assert "10001 movements" in str(too_long(task, [move] * 10_001))
-    still = [Movement(1, "right", "path", waypoints=np.tile(task.q0, (count, 1)))
-             for count in (39_999, 40_000)]  # fmt: skip
-    assert too_long(task, still[:1]) is None
-    assert "400010 numbers; at most 400000" in str(too_long(task, still[1:]))
-    far = Movement(1, "right", "planned", np.full(10, 1e308))
-    assert "its path has inf steps" in str(too_long(task, [far]))
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -260,12 +248,6 @@ def test_some_runs_of_every_cell_are_performed_again(results):
         ["task", "method", "setting"]
     )
     assert len(cells) == len(again) == len(results.cells)
-
-
-def test_a_folder_of_another_suite_is_refused(results):
-    plan = [replace(job, suite="quick") for job in planned()]
-    with pytest.raises(CoarticError, match="holds results of suite 'paper'"):
-        perform(plan, results.folder, executor=InProcess())
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -1,7 +1,6 @@
 """How far methods end from the optimum, who is ahead, and what it costs: by hand."""
 
 import math
-import pickle
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,6 @@ from coartic.analysis.methods import (
     BY_TRIAL,
     WITHOUT_REWARD,
     headline_methods,
-    methods_of,
 )
 from coartic.analysis.report import sections
 from coartic.analysis.report.sections import SECTIONS
@@ -23,11 +21,9 @@ from coartic.analysis.statistics import holm, stratified_test
 from coartic.analysis.study import Study
 from coartic.analysis.tables import shown_columns
 from coartic.analysis.words import number
-from coartic.cli.read import say_ranking
 from coartic.runs.shipped import open_shipped
 from tests.support.made_up import MadeUp, made_up_optima, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
-from tests.support.processes import ROOT
 
 EC1, BOTH = "dual-process/EC1", "dual-process (EC1, EC4)"
 LEARNER = {("ascending", EC1): [-300, -301, -302, -303],
@@ -134,30 +130,9 @@ def test_without_an_optimum_gaps_are_to_the_best_of_the_folder():
     gaps = {"mine": [3.5 / 293, 15 / 480], BOTH: [8.5 / 293, 1.5 / 480]}
     for method, of_method in gaps.items():
         assert ranked.gap[method] == pytest.approx(sum(of_method) / 2)
-    columns = shown_columns(TABLES["ranking"], unknown, ranked)
-    headings = {name: column.heading for name, column in columns.items()}
-    assert headings["gap"].startswith("gap to the best of this folder (%)")
-    for words in (*said(unknown, "ranking"), FIGURES["ranking"](unknown).alt, *headings.values()):
-        assert not re.search("optimum|known", words)
     assert TABLES["tasks"](unknown).source.tolist() == ["mine", "dual-process/EC4"]
     one = MadeUp(seen, optima=made_up_optima("ascending"), rewards=seen.rewards)
     assert TABLES["ranking"](one).loc["mine", "on ascending"] == pytest.approx(4.5 / 292)
-
-
-def test_the_ranking_figure_has_every_name_gap_and_interval():
-    rewards = {"best": -292, "far": -3000, "dual-process/EC1": -305}
-    runs = {("ascending", name): [reward] for name, reward in rewards.items()}
-    seen = study(runs | {("ascending", "spread"): [-294, -296, -299, -301]})
-    (axes,) = FIGURES["ranking"](seen).figure.axes
-    places = {text.get_text(): text.get_position()[1] for text in axes.get_yticklabels()}
-    right = {text.get_text(): text.xy[1] for text in axes.texts}
-    for name, gap in {"best": "0.0", "far": "927.4", "learner EC1": "4.5"}.items():
-        assert right[gap] == places[name]
-    (spread,) = (text for text in right if text.startswith("1.9 ["))
-    assert right[spread] == places["spread"]
-    bars = [bar for bars in axes.collections for bar in bars.get_segments() if len(bar)]
-    (ends,) = (bar[:, 0] for bar in bars if bar[0, 1] == places["spread"])
-    assert ends[0] < 100 * 5.5 / 292 < ends[1]
 
 
 ON_ONE = {("ascending", "mine"): [-300, -301, -302]}
@@ -180,14 +155,6 @@ def test_ranked_is_who_solved_all_tasks():
     ranked = ranking(seen.runs)
     assert ranked.gap.dropna().to_dict() == TABLES["ranking"](seen).gap.to_dict()
     assert ranked.why[ranked.why != ""].to_dict() == why
-
-
-def test_equal_gaps_are_a_tie():
-    same = {(task, name): rewards for (task, _), rewards in CMA.items()
-            for name in ("cma-es/bandit", "hill-climbing")}  # fmt: skip
-    (line,) = said(study(same), "ranking")
-    assert "the smallest" not in line
-    assert "place" not in line
 
 
 def with_trials(seen, by_method, suite_trials=None):
@@ -252,32 +219,14 @@ def test_a_study_of_numbers_of_trials_is_ranked_whole():
 def test_the_frame_of_shipped_runs_ranks_methods_on_all_tasks(suite):
     with open_shipped(suite) as store:
         seen = Study(Path(suite), store.plan(), store.made_with(), store.runs())
-    runs = seen.runs[~seen.runs.method.str.startswith("optimum")]
+    some = seen.runs.task.isin(seen.runs.task.unique()[:: 10 if suite == "families" else 1])
+    runs = seen.runs[some & ~seen.runs.method.str.startswith("optimum")]
     ranked, tasks = ranking(runs), runs.task.nunique()
     ran = runs.groupby("ranked_as").task.nunique()
     complete = {*ran.index[ran == tasks]}
     assert 0 < len(complete) < len(ran)
     assert {*ranked.index[ranked.why == ""]} == complete
     assert ranked.gap.notna().sum() == len(complete)
-
-
-def test_the_terminal_prints_every_method_that_was_asked_for(capsys, tmp_path):
-    """Each in the ranking, or with the reason why it is not there."""
-    names = ["cma-es/bandit", "random-search", "posture-qp/goals-ahead", "last"]
-    rewards = {(task, name): [best - n] * 3 for n, name in enumerate(names)
-               for task, best in (("ascending", -300), ("two-armed-1", -500))}  # fmt: skip
-    rows = [{**run, "commit": ""} for cell, of in (rewards | LEARNER | ON_ONE).items()
-            for run in runs_of(*cell, of)]  # fmt: skip
-    rows += runs_of("ascending", "hill-climbing", [-300] * 3, setting="width=0.2", commit="")
-    rows += runs_of("ascending", "hill-climbing", [None] * 3, setting="width=0.3", commit="")
-    seen = study_of(rows, optima=made_up_optima("ascending", "two-armed-1"))
-    say_ranking(seen, tmp_path)
-    printed = capsys.readouterr().out
-    ranked = [line.partition("  ")[0] for line in printed.splitlines()[1:6]]
-    assert ranked == seen.methods.title[TABLES["ranking"](seen).index].tolist()
-    reasons = dict(re.findall(r"Not ranked +(.+?): ((?:.|\n {3})+)", printed))
-    assert " ".join(reasons["1 of 2 tasks"].split()) == "hill climbing (width=0.2); mine"
-    assert reasons["1 of 2 tasks; 3 of 3 runs failed"] == "hill climbing (width=0.3)"
 
 
 def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
@@ -302,38 +251,6 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert (better.difference_low > 0).all()
     same = TABLES["differences"](study(TEN | {("ascending", "mine"): list(SPREAD - 303)}))
     assert same.difference_low.iloc[0] < 0  # runs with the same seeds are not matched
-
-
-def test_a_method_that_stops_early_says_so_in_a_note():
-    rows = [
-        *(run for cell, of in CMA.items() for run in runs_of(*cell, of)),
-        *runs_of("ascending", "early", [-305] * 3, trials=[3, 2, 3]),
-        *runs_of("two-armed-1", "early", [-505] * 3, trials=[3, 2, 3]),
-    ]
-    seen = with_trials(study_of(rows), {})
-    runs = seen.stored.assign(trials=[run["trials"] for run in rows])
-    seen = MadeUp(
-        Study(seen.folder, seen.plan, seen.made_with, runs),
-        optima=seen.optima,
-        rewards=seen.rewards,
-    )
-    assert TABLES["ranking"](seen).note.to_dict() == {
-        "cma-es/bandit": "",
-        "early": "made 3 of 10 trials",
-    }
-
-
-def test_a_run_without_a_solution_by_then_leaves_no_early_gap():
-    rows = [
-        *runs_of("ascending", "hill-climbing", [-300, -301, -302]),
-        *runs_of("ascending", "mine", [-300, -301, -302]),
-    ]
-    rewards = {row["run_id"]: np.array([-310.0, -305.0]) for row in rows}
-    rewards[rows[-1]["run_id"]] = np.append(np.full(1_000, np.nan), -302)
-    seen = study_of(rows, optima=made_up_optima("ascending"), rewards=lambda: iter(rewards.items()))
-    early = TABLES["ranking"](seen).gap_early
-    assert early["hill-climbing"] == pytest.approx((305 - 292) / 292)
-    assert math.isnan(early["mine"])
 
 
 def test_all_methods_are_compared_with_a_method_of_choice():
@@ -362,14 +279,6 @@ def test_all_methods_are_compared_with_a_method_of_choice():
     assert (with_a.p_holm < 0.05).all()
 
 
-def with_parameters():
-    """A method from a file, and a built-in one without its defaults, beside the learner."""
-    seen = study(TEN | strangers(("mine", 2), ("hill-climbing", -5), runs=10))
-    learns = seen.runs.method.str.contains("/EC")
-    runs = seen.runs.assign(setting=np.where(learns, "", "width=0.2"))
-    return study_of(runs, optima=seen.optima, rewards=lambda: iter(()))
-
-
 def with_settings(*settings, tasks=("ascending",), more=()):
     """The learner with settings of its noise, each 4 ticks nearer than the setting before."""
     rows = [
@@ -394,16 +303,6 @@ def test_settings_are_ranked_as_methods_are():
     page = tables.html_of(TABLES["ranking"], seen, ranked)
     bold = re.findall(r'row(\d+) col0 own text"', page)
     assert ranked.index[[*map(int, bold)]].tolist() == ["mine", "mine width=0.2"]
-
-
-def test_a_title_that_another_method_has_is_not_taken():
-    names = ["cma-es/bandit", "mine", "yours", "his", "hers"]
-    seen = study({("ascending", name): [-300, -301] for name in names})
-    titles = {"mine": "CMA-ES", "yours": "Steps", "his": "Walk", "hers": "Walk"}
-    declared = {name: replace(info, title=titles.get(name, info.title))
-                for name, info in seen.declared.items()}  # fmt: skip
-    shown = methods_of(seen.runs, declared).title
-    assert shown[names].tolist() == ["CMA-ES", "mine", "Steps", "his", "hers"]
 
 
 def test_ranked_tasks_have_the_order_of_the_study():
@@ -431,45 +330,6 @@ def test_learners_over_all_tasks_stand_for_their_conditions():
     assert [*both.methods.index] == learner  # EC1 adds no task
 
 
-SENTENCES = {
-    "ranking: the learner is second of three": lambda: study(
-        TEN | strangers(("mine", 2), ("yours", -3), runs=10)
-    ),
-    "ranking: a method ran on one task of two": lambda: study(LEARNER | CMA | ON_ONE),
-    "ranking: a method from a file has parameters": with_parameters,
-    "ranking: the learner is alone": lambda: study(TEN),
-    "ranking: a run of an own method failed": lambda: study(
-        LEARNER | {("ascending", "mine"): [-490, None], ("two-armed-1", "mine"): [-490, -491]}
-    ),
-    "ranking: methods between those that are named": lambda: study(
-        LEARNER
-        | CMA
-        | {
-            (task, method): [cost + better for cost in costs]
-            for (task, _), costs in CMA.items()
-            for better, method in ((-2, "cma-es/goal-by-goal"), (-4, "hill-climbing"))
-        }
-    ),
-    "cost: the learner and CMA-ES": lambda: study(LEARNER | CMA),
-}
-GOLDEN = (ROOT / "tests" / "golden.md").read_text("utf-8")
-"""Whole sentences of reports on these studies: one that is worded anew is changed there alone."""
-
-
 def said(seen, section):
     """The sentence of a section, its lines."""
     return sections.finding(seen, next(each for each in SECTIONS if each.id == section))
-
-
-@pytest.mark.parametrize("name", SENTENCES)
-def test_sentences_are_those_of_the_golden_page(name):
-    lines = "\n".join(said(SENTENCES[name](), name.partition(":")[0]))
-    assert f"## {name}\n\n{lines}\n\n## " in f"{GOLDEN}\n## "
-
-
-def test_a_study_pickles_with_what_was_asked_of_it(traced):
-    """As other libraries send it to their workers."""
-    before = TABLES["ranking"](traced)
-    copy = pickle.loads(pickle.dumps(traced))
-    assert copy.runs.equals(traced.runs)
-    assert TABLES["ranking"](copy).equals(before)

@@ -2,11 +2,8 @@
 
 import itertools
 import math
-import re
-from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -141,16 +138,6 @@ def test_bca_interval_against_all_resamples(samples, weights):
     assert (interval.low, interval.high) == pytest.approx((low, high), abs=0.25)
 
 
-def test_an_interval_of_very_many_values_is_the_normal_one():
-    """At the bound the bootstrap's percentiles are the same, to a tenth of the width."""
-    values = np.random.default_rng(0).exponential(size=50_001)
-    for sample, near in ((values, 1e-12), (values[:-1], 0.1)):
-        found = statistics.mean(sample)
-        width = stats.norm.ppf(0.975) * sample.std(ddof=1) / math.sqrt(len(sample))
-        for end, sign in ((found.low, -1), (found.high, 1)):
-            assert end == pytest.approx(sample.mean() + sign * width, abs=near * width)
-
-
 def test_degenerate_samples():
     interval = statistics.difference_of_means(np.full(5, 4.0), np.full(4, 3.0))
     assert interval.columns("gap") == {"gap": 1.0, "gap_low": 1.0, "gap_high": 1.0}
@@ -222,18 +209,3 @@ def test_the_least_number_of_values_on_both_sides():
         assert math.isnan(tested.p) == (none and min(len(first), len(second)) < 3)
     assert math.isnan(hypotheses.bootstrap_test([1.0], 0).p)
     assert not math.isnan(hypotheses.bootstrap_test(two, 0).p)
-
-
-def test_the_page_has_the_calibration_that_is_stored():
-    docs = Path(__file__).parents[1] / "docs"
-    stored = pd.read_csv(docs / "stored" / "two-samples" / "candidates.csv", index_col=0)
-    page = (docs / "statistics.md").read_text("utf-8")
-    rows = re.findall(r"\| (\d+) \| ([\d.]+) % \| ([\d.]+) % \|", page)
-    taken = [(int(n), float(five), float(one)) for n, five, one in rows]
-    columns = stored.sort_values("too often")[["too often", "largest at 5 %", "largest at 1 %"]]
-    for (n, five, one), row in zip(taken, columns.to_numpy(), strict=True):
-        assert (n, five, one) == (
-            row[0],
-            *(pytest.approx(100 * each, abs=0.051) for each in row[1:]),
-        )
-    assert stored["too often"].idxmin() == "exchange"

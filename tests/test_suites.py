@@ -8,7 +8,6 @@ import pytest
 from coartic import CoarticError, load_task
 from coartic.benchmarks.runner import plan_suite
 from coartic.benchmarks.suites import load_suite, suites
-from coartic.learner.conditions import EVERY_CONDITION
 from tests.support.bad_inputs import GOOD
 from tests.support.suites import KNOWN, cells_of, paper_cells, suite_of
 
@@ -97,18 +96,6 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
         impostor = tasks[1].model_copy(update={"name": name})
         with pytest.raises(CoarticError, match=f"{name}' is already taken by {by} task: give"):
             paper_cells(tasks=[impostor, str(other)])
-
-
-def test_ablations_of_the_learner_are_methods_of_their_own():
-    for name, entry in KNOWN.items():
-        if name.startswith("dual-process/") and name != "dual-process/custom":
-            condition = EVERY_CONDITION[name.partition("/")[2]]
-            for key, value in entry.complete({"trials": 1}).items():
-                assert key == "trials" or getattr(condition, key) == value
-            assert ("reward by subtask" in entry.information) == name.endswith("-subtask")
-    with pytest.raises(CoarticError, match="discount is an unknown key"):
-        # the information would no longer be right
-        KNOWN["dual-process/EC4"].complete({"discount": 0.1})
 
 
 def test_a_suite_can_move_one_goal(tmp_path):

@@ -2,7 +2,6 @@
 
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -71,36 +70,13 @@ def test_a_saved_task_is_read_as_it_was(task, tmp_path):
         ({"robot": {"right_links": [0]}}, "robot.right_links[0] is 0: "),
         ({"q0": [0, 0, 0, 0, 0, 0, 30, 40, 20, 0]}, "Did you mean 40° = 0.698?"),
         ({"start": {"left": [0] * 4, "right": "x"}}, "start.right is 'x': "),
-        ({"q0": [0] * 3}, "Task: q0 has shape (3,); it must be (10,)"),
-        ({"q0": {"base": [0, 0]}}, "Task: q0 is {'base': [0, 0]}"),
-        ({"q0": [0] * 10, "start": {"left": [0] * 4, "right": [0] * 4}}, "pass only one"),
+        ({"q0": [0] * 10, "start": {"left": [0] * 4, "right": [0] * 4}}, "give one of them"),
     ],
 )
 def test_a_wrong_task_is_refused_in_a_sentence(wrong, words):
     with pytest.raises(ValueError, match=re.escape(words)) as caught:
         Task(**{"goals": [(3, 2)]} | wrong)
     assert "pydantic" not in str(caught.value)
-
-
-LISTS = {
-    Task: ["hands", "locked_base", "goals"],
-    Start: ["base", "left", "right"],
-    Robot: ["left_links", "right_links", "left_shoulder", "right_shoulder"],
-}
-
-
-@pytest.mark.parametrize(("kind", "key"), [(kind, key) for kind in LISTS for key in LISTS[kind]])
-@pytest.mark.parametrize("text", ["right", "1, 2"])
-def test_a_text_in_place_of_a_list_is_refused(kind, key, text):
-    given = {Task: {"goals": [(3, 2)]}, Start: {"left": [0] * 4, "right": [0] * 4}}.get(kind, {})
-    with pytest.raises(ValueError, match=f"{key} is '{text}': "):
-        kind(**given | {key: text})
-
-
-def test_a_file_that_is_not_text(tmp_path):
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(TaskError, match="not valid TOML in UTF-8"):
-        load_task(tmp_path / "binary.toml")
 
 
 def test_goals_that_are_within_reach_are_accepted():
@@ -166,14 +142,6 @@ def test_a_task_of_ones_own_needs_goals_alone(tmp_path):
     path = tmp_path / "shelf.toml"
     path.write_text("goals = [[3.0, 2.0], [4.5, 2.0]]\n", encoding="utf-8")
     assert load_task(path) == Task(name="shelf", goals=goals, q0=np.zeros(10))
-
-
-@pytest.mark.parametrize("name", ["arm.urdf", "run.MOT", "hits.xlsx"])
-@pytest.mark.parametrize("kind", [str, Path])
-def test_files_of_other_programs_are_refused_by_their_kind(name, kind):
-    words = f"{name}: coartic reads no {Path(name).suffix.lower()} file; a task is a TOML file"
-    with pytest.raises(TaskError, match=words):
-        load_task(kind(name))
 
 
 def test_a_task_has_at_most_256_goals():

@@ -1,7 +1,6 @@
 """The time that missing runs take, on a clock that the test sets."""
 
 import heapq
-import math
 from types import SimpleNamespace
 
 import pytest
@@ -59,28 +58,3 @@ def test_in_the_last_third_the_time_left_is_true(monkeypatch, slower, order):
     for left, shown in late:
         assert left / 1.5 < shown < 1.5 * left
     assert pairs[-1] == (0.0, 0.0)
-
-
-def test_before_runs_of_each_method_are_known_there_is_no_estimate(monkeypatch):
-    monkeypatch.setattr(time_left, "_shipped_means", lambda: {})
-    pairs = truth_and_estimates(["cma-es/bandit", "random-search"], 10, 1.0, monkeypatch)
-    assert math.isnan(pairs[0][1])
-    assert not math.isnan(pairs[-5][1])
-
-
-def test_a_run_that_takes_longer_than_expected_is_not_about_to_end(monkeypatch):
-    clock = [0.0]
-    monkeypatch.setattr(time_left.time, "monotonic", lambda: clock[0])
-    cell = cell_of(load_task("ascending"), KNOWN["cma-es/bandit"], {})
-    estimate = time_left.TimeLeft()
-    estimate.expect([Job(cell, 0, range(2))])
-    clock[0] = 10.0
-    run = SimpleNamespace(
-        cell=cell, outcome=SimpleNamespace(times=SimpleNamespace(wall_s=10.0, together=1))
-    )
-    estimate.finish(run)
-    assert estimate.seconds == pytest.approx(10.0)
-    clock[0] = 14.0
-    assert estimate.seconds == pytest.approx(6.0)
-    clock[0] = 70.0
-    assert estimate.seconds >= 10.0

@@ -4,7 +4,6 @@ import pytest
 from PIL import Image, ImageSequence
 
 from coartic import CoarticError, Movement, Task, corrective_trial, movements_of, trajectory
-from coartic.pictures.drawing import box
 from coartic.pictures.film import stage, write_film
 from tests.support.strategies import tiny_task
 
@@ -47,13 +46,6 @@ def test_a_film_and_a_picture(tmp_path):
     for name, words in (("mine.gif", "there already"), ("mine.txt", "must end in .gif or .mp4")):
         with pytest.raises(CoarticError, match=words):
             mine.animate(tmp_path / name)
-
-
-def test_a_large_goal_is_in_the_picture():
-    task = Task(goals=[(3.0, -3.0)], radius=1.0)
-    low, high = box(task, task.q0)
-    assert (low <= [2.0, -4.0]).all()
-    assert (high >= [4.0, -2.0]).all()
 
 
 def test_a_trajectory_where_the_hand_is_in_the_goal_has_no_row(tmp_path):

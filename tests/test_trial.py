@@ -9,13 +9,8 @@ import pytest
 import coartic
 from coartic import (
     MotionModel,
-    Movement,
-    correct,
-    corrective_trial,
     execute,
-    hand_sequences,
     load_task,
-    move,
     movements_of,
     trajectory,
 )
@@ -24,9 +19,8 @@ from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
 from coartic.motion.batch import SLOTS, robot_parameters
 from coartic.motion.solution import execute_many
 from coartic.motion.trial import ALL_STOP, Requests, compiled_task, reach, reach_goals
-from coartic.tasks.task import hands_of
 from tests.support import reference
-from tests.support.strategies import make_trials, sample, uneven_task
+from tests.support.strategies import make_trials, random_solution, sample, uneven_task
 
 BOTH = load_task("two-armed-1")
 LIMITS = {  # iterations of the corrective process, spread of the targets
@@ -135,33 +129,11 @@ OTHERS = [MotionModel(max_iterations=100), MotionModel(max_iterations=300, arriv
 def rich_cases(name, number):
     """Solutions of all kinds of movement, several for a goal, near what hits and far from it."""
     task, model, rng = TASKS[name], OTHERS[number], np.random.default_rng(number)
-    locked = ["xy".index(coordinate) for coordinate in task.locked_base]
-
-    def posture(goal, alone):
-        q = np.array(alone[goal] if goal < len(alone) else task.q0)
-        q += rng.choice([0.0, 0.02, 0.3]) * rng.standard_normal(len(q))
-        q[locked] = task.q0[locked]
-        return q
-
-    def movement(goal, hand, alone):
-        kind = str(rng.choice(["learned", "planned", "corrective", "path"]))
-        if kind == "path":
-            way = [posture(goal, alone) for _ in range(rng.integers(1, 4))]
-            return Movement(goal + 1, hand, kind, waypoints=np.array(way))
-        found = kind == "corrective" and rng.random() < 0.5
-        return Movement(goal + 1, hand, kind, None if found else posture(goal, alone))
-
-    found = []
-    for sequence in map(str, rng.choice(hand_sequences(task), 10)):
-        alone = corrective_trial(task, sequence, model=model).configurations
-        solution = [
-            movement(goal, hand, alone)
-            for goal, hand in enumerate(hands_of(sequence))
-            for _ in range(rng.integers(1, 4))
-        ]
-        due = reference.execute(task, solution, model)
-        found.append(SimpleNamespace(solution=solution, due=due))
-    return found
+    solutions = [random_solution(task, model, rng) for _ in range(10)]
+    return [
+        SimpleNamespace(solution=each, due=reference.execute(task, each, model))
+        for each in solutions
+    ]
 
 
 @pytest.mark.parametrize("number", range(len(OTHERS)))
@@ -208,8 +180,7 @@ def test_kernels_end_whatever_they_get(bad, where):
 @pytest.mark.parametrize(
     ("name", "wrong", "words"),
     [
-        *(("hands", [0, hand], "must be 0 .left. or 1 .right.") for hand in (2, -1, 0.5)),
-        ("hands", [True, False], "hands"),
+        *(("hands", [0, hand], "needed are 0 .left. and 1 .right.") for hand in (2, -1, 0.5)),
         *(("q", q, "^q ") for q in ([BOTH.q0[:9]] * 2, [BOTH.q0 * np.nan] * 2)),
         *(("goals", goals, "^goals ") for goals in ([[1.0, 2.0]], [[1.0, np.inf]] * 2)),
         ("targets", np.zeros((2, 9)), "^targets "),
@@ -222,13 +193,3 @@ def test_many_arms_are_checked_before_a_kernel_gets_them(name, wrong, words):
     assert reach_goals(BOTH.robot, **usual).hit.all()
     with pytest.raises(ValueError, match=words):
         reach_goals(BOTH.robot, **usual | {name: wrong})
-
-
-@pytest.mark.parametrize("goal", [(1, 2, 3), 1.0, (np.inf, 1), ("1", "2"), None])
-def test_a_goal_is_two_finite_numbers(goal):
-    with pytest.raises(ValueError, match="goal"):
-        correct(BOTH.robot, BOTH.q0, "right", goal)
-    with pytest.raises(ValueError, match="goal"):
-        move(BOTH.robot, BOTH.q0, BOTH.q0, "right", goal, 0.1)
-    with pytest.raises(ValueError, match="configuration"):
-        correct(BOTH.robot, BOTH.q0 * np.nan, "right", (1, 2))

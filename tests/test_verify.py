@@ -97,10 +97,6 @@ def put(entry, value):
     return change
 
 
-def drop_joint(movement):
-    movement[4].pop()
-
-
 def stand(movement):
     movement[3:] = 1, [0.0] * 10
 
@@ -108,7 +104,6 @@ def stand(movement):
 EDITS = {  # what is said, and what was edited
     "reward is ": result(LEARNER, "reward = reward + 1"),
     "initial_reward is -": result(LEARNER, "initial_reward = -9"),
-    "hands is RR, not LL": result(TINY, "hands = 'LL'"),
     "solution_corrections is 1": result(TINY, "solution_corrections = 2"),
     "other_arm_travel is": result(PATH, "other_arm_travel = 1e-8"),
     "status is timeout": result(TINY, "status = 'timeout', reward = NULL, hands = NULL"),
@@ -117,14 +112,10 @@ EDITS = {  # what is said, and what was edited
     "other_arm_travel": (put((4, 3), 1e-4), OTHER, "solution", 1),
     "moves a locked base": (put((4, 1), 0.02), OTHER, "replay"),
     "a joint or a trial": (put((4, 9), 1e-9), OTHER, "replay"),
-    "a joint or a trial was changed": result(LEARNER, "rewards = zeroblob(0)"),
-    "could not be broadcast": (drop_joint, TINY),
     "goal 1 is not hit": (stand, TINY),
     "the task has no left hand": (put(1, "left"), PATH),
-    "its goals are [2, 2": (put(0, 2), LEARNER),
     "its goals are [3, ": (put(0, 3), PATH),
     "is made after goal 2": (put(3, 1), TINY, "solution", 1),
-    "a joint or a trial ": (put(2, "magic"), PATH),
     "that its id says ": (
         "UPDATE cells SET content = json_set(content, '$.task.radius', 0.2) WHERE task = 'tiny'",
     ),
@@ -132,8 +123,6 @@ EDITS = {  # what is said, and what was edited
     "its seed is another": result(TINY, "seed = seed + 1"),
     # Of the plan: what it asks for is there.
     "asks for 6 runs, of which the folder has 5": ("DELETE FROM results WHERE rowid = 2",),
-    "asks for 6 runs, of which the folder has 0": ("UPDATE suite SET seed = 1",),
-    "asks for 7 runs, of which the folder has 6": ("UPDATE cells SET runs = 3 WHERE position = 0",),
 }
 
 

@@ -141,27 +141,6 @@ def test_a_shipped_run_of_each_built_in_method_comes_back(runs, monkeypatch):
     assert [*check_shipped.differences(rows), *found] == []
 
 
-def test_a_shipped_run_that_does_not_come_back_is_named(runs, monkeypatch):
-    def another(runs, registered):
-        for run in runs:
-            score = run.solution._replace(reward=run.solution.reward - 1)
-            yield run, type(run)(run.job, run.outcome, run.scores | {"solution": score}, run.date)
-
-    monkeypatch.setattr(check_shipped, "perform_runs_again", another)
-    (sentence,) = check_shipped.differences(runs[runs.method == "dual-process/EC1"].head(1))
-    assert "dual-process/EC1 on" in sentence
-    assert "raise the version of the method" in sentence
-
-
-def test_what_is_checked_before_a_release(runs):
-    """A run of each cell of the comparison, and of each method on each family."""
-    rows, every = check_shipped.chosen(runs), check_shipped.chosen(runs, every=True)
-    assert len(every) == len(runs.groupby(check_shipped.CELL))
-    assert (every.suite == "comparison").sum() == (rows.suite == "comparison").sum()
-    of_families = runs[runs.suite == "families"].groupby(["method", "setting", "family"])
-    assert len(rows) - (rows.suite == "comparison").sum() == len(of_families)
-
-
 @pytest.mark.process
 def test_workers_round_alike_whatever_the_environment_says(tmp_path):
     """The environment of these tests is that of workers (tests/conftest.py): this process rounds as

@@ -9,7 +9,7 @@ from pydantic import ConfigDict
 import coartic
 from coartic import load_task
 from coartic.method import Information, Method, Parameters, Result, Session
-from coartic.motion.solution import Movement, movements_of
+from coartic.motion.solution import Movement
 
 CORRECTIVE = frozenset({Information.CORRECTIVE_PROCESS})
 SEEN = []
@@ -176,17 +176,6 @@ class Draws(Lucky):
 
     name = "test/draws"
     stochastic = True
-
-
-class NoTarget(Good):
-    """Has an inverse kinematics that fails, which looks like a solution."""
-
-    name = "test/no-target"
-
-    def solve(self, session):
-        by_correction(session)
-        targets = np.full((session.goals_count, session.dof), np.nan)
-        return Result(movements_of("R" * session.goals_count, targets))
 
 
 class Undrawn(Good):

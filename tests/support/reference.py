@@ -23,11 +23,13 @@ from coartic.tasks.task import hands_of
 
 ReferenceRun = namedtuple(
     "ReferenceRun",
-    "rewards completed values targets corrections corrective_iterations visits ticks_by_goal",
+    "rewards completed values targets corrections corrective_iterations visits ticks_by_goal "
+    "replay",
 )
 """What the slow learner found; values and targets by state (goal, hand before) and hand. By trial:
 ``corrections``; ``visits`` has state, hand and posture at each hit, ``ticks_by_goal`` the ticks for
-each goal."""
+each goal. ``replay``: hands and ticks by goal of the greedy trial after the last; None where that
+failed."""
 
 
 def move(robot, q, target, hand, goal, radius, *, stop_on_arrival=True, model=PAPER, waypoints=()):
@@ -170,9 +172,13 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
     rewards = np.zeros(trials, dtype=np.int64)
     completed = np.zeros(trials, dtype=np.bool_)
     iterations = 0
-    by_trial = np.zeros(trials, dtype=np.int64)
+    by_trial = np.zeros(trials + 1, dtype=np.int64)
     visits, ticks_by_goal = [], []
-    for trial in range(trials):
+    for trial in range(trials + 1):
+        if trial == trials:  # the replay, of which nothing is learned or counted
+            direction = condition.direction if condition.pull else "next-goal"
+            greedy = {"hand_exploration": "none", "drift": 0.0, "noise_sd": 0.0}
+            condition, counted = replace(condition, direction=direction, **greedy), iterations
         drift = condition.drifts[0]
         if trial and len(condition.drifts) > 1:
             drift = condition.drifts[int(rng.random() * len(condition.drifts))]
@@ -219,8 +225,13 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
             visited.append((state, hand, q))
             subtasks.append(total - spent_before)
             previous = hand
+        ticks = [-reward for reward in subtasks]
+        if trial == trials:
+            hands = [hand for _, hand, _ in visited]
+            replay = (hands, ticks) if len(visited) == len(task.goals) else None
+            break
         visits.append(visited)
-        ticks_by_goal.append([-reward for reward in subtasks])
+        ticks_by_goal.append(ticks)
         rewards[trial] = total
         completed[trial] = len(visited) == len(task.goals)
         if completed[trial]:
@@ -239,7 +250,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
                     values[state, hand] = credit
                     targets[state, hand] = reached
     return ReferenceRun(
-        rewards, completed, values, targets, by_trial, iterations, visits, ticks_by_goal
+        rewards, completed, values, targets, by_trial[:-1], counted, visits, ticks_by_goal, replay
     )
 
 

@@ -7,11 +7,21 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import minimize
 
-from coartic import PAPER, Robot, corrective_trial, execute, hand_sequences, load_task, parse_task
+from coartic import (
+    PAPER,
+    Movement,
+    Robot,
+    corrective_trial,
+    execute,
+    hand_sequences,
+    load_task,
+    parse_task,
+)
 from coartic.method import Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.tasks.catalogue import as_task
 from coartic.tasks.optima import entries
+from coartic.tasks.task import hands_of
 
 PAPER_CELLS = [
     ("ascending", "EC1"),
@@ -115,6 +125,36 @@ def sample(task, count, noise=0.3, seed=0):
     targets = np.array([corrective_trial(task, sequence).configurations for sequence in hands])
     free = [axis not in task.locked_base for axis in "xy"] + [True] * (task.robot.dof - 2)
     return hands, targets + noise * np.array(free) * rng.standard_normal(targets.shape)
+
+
+def random_solution(task, model, rng):
+    """Movements of all kinds, up to three for a goal, near what hits the goal and far from it; some
+    coordinates stay where the corrective process alone would have them before."""
+    hands = str(rng.choice(hand_sequences(task)))
+    alone = [task.q0, *corrective_trial(task, hands, model=model).configurations]
+    alone += [alone[-1]] * (len(task.goals) + 1 - len(alone))
+    locked = ["xy".index(coordinate) for coordinate in task.locked_base]
+
+    def configuration(goal):
+        q = alone[goal + 1] + rng.choice([0.0, 0.02, 0.3]) * rng.standard_normal(len(task.q0))
+        stays = rng.random(len(q)) < 0.2
+        q[stays] = alone[goal][stays]
+        q[locked] = task.q0[locked]
+        return q
+
+    def movement(goal, hand):
+        kind = str(rng.choice(["learned", "planned", "corrective", "path"]))
+        if kind == "path":
+            way = [configuration(goal) for _ in range(rng.integers(1, 4))]
+            return Movement(goal + 1, hand, kind, waypoints=np.array(way))
+        acts = kind == "corrective" and rng.random() < 0.5
+        return Movement(goal + 1, hand, kind, None if acts else configuration(goal))
+
+    return [
+        movement(goal, hand)
+        for goal, hand in enumerate(hands_of(hands))
+        for _ in range(rng.integers(1, 4))
+    ]
 
 
 def solve(method, task, seed=0, *, budget=None, model=PAPER, **parameters):

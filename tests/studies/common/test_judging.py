@@ -10,27 +10,6 @@ from tests.support.made_up import found
 NAN = float("nan")
 
 
-@pytest.mark.parametrize("sentence", ["It saves ticks", "{} {}", "It saves {:d}", "{mean}"])
-def test_a_sentence_has_one_place_for_the_mean(sentence):
-    with pytest.raises(CoarticError, match="exactly one {}, for the mean"):
-        mean_beyond(sentence, [4.0, 5.0, 6.0])
-
-
-def test_a_side_is_known_values_are_a_list_and_something_is_joined():
-    """A misspelt side would otherwise test the other one."""
-    with pytest.raises(CoarticError, match="side must be 'greater' or 'less', not 'lower'"):
-        mean_beyond("{}", [4.0, 5.0, 6.0], 0.0, "lower")
-    with pytest.raises(CoarticError, match=r"values have shape \(2, 2\)"):
-        mean_beyond("{}", [[1.0, 2.0], [3.0, 4.0]])
-    with pytest.raises(CoarticError, match="at least one finding"):
-        all_of()
-
-
-def test_other_braces_are_text():
-    found = mean_beyond("Goals {a, b} save {} {1} ticks {", [4.0, 5.0, 6.0])
-    assert found.evidence.startswith("Goals {a, b} save 5.00 [4.00, 6.00] {1} ticks { (3")
-
-
 def test_joined_findings_have_the_opposites_of_all():
     own, other = found(False, 0.7, against=[0.01]), found(True, 0.99, against=[0.2, 0.3])
     joined = all_of(own, other)

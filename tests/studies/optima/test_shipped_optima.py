@@ -1,20 +1,16 @@
 """Shipped best rewards: they hold, are taken over from folders, and get bounds."""
 
 import json
-import lzma
-import sqlite3
-import subprocess
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from coartic import CoarticError, builtin_tasks, execute, load_task, objective
 from coartic.baselines.optimum import with_locks
 from coartic.motion.solution import corrective_trial, other_arm_travel
+from coartic.runs.shipped import open_shipped
 from coartic.tasks import optima
 from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import best_shipped, task_hash
@@ -24,7 +20,6 @@ from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, cell_on, run_and_write
 
 FOLDER = ROOT / "studies" / "optima"
-THIRD_VERSION = "dcb24843"
 RENEW, PROVE, STUDY = programs("optima", "renew", "prove", "study")
 SHIPPED = RENEW.shipped
 ENTRIES = SHIPPED.read()
@@ -99,30 +94,13 @@ def test_the_optimum_of_every_task_is_proven_or_bounded(name):
         assert ENTRIES[name, "y", "free"]["reward"] < free["reward"]
 
 
-@pytest.mark.parametrize(
-    ("commit", "suite", "runs"),
-    [(None, "comparison", 3604), (None, "families", 7480),
-     (THIRD_VERSION, "comparison", 5508), (THIRD_VERSION, "families", 2350)],
-)  # fmt: skip
-def test_no_run_exceeds_a_bound(tmp_path, commit, suite, runs):
-    """All runs that ship, and those that shipped with version 3.0.0, from its commit."""
-    place = f"benchmarks/shipped/{suite}.sqlite.xz"
-    if commit is None:
-        packed = (ROOT / place).read_bytes()
-    else:
-        shown = subprocess.run(
-            ["git", "-C", ROOT, "show", f"{commit}:{place}"], capture_output=True
-        )
-        if shown.returncode:
-            pytest.skip("the commit is not in this clone")
-        packed = shown.stdout
-    (tmp_path / "runs.sqlite").write_bytes(lzma.decompress(packed))
-    with closing(sqlite3.connect(tmp_path / "runs.sqlite")) as file:
-        best = file.execute("SELECT task, max(reward), count(*) FROM runs GROUP BY task").fetchall()
-    assert sum(count for *_, count in best) == runs
-    for name, reward, _ in best:
-        assert ENTRIES[name, *SHIPPED.FREE]["bound"] >= reward
-        assert ENTRIES[name, *SHIPPED.FREE]["reward"] >= reward
+@pytest.mark.parametrize("suite", ["comparison", "families"])
+def test_no_shipped_run_exceeds_a_bound(suite):
+    with open_shipped(suite) as store:
+        best = store.runs().groupby("task").reward.max()
+    for name, reward in best.items():
+        entry = ENTRIES[name, *SHIPPED.FREE]
+        assert entry["bound"] >= entry["reward"] >= reward
 
 
 @pytest.fixture
@@ -182,30 +160,6 @@ def prove(monkeypatch, capsys, folder, *asked):
     return capsys.readouterr().out.splitlines(), SHIPPED.read_log(folder)
 
 
-def test_proofs_go_on_where_they_stopped_and_the_sharper_bound_is_kept(
-    files, tmp_path, monkeypatch, capsys
-):
-    """A log whose last line was cut off, as where a process was killed."""
-    family = (each for each in ENTRIES.values() if each["task"].startswith("two-armed/v1"))
-    task, reward = next((e["task"], e["reward"]) for e in family if e["reward"] != e["bound"])
-    folder, names = tmp_path / "optima", (task, "two-armed/v1/i002..i003")
-    asked = monkeypatch, capsys, folder, *names, "--seconds"
-    shown, log = prove(*asked, "0.05")
-    assert [row["task"] for row in log] == [names[0]]  # the others are proven
-    assert shown[0].startswith(f"{task} (base task, other arm free): {reward}, no solution ")
-    with (folder / SHIPPED.LOG).open("a") as file:
-        file.write('{"task": "two-armed/v1/i0')
-    assert prove(*asked, "0.05") == ([], log)
-    _, longer = prove(*asked, "0.1")
-    assert [row["asked"] for row in longer] == [0.05, 0.1]
-    known = SHIPPED.read()
-    key = SHIPPED.key_of(log[0])
-    assert not SHIPPED.take_proof(known, log[0])
-    assert known == ENTRIES
-    assert SHIPPED.take_proof(known, log[0] | {"bound": reward, "nodes": 7})
-    assert known[key] == ENTRIES[key] | {"bound": reward, "nodes": 7}
-
-
 def test_a_bound_below_a_known_reward_or_a_solution_without_its_reward_is_refused():
     key = "two-armed/v1/i002", *SHIPPED.FREE
     row = ENTRIES[key] | {"nodes": 1}
@@ -225,38 +179,9 @@ def test_a_bound_below_a_known_reward_or_a_solution_without_its_reward_is_refuse
             refused()
 
 
-def test_a_better_solution_is_found_on_the_way():
-    """From the open subproblems of least bound, if the reward that is known is poor."""
-    entry = ENTRIES["two-armed/v1/i001", *SHIPPED.FREE] | {"reward": -400}
-    row = PROVE.prove(entry, 0.1)
-    assert -400 < row["reward"] <= row["bound"]
-    execution = execute(load_task(row["task"]), SHIPPED.movements_of(row["solution"]))
-    assert (execution.reward, execution.hands) == (row["reward"], row["hands"])
-
-
 def test_a_task_of_ones_own_is_searched_and_proven(tmp_path, monkeypatch, capsys):
     file = tmp_path / "mine.toml"
     tiny_task(goals=[[6.0, 0.5]], hands=["right"]).save(file)
     (sentence,), (row,) = prove(monkeypatch, capsys, tmp_path, file)
     assert sentence.startswith(f"{file} (base task, other arm free): {row['reward']}, proven opti")
     assert -200 < row["reward"] == row["bound"] < -100
-
-
-def test_the_table_is_of_the_shipped_data():
-    stored = pd.read_csv(FOLDER / "results.csv", index_col=0)
-    table = STUDY.count(STUDY.distances(FOLDER)).drop(columns="seconds")
-    counted = stored[table.columns]
-    pd.testing.assert_frame_equal(table, counted, check_dtype=False, rtol=1e-5)
-    assert table.instances["all families"] == len(DRAWN)
-    assert table.proven["all families"] == sum(e["bound"] == e["reward"] for e in DRAWN)
-    before = pd.read_csv(FOLDER / "before.csv", index_col=0)
-    before = before.drop(columns="bounded")
-    assert (counted[before.columns] >= before).all(axis=None)
-
-
-def test_open_tasks_are_those_farther_than_five_per_cent_and_all_have_a_bound():
-    stored = pd.read_csv(FOLDER / "open.csv", index_col=0)
-    far = {e["task"] for e in DRAWN if e["bound"] - e["reward"] > 0.05 * -e["reward"]}
-    assert far == set(stored.index)
-    page = (FOLDER / "README.md").read_text("utf-8")
-    assert f"For {len(far)} random instances no method comes within 5 % of the bound" in page

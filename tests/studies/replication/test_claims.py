@@ -1,8 +1,6 @@
 """The claims register: verdicts on planted findings, and on runs of its own."""
 
 import importlib
-import re
-import tomllib
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +9,6 @@ import pytest
 
 from coartic import corrective_trial, load_task
 from coartic.analysis.signatures import Solutions
-from coartic.analysis.statistics import exchange_test
 from common.judging import Finding, judge
 from tests.support.made_up import found, row, runs_of, study_of, study_of_solutions
 from tests.support.processes import program
@@ -207,19 +204,6 @@ def test_a_margin_is_taken_off_and_values_are_said_once():
     assert finding.holds
     assert not all_higher([Higher(first, second, by=2)]).holds
     assert finding.evidence.count("t, who: 5.0 [") == 1
-
-
-@pytest.mark.parametrize("beaten", [0, 1, 2, 3])
-def test_two_of_three_plans_have_to_be_beaten(beaten):
-    """By twice the second smallest p of the claim, or of its opposite."""
-    high, low = ticks("t", 7, 8, 9, 10), ticks("t", 1, 2, 3, 4)
-    each = [all_higher([Higher(high, low) if k < beaten else Higher(low, high)]) for k in range(3)]
-    finding = performance.two_of_three(each)
-    least = exchange_test(high.numbers, low.numbers).p
-    assert finding.holds == (beaten > 1)
-    assert (finding.tests[0].p == pytest.approx(2 * least)) == (beaten > 1)
-    assert (finding.against[0].p == pytest.approx(2 * least)) == (beaten < 2)
-    assert finding.evidence.count(": beaten") == beaten
 
 
 CELLS = [
@@ -564,42 +548,3 @@ def test_the_register_on_runs(study):
     assert sum(map(bool, read.values())) > 8
     for name, tasks in read.items():
         assert not tasks or bool(tasks & {T1, T2}) == claims.CLAIMS.fitted[name], name
-
-
-def test_a_claim_is_judged_by_the_first_folder_that_has_its_runs(monkeypatch):
-    def missing(read):
-        raise reader.MissingError("not run")
-
-    rules = dict.fromkeys(claims.RULES, missing)
-    for name in ("ec4-mixed", "half-choose-rlrr"):
-        rules[name] = claims.RULES[name]
-    monkeypatch.setattr(claims, "RULES", rules)
-    monkeypatch.setattr(claims, "BEYOND", {})
-    rows = (
-        on_2("EC4", WORSE, "RLRR"),
-        on_2("EC4", WORSE + BETTER, MIXED) + on_2("EC3", WORSE, "RLRR"),
-    )
-    entries = STUDY.judge_by_first([*map(planted_study, rows)])
-    assert entries.replicates["ec4-mixed"] == "not supported"  # by the first
-    assert entries.suite[["ec4-mixed", "half-choose-rlrr"]].tolist() == ["paper"] * 2
-    assert entries.evidence["half-choose-rlrr"].startswith("Two-armed 2 EC3")
-    assert entries.suite["rail"] == ""
-
-
-def test_every_sentence_is_accounted_for():
-    path = FOLDER / "sentences.toml"
-    published = tomllib.loads(path.read_text(encoding="utf-8"))["sentence"]
-    for each in published:
-        assert len({"claims", "held", "open"} & set(each)) == 1, each["quote"]
-        assert set(each.get("claims", ())) <= {*claims.CLAIMS.index}, each["quote"]
-    accounted = {name for each in published for name in each.get("claims", ())}
-    lacking = {*claims.CLAIMS.index} - accounted
-    assert not lacking, f"in no sentence of sentences.toml: {lacking}"
-    files = re.findall(r"(?:coartic|studies|tests)/[\w/-]+(?:\.\w+)?", str(published))
-    assert [file for file in files if not (ROOT / file).exists()] == []
-
-
-def test_sets_of_goals_are_of_claims_that_rest_on_them():
-    judged = {*claims.SETS.claim} & {*claims.CLAIMS.index}
-    assert len(judged) > 8
-    assert claims.CLAIMS.fitted[[*judged]].all()

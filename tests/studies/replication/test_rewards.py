@@ -1,10 +1,8 @@
 """Rewards, spreads and solutions against planted runs and known tests."""
 
 import math
-import re
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy import stats
 
@@ -63,35 +61,6 @@ def test_the_page_of_a_folder_has_verdicts_evidence_and_what_is_missing(tables, 
     assert "Not judged, for lack of runs: " in page
     assert page.count("<p>Test: ") == (tables["claims"].suite != "").sum() > 0
     assert (tmp_path / "solutions.svg").read_bytes().count(b"<path") > 20
-
-
-def test_the_page_begins_with_its_answer_and_with_failures(tmp_path):
-    """Of the stored tables; it names no internal id, and its links stay below its folder."""
-    for table in FOLDER.glob("*.csv"):
-        (tmp_path / table.name).write_bytes(table.read_bytes())
-    solutions = pd.read_csv(FOLDER / "solutions.csv", index_col=0)
-    solutions[solutions.task == "ascending"].to_csv(tmp_path / "solutions.csv")  # panels of each
-    STUDY.write(tmp_path)
-    page = (tmp_path / "page.html").read_text("utf-8")
-    claims = pd.read_csv(FOLDER / "claims.csv", index_col=0)
-    counts = claims.replicates.value_counts()
-    first = f"Of {len(claims)} claims of Shah, Barto &amp; Fagg (2013) {counts.supported} replicate"
-    assert first in page
-    verdicts = page.partition("Verdicts</h2>")[2].partition("</table>")[0]
-    marks = re.findall(r"<td>[^<]*</td>\s*<td><b>(.)", verdicts)
-    assert [(mark, marks.count(mark)) for mark in dict.fromkeys(marks)] == [
-        ("✗", counts["not supported"]), ("±", counts["depends on the goals"]),
-        ("?", counts.undecided), ("✓", counts.supported),
-    ]  # fmt: skip
-    assert "EC1-subtask" not in page
-    targets = re.findall(r'(?:href|src)="([^"#]+)"', page)
-    assert targets
-    assert all((tmp_path / target).is_file() and ".." not in target for target in targets)
-
-
-def test_stored_claims_on_families_are_of_suite_families():
-    claims = pd.read_csv(FOLDER / "claims.csv", index_col=0)
-    assert (claims.suite == "families").sum() == claims.index.str.endswith("-in-general").sum()
 
 
 def test_spreads_against_normal_samples():
