@@ -34,8 +34,10 @@ RESAMPLES = 9_999
 """Number of resamples unless stated otherwise: 0.05 and 0.01 of 9,999 + 1 are whole numbers."""
 SEED = 0
 """Seed of resampling."""
-FEWEST = 3
-"""Least number of values in each sample for a bootstrap interval."""
+FEWEST = 5
+"""Least number of values, such as runs, in each sample for an interval or a test."""
+FEWEST_TASKS = 3
+"""Least number of random tasks of a family for an interval or a test over tasks."""
 FEWER_RESAMPLES = 1_999
 """Number of resamples for intervals of many values and over instances, which take long."""
 LARGE = 500
@@ -108,7 +110,7 @@ def centred(values: Array) -> Array:
 
 def mean(values: ArrayLike) -> Estimate:
     """Return the mean of a sample ``(n,)`` with its 95 % interval (:func:`mean_of_means`), whose
-    ends are NaN for fewer than three values. Raises ValueError for a sample that is no vector,
+    ends are NaN for fewer than five values. Raises ValueError for a sample that is no vector,
     empty or not finite, or has values, other than 0, that are not from 1e-100 to 1e100 in size."""
     return _mean_of(tuple(vector(values).tolist()))
 
@@ -121,7 +123,7 @@ def _mean_of(values: tuple[float, ...]) -> Estimate:
 def difference_of_means(first: ArrayLike, second: ArrayLike) -> Estimate:
     """Return the mean of ``first`` less the mean of ``second``, two independent samples ``(n,)``
     and ``(m,)``, with its 95 % interval (:func:`mean_of_means`), whose ends are NaN for fewer than
-    three values in a sample. Raises ValueError for samples that :func:`mean` refuses."""
+    five values in a sample. Raises ValueError for samples that :func:`mean` refuses."""
     return mean_of_means([first, second], [1.0, -1.0])
 
 

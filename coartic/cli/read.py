@@ -83,6 +83,7 @@ def say_ranking(study: Study, folder: Path) -> None:
     from coartic.analysis.report.sections import limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
+    from coartic.estimates import FEWEST
 
     every, what = standings(study), limits(study)
     names = [
@@ -104,6 +105,12 @@ def say_ranking(study: Study, folder: Path) -> None:
     ]
     if len(rows):
         pairs.append(("Reference", f"gaps are to the {reference(study, ranked_tasks(study))}"))
+    fewest = min(
+        (len(of) for (_, label), of in study.cells.items() if study.methods.stochastic[label]),
+        default=FEWEST,
+    )
+    if fewest < FEWEST:
+        pairs.append(("Intervals", f"too few runs to test: make {FEWEST} (--runs {FEWEST})"))
     if what["own"]:
         known = f"of {listed(what['own'])} only the best reward of this folder is known"
         again = "repeat the command with optimum/search among its --methods"
