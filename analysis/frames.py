@@ -251,7 +251,7 @@ def means(
     DataFrame
         A row for each group, in the order of first appearance: ``by``, the number of ``rows``, and
         for each column ``x`` the mean ``x`` with its interval ``x_low`` to ``x_high`` (NaN with
-        fewer than three values); a mean without values is NaN.
+        fewer than five values); a mean without values is NaN.
 
     Raises
     ------
@@ -261,11 +261,11 @@ def means(
 
     Examples
     --------
-    >>> frame = pd.DataFrame({"h": [0, 0, 0, 1, 1, 1], "gap": [0.3, 0.2, 0.4, 0.1, 0.1, 0.1]})
+    >>> frame = pd.DataFrame({"h": [0] * 5 + [1] * 5, "gap": [0.1, 0.2, 0.3, 0.4, 0.5] + [0.1] * 5})
     >>> means(frame, ["h"], ["gap"]).round(2)
        h  rows  gap  gap_low  gap_high
-    0  0     3  0.3      0.2      0.37
-    1  1     3  0.1      0.1      0.10
+    0  0     5  0.3     0.18      0.42
+    1  1     5  0.1     0.10      0.10
     """
     by, columns = _names_given("by", by), _names_given("columns", columns)
     if not by:
@@ -344,7 +344,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         the others.
 
         - ``gap``: mean over tasks of the mean over runs, with its 95 % interval ``gap_low`` to
-          ``gap_high`` for other runs on the same tasks (NaN with fewer than three runs on a task);
+          ``gap_high`` for other runs on the same tasks (NaN with fewer than five runs on a task);
           NaN for a method that is not ranked;
         - ``share``, ``share_low``, ``share_high``: share of the possible gain (:func:`shares`), a
           mean over the tasks on which something can be gained, and ``without_gain``, the number of

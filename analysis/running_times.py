@@ -76,7 +76,7 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     target is reached, infinite if no budget is enough; each task has the same weight.
 
     The percentile interval is of the bootstrap over runs within tasks, not widened: budgets can be
-    infinite. No interval if a task has fewer than three runs.
+    infinite. No interval if a task has fewer than five runs.
     """
     values, weights, runs = _pairs(times)
 
@@ -99,7 +99,7 @@ def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Arra
     targets reached within each budget, a finite number in the unit of ``times``.
 
     The percentile interval is of the bootstrap over runs within tasks; NaN if a task has fewer than
-    three runs.
+    five runs.
     """
     sizes = tuple(map(len, times))
     if min(sizes) < FEWEST:

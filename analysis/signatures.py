@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from coartic import Execution, Hand, Task, corrective_trial, initial_hands
 from coartic.analysis.statistics import drawn_rows, places
 from coartic.errors import NotApplicableError
-from coartic.estimates import RESAMPLES, SEED, Resamples, centred, slices
+from coartic.estimates import FEWEST, RESAMPLES, SEED, Resamples, centred, slices
 from coartic.internal.arguments import Numbers
 from coartic.motion.trial import reach_goals
 from coartic.robot import HANDS, Array
@@ -582,6 +582,11 @@ class TwoContexts:
         return sum(map(len, self.configurations))
 
     @property
+    def can_test(self) -> bool:
+        """True if each context has the five runs that a test needs."""
+        return min(map(len, self.configurations)) >= FEWEST
+
+    @property
     def posture_difference(self) -> float:
         """Distance between the mean postures of the two contexts, length unit and rad mixed."""
         return distance_of_means(*self.configurations)
@@ -605,20 +610,26 @@ class TwoContexts:
     @cached_property
     def p(self) -> float:
         """P-value of the one-tailed permutation test that the posture difference exceeds chance
-        (:func:`.permutation_p`); NaN if a context has a single run."""
+        (:func:`.permutation_p`); NaN if a context has fewer than five runs."""
+        if not self.can_test:
+            return math.nan
         return permutation_p(*self.configurations, self._rng("context dependence"))
 
     @cached_property
     def p_same(self) -> float:
         """P-value of the bootstrap test that the posture difference is below :data:`SAME`
-        (:func:`.posture_difference_below`); NaN if a context has a single run."""
+        (:func:`.posture_difference_below`); NaN if a context has fewer than five runs."""
+        if not self.can_test:
+            return math.nan
         rng = self._rng("sameness")
         return posture_difference_below(*self.configurations, SAME, rng, standardised=False)
 
     def p_beyond(self, other: TwoContexts) -> float:
         """Return the p-value of the permutation test that the posture difference exceeds the
         posture difference of ``other``, another method at the same goal: twice the upper tail
-        (:func:`.beyond_p`); NaN if a context has a single run."""
+        (:func:`.beyond_p`); NaN if a context has fewer than five runs."""
+        if not (self.can_test and other.can_test):
+            return math.nan
         return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
 
     def _rng(self, test: str) -> np.random.Generator:

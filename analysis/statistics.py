@@ -33,6 +33,7 @@ from pydantic import Field
 from coartic.estimates import (
     FEWER_RESAMPLES,
     FEWEST,
+    FEWEST_TASKS,
     IN_CACHE,
     NEGLIGIBLE,
     RESAMPLES,
@@ -109,7 +110,7 @@ def exchange_test(
     are no more than ``resamples``, or else (1 + exchanges at least as extreme) / (1 + resamples).
     ``"greater"``: one-tailed, the mean of ``first`` is higher; two-sided by the absolute value.
 
-    p is NaN with fewer than three values in a sample, and if all values are equal.
+    p is NaN with fewer than five values in a sample, and if all values are equal.
     """
     samples = vector(first), vector(second)
     n, m = map(len, samples)
@@ -139,14 +140,14 @@ def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> fl
     In each stratum labels are exchanged, as in :func:`exchange_test`; a sample that is compared
     with an exact number is resampled, as in :func:`bootstrap_test`. The statistic is the
     sum of the differences over the root of the sum of their variances; p = (1 + resamples at least
-    as extreme) / (1 + resamples). p is NaN with fewer than three values in a sample, and without a
+    as extreme) / (1 + resamples). p is NaN with fewer than five values in a sample, and without a
     sample.
 
     Examples
     --------
-    >>> apart = np.array([1.0, 2.0, 3.0, 4.0]), np.array([5.0, 6.0, 7.0, 8.0])
+    >>> apart = np.arange(5.0), np.arange(5.0) + 9.0
     >>> stratified_test([apart, apart])
-    0.0003
+    0.0001
     """
     samples = [each for pair in strata for each in pair if not isinstance(each, float)]
     if not samples or min(map(len, samples)) < FEWEST:
@@ -356,7 +357,7 @@ def other_tasks(scores: Scores) -> Estimate:
     }
     mean = float(np.mean([instances.mean() for instances in values.values()]))
     n = tuple(map(len, values.values()))
-    if min(n) < FEWEST:
+    if min(n) < FEWEST_TASKS:
         return Estimate(mean, n=n)
     deviations = np.zeros(FEWER_RESAMPLES)
     for place, (family, instances) in enumerate(samples.items()):

@@ -65,7 +65,6 @@ from coartic.analysis.statistics import (
     exchange_test,
     holm,
     other_tasks,
-    smallest_p,
     stratified_test,
 )
 from coartic.analysis.study import Study, check_study, solved, typical_run
@@ -83,6 +82,7 @@ from coartic.analysis.words import (
 )
 from coartic.estimates import (
     FEWER_RESAMPLES,
+    FEWEST,
     LEVEL,
     Estimate,
     difference_of_means,
@@ -386,11 +386,12 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
             )
             if len(rewards) == len(runs) and len(learned) == len(learner):
                 ahead.append(bool(rewards.mean() > learned.mean()))
-                tests.append(
-                    exchange_test(learned, rewards, "two-sided")
-                    if stochastic
-                    else bootstrap_test(learned, float(rewards[0]), "two-sided")
-                )
+                if min(len(learned), len(rewards) if stochastic else FEWEST) < FEWEST:
+                    tests.append(Estimate(math.nan))
+                elif stochastic:
+                    tests.append(exchange_test(learned, rewards, "two-sided"))
+                else:
+                    tests.append(bootstrap_test(learned, float(rewards[0]), "two-sided"))
         least = [test.least_p for test in tests if not math.isnan(test.least_p)]
         if least and len(least) * min(least) < LEVEL:
             sure = [
@@ -717,8 +718,7 @@ def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
     """
     method: Any = study.methods.loc[shared.method]
     if method.stochastic:
-        few = smallest_p(*map(len, shared.configurations)) >= LEVEL
-        if few or math.isnan(shared.p):
+        if math.isnan(shared.p):
             return "too few runs"
         differs = (shared.p if math.isnan(row["p_holm"]) else row["p_holm"]) < LEVEL
         is_same = shared.p_same < LEVEL

@@ -1,14 +1,19 @@
 """Hill climbing: Gaussian noise and drawn hands, a (1+1) hill climber for each hand sequence.
 
-A sequence has a centre, at first the configurations of the corrective process **A** alone, which
-take the first trial of the sequence. A trial perturbs all explored joints of the centre at once;
-any better one moves the centre to the configurations in which it hit the goals, as in the learner.
+A sequence has a centre, at first the configurations in which its first trial hits the goals. In
+this trial the corrective process **A** acts alone (or see ``begin``). Each later trial perturbs all
+explored joints of the centre at once; any better one moves the centre to the configurations in
+which it hit the goals, as in the learner.
 To keep its targets would gain more: random search with 1,000 ``stages`` gains 0 to 16 ticks more
 with targets on the paper's tasks. Hands are explored as the learner does, with ε for each goal
 around the best sequence known. SD (by default) and ε are the learner's, untuned.
 """
 
 from __future__ import annotations
+
+from itertools import pairwise
+from operator import eq
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +27,16 @@ _EPSILON = 0.2  # probability of a random hand, for each goal
 _MOST_DRAWN = 128  # trials that are drawn before they are made, at most
 
 
+class HillClimbingParameters(UninformedParameters):
+    """Parameters of hill climbing; the defaults are the learner's."""
+
+    begin: Literal["correction", "best"] = "correction"
+    """Where the first trial of a hand sequence begins. ``"correction"``: **A** acts alone.
+    ``"best"``: as in the learner's table, at the centre of the best sequence so far, perturbed, at
+    each goal where both sequences have the same hand and the same hand before; **A** acts at the
+    other goals."""
+
+
 class HillClimbing(Method):
     """Hill climbing for each hand sequence, from its best trial so far."""
 
@@ -33,7 +48,7 @@ class HillClimbing(Method):
         "introduction. Natural Computing."
     )
     information = OPTIMISER_INFORMATION
-    Parameters = UninformedParameters
+    Parameters = HillClimbingParameters
 
     def solve(self, session: Session) -> Result:
         """Make trials until none is left, or every hand sequence has failed; return the movements
@@ -59,6 +74,17 @@ class HillClimbing(Method):
                 if (hands := "".join(chosen)) not in hopeless:
                     return hands
 
+        def begin(hands: str) -> Array:
+            """Return the targets of the first trial of a hand sequence, shape ``(G, dof)``."""
+            targets = np.full(explored.shape, np.nan)
+            if self.parameters.begin == "best" and attempts.hands:
+                states, of_best = ([*pairwise(f" {each}")] for each in (hands, attempts.hands))
+                shared = np.array([*map(eq, states, of_best)])
+                aimed = shared[:, None] & explored
+                noise = self.parameters.sigma * rng.standard_normal(aimed.sum())
+                targets[aimed] = centres[attempts.hands][aimed] + noise
+            return targets
+
         with session.solving():
             while attempts.left > 0 and len(hopeless) < most:
                 # The next draws are known until a centre moves, which is rare: they are tried
@@ -83,8 +109,9 @@ class HillClimbing(Method):
                         ahead = tried
                 else:
                     rewards[hands] = -np.inf
-                    attempt = attempts.by_correction(hands)
-                    if attempt.rewards[-1] == -np.inf:
+                    targets = begin(hands)
+                    attempt = attempts.by_targets([hands], targets[None])
+                    if attempt.rewards[-1] == -np.inf and np.isnan(targets).all():
                         hopeless.add(hands)
                 if attempt.rewards[-1] > rewards[hands]:
                     centres[hands] = np.where(explored, attempt.reached[-1], np.nan)

@@ -34,8 +34,10 @@ RESAMPLES = 9_999
 """Default number of resamples: 0.05 and 0.01 of 9,999 + 1 are integers."""
 SEED = 0
 """Seed of resampling."""
-FEWEST = 3
-"""Smallest size of a sample for which a bootstrap interval is computed."""
+FEWEST = 5
+"""Least number of values, such as runs, in each sample for an interval or a test."""
+FEWEST_TASKS = 3
+"""Least number of random tasks of a family for an interval or a test over tasks."""
 FEWER_RESAMPLES = 1_999
 """Number of resamples where they take long: for large samples and over instances."""
 LARGE = 500

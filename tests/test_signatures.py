@@ -284,14 +284,14 @@ NO_CONTROL = "undecided: no random search of as many trials"
         (EC1, 2.0, MANY, "different postures", {}),
         (EC1, 0.5, MANY, "no more than random search", {"difference": 2.0}),
         (EC1, 0.0, MANY, "no significant difference", {}),
-        (EC1, 2.0, (2, 2), "too few runs", {}),
+        (EC1, 2.0, (4, 4), "too few runs", {}),
         (EC1, 2.0, MANY, FEW_CONTROLS, {"runs": ONE}),
         (EC1, 2.0, MANY, NO_CONTROL, {"trials": 9}),  # fewer than the learner's
         # Methods without trials select nothing; of one that draws nothing there is no test.
         ("plan", 0.0, ONE, "the same posture", {}),
         ("plan", 0.005, ONE, "different, negligible", {}),
-        # Of 41 divisions one is as far apart: below 5 %.
-        ("mine", 0.5, (40, 1), "too few runs", {}),
+        # Five runs in each context are needed, whatever the number of divisions.
+        ("mine", 0.5, (40, 4), "too few runs", {}),
         ("mine", 0.5, (9, 9), "different postures", {}),
         # With a hundredth of the noise the 90 % interval is below the bound of sameness.
         ("mine", 0.0, (9, 9), "the same posture", {"noise": 0.001}),
@@ -345,24 +345,24 @@ def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs(tmp_p
     rows = runs_of(task.name, EC4, [-300] * len(runs), hands=[run.hands for run in runs])
     # One of the runs is no faster than the corrective process alone, and counts.
     for setting, first, hands, trials in (
-        ("", [2, 3, 400], "RRRR", 10), ("trials=100", [9, 9, 9], "RRRR", 100),
-        ("hands=RLLR", [1, 1, 1], "RLLR", 10),
+        ("", [2, 3, 400, 130, 140], "RRRR", 10), ("trials=100", [9] * 5, "RRRR", 100),
+        ("hands=RLLR", [1] * 5, "RLLR", 10),
     ):  # fmt: skip
         label = f"{RANDOM_SEARCH} {setting}".strip()
         cells.append(shifted(task, label, first, hands=hands))
-        rows += runs_of(task.name, RANDOM_SEARCH, [-300] * 3, setting=setting, trials=trials,
+        rows += runs_of(task.name, RANDOM_SEARCH, [-300] * 5, setting=setting, trials=trials,
                         hands=hands)  # fmt: skip
     study = study_of_solutions(cells, rows)
     compared = with_control(study, "first", task.name, EC4)
     assert {each: [v.tolist() for v in pair] for each, pair in compared.items()} == {
-        "RRRR": [[5] * 18, [2, 3, 400]],
+        "RRRR": [[5] * 18, [2, 3, 400, 130, 140]],
         "RLRR": [[9] * 3, []],
     }
     assert mean_excess(study, "first", task.name, EC4) == 5 - 135
     table = TABLES["signatures"](study).loc[f"{task.name} {EC4} RRRR"]
-    test = exchange_test([5.0] * 18, [2.0, 3.0, 400.0])
+    test = exchange_test([5.0] * 18, [2.0, 3.0, 400.0, 130.0, 140.0])
     assert (table["first"], table.first_control, table.first_p) == (5, 135, test.p)
-    assert (table.runs, table.control_runs) == (18, 3)
+    assert (table.runs, table.control_runs) == (18, 5)
     (tmp_path / "control.toml").write_text(control_suite(study), "utf-8")
     (job,) = plan_suite(tmp_path / "control.toml")
     cell = job.cell
@@ -402,21 +402,21 @@ def test_the_control_of_ec3_has_an_idle_arm_that_keeps_still(has_its_own):
 
 
 def test_p_of_shared_goals_is_corrected_by_method():
-    """Of eight runs in two places 2 of 70 divisions are as far apart. Two tasks share two goals:
-    the learner, on three tasks, has six of them, and random search, on two, has two."""
+    """Of ten runs in two places 2 of 252 divisions are as far apart. Two tasks share two goals: the
+    learner, on four tasks, has twelve of them, and random search, on two, has two."""
     tasks = [
         tiny_task(name=name, goals=[[5.0, 1.0], [5.0, 2.0], [5.0, y]])
-        for name, y in (("a", 3.0), ("b", 3.5), ("c", 4.0))
+        for name, y in (("a", 3.0), ("b", 3.5), ("c", 4.0), ("d", 4.5))
     ]
     cells = [
-        posed(task, label, [posture(place + 0.01 * run) for run in range(4)])
-        for label, count in ((EC1, 3), (RANDOM_SEARCH, 2))
+        posed(task, label, [posture(place + 0.01 * run) for run in range(5)])
+        for label, count in ((EC1, 4), (RANDOM_SEARCH, 2))
         for place, task in enumerate(tasks[:count])
     ]
     table = TABLES["contexts"](study_of_solutions(cells))
     assert table.index.is_unique
     table = table.set_index("method")
-    assert table.p_holm[EC1].tolist() == pytest.approx([6 * 2 / 70] * 6)
-    assert table.p_holm[RANDOM_SEARCH].tolist() == pytest.approx([2 * 2 / 70] * 2)
+    assert table.p_holm[EC1].tolist() == pytest.approx([12 * 2 / 252] * 12)
+    assert table.p_holm[RANDOM_SEARCH].tolist() == pytest.approx([2 * 2 / 252] * 2)
     # Each of its tests alone is significant.
     assert {*table.verdict[EC1]} == {"no significant difference"}

@@ -28,6 +28,13 @@ def share_as_extreme(null, observed, alternative):
     return np.mean(sign * np.array(null) >= sign * observed - 1e-9)
 
 
+@pytest.fixture
+def three_suffice(monkeypatch):
+    """Let three values suffice for intervals and tests, so that all resamples can be listed."""
+    for module in (statistics, hypotheses):
+        monkeypatch.setattr(module, "FEWEST", 3)
+
+
 @pytest.mark.parametrize(("a", "bound"), [([1, 2, 6, 6], 3.5), ([-3, -2, -7], -5)])
 @pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
 def test_bootstrap_test_against_all_resamples(a, bound, alternative):
@@ -46,6 +53,7 @@ def test_bootstrap_test_against_all_resamples(a, bound, alternative):
 )  # fmt: skip
 @pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
 @pytest.mark.parametrize("resamples", [9_999, 15])
+@pytest.mark.usefixtures("three_suffice")
 def test_exchange_test_against_all_exchanges(a, b, alternative, resamples):
     """With fewer resamples than exchanges, some of these are drawn."""
     pool, null = np.array([*a, *b], float), []
@@ -63,6 +71,7 @@ def test_exchange_test_against_all_exchanges(a, b, alternative, resamples):
         assert test.resamples == 0
 
 
+@pytest.mark.usefixtures("three_suffice")
 def test_a_test_over_strata_against_all_exchanges():
     """In each of two strata; and in one, where values stand beside an exact number."""
     first, second = [[1, 2, 6], [0, 4, 5, 5]], [[0, 1, 3], [2, 3, 9]]
@@ -95,6 +104,7 @@ def of_strata(pairs):
     return 0.0 if abs(differences) < 1e-12 else differences / math.sqrt(error)
 
 
+@pytest.mark.usefixtures("three_suffice")
 def test_smallest_p():
     """No resample comes near: p is that of the sample seen; tests of few values cannot reject."""
     far = 1000 + np.arange(8.0)
@@ -121,6 +131,7 @@ def test_smallest_p():
         ([[0.0, 1.0, 2.5, 4.2, 9.1, 13.3], [0.3, 1.6, 5.9]], [1, -1]),  # of unequal sizes
     ],
 )
+@pytest.mark.usefixtures("three_suffice")
 def test_bca_interval_against_all_resamples(samples, weights):
     """The formula of Efron & Tibshirani (1993, equation 14.10) on all resamples."""
     parts = [*zip(weights, map(np.array, samples), strict=True)]
@@ -139,21 +150,21 @@ def test_bca_interval_against_all_resamples(samples, weights):
 
 
 def test_degenerate_samples():
-    interval = statistics.difference_of_means(np.full(5, 4.0), np.full(4, 3.0))
+    interval = statistics.difference_of_means(np.full(6, 4.0), np.full(5, 3.0))
     assert interval.columns("gap") == {"gap": 1.0, "gap_low": 1.0, "gap_high": 1.0}
 
 
 def test_tests_that_cannot_be_made():
     assert math.isnan(hypotheses.bootstrap_test([2.0, 2.0], 2.0).p)
-    assert math.isnan(hypotheses.exchange_test([0.1] * 3, [0.1] * 4).p)  # no mean of 0.1 is 0.1
+    assert math.isnan(hypotheses.exchange_test([0.1] * 6, [0.1] * 7).p)  # no mean of 0.1 is 0.1
 
 
 @pytest.mark.parametrize(("alternative", "share"), [("greater", 1), ("two-sided", 2)])
 def test_without_spread_it_is_an_exact_test(alternative, share):
-    """By signs of three values, all alike; by exchange of three and three."""
+    """By signs of three values, all alike; by exchange of five and five."""
     assert hypotheses.bootstrap_test([2.0] * 3, 1.0, alternative).p == share / 8
-    assert hypotheses.exchange_test([2.0] * 3, [1.0] * 3, alternative).p == share / 20
-    assert hypotheses.exchange_test([2.0] * 3, [1.0] * 3, "less").p == 1
+    assert hypotheses.exchange_test([2.0] * 5, [1.0] * 5, alternative).p == share / 252
+    assert hypotheses.exchange_test([2.0] * 5, [1.0] * 5, "less").p == 1
 
 
 @pytest.mark.parametrize("values", [[], [[1.0]], [1.0, math.nan], [math.inf]])
@@ -201,11 +212,29 @@ def test_share_test():
 
 
 def test_the_least_number_of_values_on_both_sides():
-    two, three = [1.0, 4.0], [1.0, 2.0, 4.0]
-    assert [math.isnan(statistics.mean(of).low) for of in (two, three)] == [True, False]
-    for first, second, none in ((two, three, True), (three, two, True), (three, three[::-1], True),
-                                (three, [5.0, 6.0, 9.0], False)):  # fmt: skip
-        tested = hypotheses.exchange_test(first, second)
-        assert math.isnan(tested.p) == (none and min(len(first), len(second)) < 3)
+    """Below five values there is neither an interval nor a p."""
+    four, five = [1.0, 2.0, 4.0, 4.5], [1.0, 2.0, 4.0, 4.5, 7.0]
+    assert [math.isnan(statistics.mean(of).low) for of in (four, five)] == [True, False]
+    for first, second in ((four, five), (five, four), (five, [5.0, 6.0, 9.0, 9.5, 9.7])):
+        few = len(first) + len(second) < 10
+        assert math.isnan(hypotheses.exchange_test(first, second).p) == few
+        assert math.isnan(statistics.difference_of_means(first, second).low) == few
+        strata = [(np.array(first), np.array(second))]
+        assert math.isnan(hypotheses.stratified_test(strata)) == few
     assert math.isnan(hypotheses.bootstrap_test([1.0], 0).p)
-    assert not math.isnan(hypotheses.bootstrap_test(two, 0).p)
+    assert not math.isnan(hypotheses.bootstrap_test(four[:2], 0).p)
+
+
+def test_the_page_has_the_calibration_that_is_stored():
+    docs = Path(__file__).parents[1] / "docs"
+    stored = pd.read_csv(docs / "stored" / "two-samples" / "candidates.csv", index_col=0)
+    page = (docs / "statistics.md").read_text("utf-8")
+    rows = re.findall(r"\| (\d+) \| ([\d.]+) % \| ([\d.]+) % \|", page)
+    taken = [(int(n), float(five), float(one)) for n, five, one in rows]
+    columns = stored.sort_values("too often")[["too often", "largest at 5 %", "largest at 1 %"]]
+    for (n, five, one), row in zip(taken, columns.to_numpy(), strict=True):
+        assert (n, five, one) == (
+            row[0],
+            *(pytest.approx(100 * each, abs=0.051) for each in row[1:]),
+        )
+    assert stored["too often"].idxmin() == "exchange"

@@ -61,6 +61,44 @@ def test_sequences_that_cannot_be_completed_are_left(method):
     assert execution.hands[1] == "R"
 
 
+def trials_of_hill_climbing(monkeypatch, **options):
+    """Return hands, targets, reward and postures of each trial of hill climbing, in order."""
+    made, trials = [], Session.trials
+
+    def recorded(self, hands, targets, *args, **kwargs):
+        results = trials(self, hands, targets, *args, **kwargs)
+        names = [hands] * len(targets) if isinstance(hands, str) else hands
+        made.extend(zip(names, targets, results.rewards, results.reached))  # noqa: B905 (budget)
+        return results
+
+    monkeypatch.setattr(Session, "trials", recorded)
+    solve(HillClimbing, "two-armed-1", trials=600, **options)
+    return made
+
+
+@pytest.mark.parametrize("begin", ["correction", "best"])
+def test_where_hill_climbing_begins_a_hand_sequence(begin, monkeypatch):
+    """With ``best``: at the best trial's postures where hand and hand before are the same."""
+    best, first, shared = (-np.inf, "", None), 0, 0
+    known = set()
+    for hands, targets, reward, reached in trials_of_hill_climbing(monkeypatch, begin=begin):
+        if hands not in known:
+            known.add(hands)
+            first += 1
+            for goal in range(4):
+                same = hands[max(goal - 1, 0) : goal + 1] == best[1][max(goal - 1, 0) : goal + 1]
+                if begin == "best" and same:
+                    shared += 1
+                    away = np.nanstd(targets[goal] - best[2][goal])
+                    assert 0.01 < away < 0.12  # of nine values with SD 0.05
+                else:
+                    assert np.isnan(targets[goal]).all()
+        if reward > best[0]:
+            best = reward, hands, reached
+    assert first > 8
+    assert (shared > 8) == (begin == "best")
+
+
 class HalfOfAPlain:
     """A quadratic reward around (1, 1, 1); beyond 0.5 in the first joint trials fail."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -57,7 +57,7 @@ from coartic.analysis.statistics import other_tasks
 from coartic.analysis.study import Study, solved
 from coartic.analysis.tables import by_family, list_runtimes, list_saved, on_instances
 from coartic.analysis.words import capital, id_of, interval, listed, marked, number, titled_apart
-from coartic.estimates import Estimate
+from coartic.estimates import FEWEST, Estimate
 from coartic.internal.text import counted
 from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
 from coartic.tasks.task import shipped_tasks
@@ -108,7 +108,11 @@ def _draw_varied(study: Study) -> Parts | None:
         axes.annotate(marked(study.tasks[task]), (places[-1], gaps[-1]), color=style.GREY, **at)
         shown[f"on {task}"] = gaps
     style.means(axes, shown, x="place", y="gap", scale=100, bars=1.6, **mean)
-    axes.set_ylim(bottom=min(0, 100 * shown.gap_low.min()))
+    few = [(place, gap) for place, row in zip(places, rows.to_dict("records"), strict=True)
+           for gap in _gaps_of_few_runs(study, row)]  # fmt: skip
+    axes.plot(*zip(*few, strict=True) if few else ([], []), ".", **_FEW, color=style.BLUE)
+    lowest = min([0, 100 * shown.gap_low.min(), *(gap for _, gap in few)])
+    axes.set_ylim(bottom=lowest)
     axes.set_xlabel(name)
     axes.set_ylabel(f"gap to the {reference(study, tasks)} (%)")
     words = (f"{row['value']}: {interval(row, 'gap', scale=100, unit=' %')}"
@@ -116,6 +120,18 @@ def _draw_varied(study: Study) -> Parts | None:
     alt = f"Gap to the {reference(study, tasks)} by {name}: {'; '.join(words)}."
     thin = "; thin: the gap on each" * bool(each_task)
     return drawing, shown, alt, f" Means over all tasks{thin}." * (len(tasks) > 1)
+
+
+_FEW: Any = {"markersize": 3, "alpha": 0.6}
+"""Look of single runs."""
+
+
+def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
+    """Return the gaps (%) of the runs of a ranked method, each a mean over tasks of the runs with
+    one number, if they are too few for an interval; an empty list for enough or for one run."""
+    runs = runs_on(study, str(row["method"]), ranked_tasks(study))
+    gaps = 100 * runs.groupby("run").gap.mean()
+    return list(gaps) if 1 < runs.groupby("task").size().min() < FEWEST else []
 
 
 @figure(
@@ -142,7 +158,8 @@ def _draw_gaps(study: Study) -> Parts | None:
     height = (0.145 if narrow else 0.165) + 0.1 * deep  # inches of a line
     drawing, (axes,) = style.panels((1, 1), (style.TWO, 0.6 + height * len(lines)))
     gaps = shown[["gap", "gap_low", "gap_high"]]
-    nearest, farthest = gaps.min().min(), max(gaps.max().max(), 0.5)
+    few = [gap for row in shown.to_dict("records") for gap in _gaps_of_few_runs(study, row)]
+    nearest, farthest = min([gaps.min().min(), *few]), max([gaps.max().max(), 0.5, *few])
     left = min(nearest, 0) if nearest < 0.15 else nearest / 1.3
     axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
     steps = (1, 2, 5) if farthest < 100 and not narrow else (1,)
@@ -175,6 +192,8 @@ def _draw_gaps(study: Study) -> Parts | None:
         size = looks[row["method"]]["markersize"] + learner  # a diamond of equal width is smaller
         look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
         axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
+        of_runs = _gaps_of_few_runs(study, row)
+        axes.plot(of_runs, [y] * len(of_runs), ".", **_FEW, **look)
         mark = looks[row["method"]]["marker"]
         (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
         name = row["title"]
@@ -191,6 +210,7 @@ def _draw_gaps(study: Study) -> Parts | None:
     bold += ["methods from files (larger marks)"] * (not all(rows.built_in))
     more = " Means over all tasks." * (len(tasks) > 1)
     more += " Methods that are run once have no interval." * (not all(rows.stochastic))
+    more += f" Of fewer than {FEWEST} runs each is a small point." * bool(few)
     return drawing, rows, alt, more + (f" Bold: {listed(bold)}." if bold else "")
 
 

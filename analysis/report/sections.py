@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import traceback
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain
@@ -26,7 +26,7 @@ from coartic.analysis.figures.drawings import (
 )
 from coartic.analysis.figures.plot import DrawsFigure
 from coartic.analysis.methods import EC1, EC4, GROUPS, RANDOM_SEARCH, joined_label, title_of
-from coartic.analysis.standings import ranked_tasks, reference, standings
+from coartic.analysis.standings import ranked_tasks, reference, runs_on, solved_tasks, standings
 from coartic.analysis.study import Study
 from coartic.analysis.tables import (
     Table,
@@ -53,13 +53,15 @@ from coartic.analysis.words import (
     p_value,
 )
 from coartic.errors import CoarticError
-from coartic.estimates import LEVEL
+from coartic.estimates import FEWEST, LEVEL
 from coartic.internal.text import error_line, one_line
 from coartic.learner.learning import TRIALS
 
 Made = TypeVar("Made")
 RUNS = 20
 """Number of runs of every experiment of the paper."""
+TOO_FEW = f"; too few runs to test: make {FEWEST}"
+NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer runs as points."
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ SECTIONS = (
 {%- for next in others[1].to_dict("records")[:1] %}
  Next is {{ next.title }}, {{ interval(next, "difference", scale=100) }} percentage points behind\
 {{ ": %s chance (%s)" % ("beyond" if next.p_holm < LEVEL else "not beyond", p_value(next.p_holm)) \
-if next.p_holm >= 0 else ", too few runs to test" }}.
+if next.p_holm >= 0 else few(next) }}.
 {%- endfor %}
 {%- for row in rows[rows.method.isin(papers)].to_dict("records") if row.method != best.method %}
  {{ row.title }} leaves {{ interval(row, "gap", scale=100, unit=" %") }}.
@@ -131,7 +133,8 @@ if next.p_holm >= 0 else ", too few runs to test" }}.
 smaller on the tasks that it solved: \
 {% for row in leading(group) %}
 {{ row.title }} {{ interval(row, "difference", scale=100) }}\
-{{ " (%s)" % p_value(row.p_holm) if row.p_holm >= 0 }}{{ "." if loop.last else "; " }}
+{{ " (%s)" % p_value(row.p_holm) if row.p_holm >= 0 else few(row) }}\
+{{ "." if loop.last else "; " }}
 {%- endfor %}
 
 {% endfor %}""",
@@ -143,9 +146,9 @@ smaller on the tasks that it solved: \
         "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
         "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
         "by two-tailed tests, corrected for the tasks of the method. Empty: the runs are too few, "
-        "or too alike, to tell. Ranked are the methods that solved all tasks in as many trials as "
-        "were asked for; planners count with any number. What an own method uses is as its "
-        "author declares; own methods are bold.",
+        f"or too alike, to tell. {NEEDS_RUNS} Ranked are the methods that solved all tasks in as "
+        "many trials as were asked for; planners count with any number. What an own method uses is "
+        "as its author declares; own methods are bold.",
         single=False,
     ),
     Section(
@@ -161,7 +164,7 @@ smaller on the tasks that it solved: \
 "no more than random search": "in postures that differ no more than those of random search",
 "no significant difference": "in postures without significant difference",
 "different, negligible": "in postures with a negligible difference",
-"the same posture": "in the same posture", "too few runs": "in too few runs to tell",
+"the same posture": "in the same posture", "too few runs": "in too few runs to test (make 5)",
 }.get(row.verdict, "in postures that differ, without random search to compare them with") }}: \
 posture difference {{ row.distance | number(2) }} (length units and rad; {{ row.runs }} runs)\
 {{ "; random search: %s" % number(row.control, 2) if row.control >= 0 }}\
@@ -281,6 +284,19 @@ def finding(study: Study, section: Section) -> list[str]:
     methods = study.methods
     built_in = methods.index[methods.built_in.astype(bool)]
 
+    def few(row: Mapping[str, Any]) -> str:
+        """Return why a difference of gaps is not tested: too few runs of a stochastic method."""
+        labels = {str(row["method"]), str(row["against"])}
+        drawn = [
+            runs_on(study, label, solved_tasks(study, str(row["against"]))) for label in labels
+        ]
+        counts = [
+            len(of_task)
+            for runs in drawn
+            for _, of_task in runs[runs.label.map(methods.stochastic).astype(bool)].groupby("task")
+        ]
+        return TOO_FEW if counts and min(counts) < FEWEST else ""
+
     def named(table: Table) -> pd.DataFrame:
         every = table(study)
         rows: pd.DataFrame = every[~is_setting(study, every)]
@@ -290,7 +306,7 @@ def finding(study: Study, section: Section) -> list[str]:
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "commonest": commonest, "listed": listed}
     environment.globals |= {
-        "interval": interval, "number": number, "p_value": p_value, "leading": leading,
+        "interval": interval, "number": number, "p_value": p_value, "leading": leading, "few": few,
         "infinite": math.inf,
         "uses": GROUPS, "first": next(iter(standings(study).index), ""),
         "titles": methods.title,

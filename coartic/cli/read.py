@@ -83,6 +83,7 @@ def say_ranking(study: Study, folder: Path) -> None:
     from coartic.analysis.report.sections import limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
+    from coartic.estimates import FEWEST
     from coartic.runs.record import MOTOR_NOISE
 
     every, what = standings(study), limits(study)
@@ -108,6 +109,12 @@ def say_ranking(study: Study, folder: Path) -> None:
         known = f"gaps are to the {reference(study, ranked_tasks(study))}"
         noise = f"noisy gaps, too, of solutions executed with motor noise {MOTOR_NOISE}"
         pairs.append(("Reference", f"{known}; {noise}"))
+    fewest = min(
+        (len(of) for (_, label), of in study.cells.items() if study.methods.stochastic[label]),
+        default=FEWEST,
+    )
+    if fewest < FEWEST:
+        pairs.append(("Intervals", f"too few runs to test: make {FEWEST} (--runs {FEWEST})"))
     if what["own"]:
         known = f"of {listed(what['own'])} only the best reward of this folder is known"
         again = "repeat the command with optimum/search among its --methods"

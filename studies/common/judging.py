@@ -23,7 +23,7 @@ from coartic import CoarticError
 from coartic.analysis import interval, mean
 from coartic.analysis.statistics import bootstrap_test, holm
 from coartic.analysis.words import p_value
-from coartic.estimates import FEWEST, LEVEL, Estimate
+from coartic.estimates import FEWEST, FEWEST_TASKS, LEVEL, Estimate
 
 RESAMPLES_OF_CLAIMS = 99_999
 """Resamples of a test over tasks, whose p-value is corrected over many claims."""
@@ -59,9 +59,9 @@ class Finding:
 
         - *supported*: the claim holds, and ``p`` is below 5 % or NaN (counted exactly);
         - *not supported*: the claim does not hold, and ``opposite_p`` is below 5 %, or the claim
-          has no test, or a test of three values or more has no p and no positive estimate (all
+          has no test, or a test of five values or more has no p and no positive estimate (all
           values are equal);
-        - *undecided*: any other claim, and a claim with a test of fewer than three values that has
+        - *undecided*: any other claim, and a claim with a test of fewer than five values that has
           no p.
         """
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
@@ -131,7 +131,7 @@ def mean_beyond(
     --------
     >>> finding = mean_beyond("Planning saves {} ticks", [4.0, 5.0, 6.0, 7.0], 1.0)
     >>> finding.holds, finding.evidence
-    (True, 'Planning saves 5.50 [4.50, 6.50] ticks (4 tasks)')
+    (True, 'Planning saves 5.50 ticks (4 tasks)')
     """
     if sentence.count("{}") != 1:
         raise CoarticError(f"sentence {sentence!r} must have exactly one {{}}, for the mean")
@@ -141,8 +141,8 @@ def mean_beyond(
     if found.ndim != 1:
         raise CoarticError(f"values have shape {found.shape}; they need one value for each task")
     found = found[~np.isnan(found)]
-    if len(found) < FEWEST:
-        return Finding(None, f"fewer than {FEWEST} random tasks can be judged")
+    if len(found) < FEWEST_TASKS:
+        return Finding(None, f"fewer than {FEWEST_TASKS} random tasks can be judged")
     sign = SIGNS[side]
     test, without = _tests_over_tasks(sign * found, sign * bound)
     opposite = max(_tests_over_tasks(-sign * found, -sign * bound), key=lambda test: test.p)

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 from cells import MEASURES
-from scales import drawn
+from scales import drawn, weights_of
 
 from coartic.estimates import Estimate
 
@@ -33,7 +33,8 @@ def at_equal_gain(cells):
 
 def tabulate_equal(cells):
     """Tabulate what is left of each method's signatures at the learner's gain: the difference, and
-    the ratio of sums over tasks, with tasks resampled within families; and what is left out."""
+    the ratio of means, with tasks resampled within families, which weigh the same; and what is left
+    out."""
     equal, rows = at_equal_gain(cells[cells.task.str.contains("/")]), {}
     keys = ["name", "stages"]
     for group, of_group in (("all", equal), *equal.groupby("group", sort=False)):
@@ -46,13 +47,15 @@ def tabulate_equal(cells):
                 pairs = of[["group", measure, f"learner {measure}"]].dropna().sort_values("group")
                 if len(pairs) < 3 or not pairs[measure].any():
                     continue
-                mine, learner = pairs[[measure, f"learner {measure}"]].to_numpy().T
+                weights = weights_of(pairs.group).to_numpy()
+                both = pairs[[measure, f"learner {measure}"]].to_numpy()
+                mine, learner = weights * both.T
                 places = drawn(pairs.group)
-                differences = (mine - learner)[places].mean(axis=1)
+                differences = (mine - learner)[places].sum(axis=1)
                 with np.errstate(invalid="ignore"):  # 0 / 0 where no drawn task shows anything
                     ratios = mine[places].sum(axis=1) / learner[places].sum(axis=1)
                 for word, value, each in (
-                    ("difference", (mine - learner).mean(), differences),
+                    ("difference", (mine - learner).sum(), differences),
                     ("ratio", mine.sum() / learner.sum(), ratios),
                 ):
                     ends = np.quantile(each, [0.025, 0.975])

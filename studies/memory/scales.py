@@ -16,6 +16,12 @@ MOST = STAGES[-1]
 RESAMPLES = 9_999
 
 
+def weights_of(groups):
+    """Return the weight of each task, by which families weigh the same whatever the number of their
+    tasks. ``groups``: the family of each task."""
+    return 1 / groups.groupby(groups).transform("size") / groups.nunique()
+
+
 def drawn(groups):
     """Return places of tasks in :data:`RESAMPLES` resamples within families, shape ``(resamples,
     tasks)``. ``groups``: the family of each task, families one after the other."""
@@ -40,8 +46,7 @@ class Scale:
         self.table = table.dropna().sort_index()
         self.stages = [stage for stage in STAGES if stage in table]
         families = self.table.index.get_level_values("group").to_series(index=self.table.index)
-        # Families weigh the same, whatever the number of their tasks.
-        weights = 1 / families.groupby(families).transform("size") / families.nunique()
+        weights = weights_of(families)
         columns = [*self.stages, "learner"]
         values, places = self.table[columns].to_numpy(float), drawn(families)
         self.means = pd.Series(weights @ values, columns)
@@ -85,11 +90,28 @@ class Scale:
         """Return a column less another, a value for each task, family as a factor."""
         return self.by_task(self.table[first] - self.table[second])
 
+    def median(self, first, second):
+        """Return the median over tasks of a column less that of another."""
+        return float((self.table[first] - self.table[second]).median())
+
     def by_task(self, values):
-        """Return values whose spread is that within families, about the mean of families."""
-        of_family = values.groupby(self.families)
-        size, means = of_family.transform("size"), of_family.transform("mean")
-        return of_family.mean().mean() + (values - means) * np.sqrt(size / (size - 1))
+        """Return values of tasks whose mean and standard error are those of the mean of families
+        (:func:`by_task`)."""
+        return by_task(values, self.families)
+
+
+def by_task(values, families):
+    """Return values of tasks, shape ``(N,)``, whose mean is the mean over families of their means,
+    and whose standard error is that of this mean.
+
+    In a mean of F families a task of a family of n tasks has the weight 1 / (F n), and in a mean of
+    N tasks 1 / N. So deviations within a family are multiplied by N / (F n). ``families``: the
+    family of each task.
+    """
+    of_family = values.groupby(families)
+    size, means = of_family.transform("size"), of_family.transform("mean")
+    weights = len(values) * weights_of(families)
+    return of_family.mean().mean() + weights * (values - means) * np.sqrt(size / (size - 1))
 
 
 def first_crossing(stages, scale, value):
@@ -137,6 +159,11 @@ def tabulate_scales(scales):
             "beyond_level": scale.difference("learner", MOST),
         }.items():
             row |= value.columns(name)
+        for name, (first, second) in {"hundred": (100, MOST), "beyond": ("learner", MOST)}.items():
+            row |= scale.difference(first, second, 0.9).columns(f"{name}_90")
+        row["rise_median"] = scale.median(MOST, 1)
+        row["beyond_one_median"] = scale.median("learner", 1)
+        row["beyond_level_median"] = scale.median("learner", MOST)
         row |= {"level": scale.level(BOUNDS[measure]), "where": where(scale, BOUNDS[measure])}
         rows[f"{group} {keep} {measure}"] = row
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
@@ -166,8 +193,11 @@ def tabulate_keeping(cells):
             of = cells[cells.group.isin(families) & (cells.stages == MOST)]
             table = of.pivot_table(measure, ["group", "task"], "name").dropna()
             more = (table.targets - table.postures).sort_index()
-            places = drawn(more.index.get_level_values(0).to_series())
-            ends = np.quantile(more.to_numpy()[places].mean(axis=1), [0.025, 0.975])
+            of_task = more.index.get_level_values(0).to_series(index=more.index)
+            places, weights = drawn(of_task), weights_of(of_task).to_numpy()
+            weighted = weights * more.to_numpy()
+            ends = np.quantile(weighted[places].sum(axis=1), [0.025, 0.975])
             key = {"group": group, "measure": measure, "tasks": len(more)}
-            rows[f"{group} {measure}"] = key | Estimate(more.mean(), *ends).columns("more")
+            key |= Estimate(weighted.sum(), *ends).columns("more")
+            rows[f"{group} {measure}"] = key | {"median": more.median()}
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")

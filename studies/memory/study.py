@@ -3,6 +3,9 @@
     python studies/memory/protocols.py results/memory
     PYTHONPATH=studies python studies/memory/study.py results/memory
 
+Without a folder, tables and page are made from cells.csv. hands.py has the runs on the learner's
+rule for hands, and one_selection.py those at equal gain.
+
 Random search is the learner without its memory. Here it has memory by the dose: after each of r
 equal parts of its trials it goes on from its best trial, from the postures that this trial reached
 or from the targets that it aimed at. Against the expected answer, that such a memory makes the
@@ -15,6 +18,7 @@ weight it. All tests and intervals resample tasks within families, which weigh t
 import sys
 from pathlib import Path
 
+import pandas as pd
 from cells import KEEPS, MEASURES, groups_of, measure_cells, measure_contexts, measure_runs
 from equal_gain import tabulate_equal
 from scales import MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
@@ -86,17 +90,23 @@ def draw(results):
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
     cells = measure_cells(measure_runs(study))
+    return {"cells": cells, "contexts": measure_contexts(study), **tables_of(cells)}
+
+
+def tables_of(cells):
+    """Return the tables that are made from means over runs, by name."""
     scales = every_scale(cells)
     return {
-        "cells": cells,
         "results": tabulate(scales),
         "scales": tabulate_scales(scales),
         "keeping": tabulate_keeping(cells),
         "equal": tabulate_equal(cells),
-        "contexts": measure_contexts(study),
         "claims": judge_claims(cells, scales),
     }
 
 
 if __name__ == "__main__":
-    write_study(HERE, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)
+    if sys.argv[1:]:
+        write_study(HERE, measure(load(sys.argv[1])), draw)
+    else:
+        write_study(HERE, tables_of(pd.read_csv(HERE / "cells.csv", index_col=0)), draw)

@@ -20,6 +20,8 @@ EC1, EC2, EC3, EC4 = CONDITIONS = tuple(f"{LEARNER}EC{n}" for n in (1, 2, 3, 4))
 EC1_BY_SUBTASK, EC4_BY_SUBTASK = f"{EC1}-subtask", f"{EC4}-subtask"
 """The learner with a reward for each subtask by itself."""
 RANDOM_SEARCH = "random-search"
+FEWEST_ON_INSTANCE = 3
+"""Least number of runs whose mean is the value of a random task."""
 ONE_ARMED = "ascending", "descending"
 TWO_ARMED = TASK_1, TASK_2 = "two-armed-1", "two-armed-2"
 CELLS_OF_ONE_ARM = [(task, EC1) for task in ONE_ARMED]
@@ -66,6 +68,11 @@ class Reader:
             return label.removeprefix(LEARNER)
         return self.study.methods.title.get(label, label.replace("-", " "))
 
+    def least_runs(self, name):
+        """Return the least number of runs of a method on a task: fewer on an instance of a family,
+        where the mean is a single value of a test over instances."""
+        return FEWEST_ON_INSTANCE if self.task(name).family else FEWEST
+
     def runs(self, task, label):
         """Return the runs of a method on a task, if all of them have a solution."""
         runs, title = self.study.cells.get((task, label)), self.title(task)
@@ -83,8 +90,8 @@ class Reader:
                     f"the paper's runs have {TRIALS} trials; those of {label} on {title} have "
                     f"{', '.join(map(str, trials))}"
                 )
-            if len(runs) < FEWEST:
-                raise MissingError(f"fewer than {FEWEST} runs of {label} on {title}")
+            if len(runs) < (least := self.least_runs(task)):
+                raise MissingError(f"fewer than {least} runs of {label} on {title}")
         self.run_ids.extend(runs.run_id)
         return runs
 
@@ -150,9 +157,9 @@ class Reader:
         pairs = []
         one_handed = len(self.task(task).hands) == 1
         for hands, (values, control) in with_control(self.study, name, task, label).items():
-            if len(control) < FEWEST:
+            if len(control) < (least := self.least_runs(task)):
                 raise MissingError(
-                    f"fewer than {FEWEST} runs of {RANDOM_SEARCH} on {task} with hands {hands} and "
+                    f"fewer than {least} runs of {RANDOM_SEARCH} on {task} with hands {hands} and "
                     f"{TRIALS} trials"
                 )
             words = "" if one_handed else f"with hands {hands}, "

@@ -9,7 +9,7 @@ from reader import LEARNER
 from scipy.special import stdtrit
 
 from coartic.analysis import figures
-from coartic.estimates import RESAMPLES, SEED, TAILS, Estimate, standard_deviation
+from coartic.estimates import FEWEST, RESAMPLES, SEED, TAILS, Estimate, standard_deviation
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
@@ -79,9 +79,9 @@ def compare_rewards(study):
 
 def difference_to_published(ours, published, sd, runs):
     """Return our mean less the published mean, with Welch's interval from the published SD and
-    number of runs; Student's without a published SD (None), none for a single run."""
+    number of runs; Student's without a published SD (None), none for fewer than five runs."""
     n, value = len(ours), float(np.mean(ours)) - published
-    if n < 2:
+    if n < FEWEST:
         return Estimate(value, n=(n,))
     parts = [(standard_deviation(ours) ** 2 / n, n - 1)]
     if sd is not None and runs > 1:

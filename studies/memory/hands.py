@@ -1,0 +1,107 @@
+"""Test the learner's rule for hands: a table by state against a centre for each hand sequence.
+
+    python studies/memory/hands.py results/memory-hands
+
+runs suite hands.toml, then random search with the hands in which each run of the learner ends, and
+writes hands.csv.xz, a row for each run, and hands.csv, a row for each family. What is done is not
+done again. It takes about half an hour of one core.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from coartic.analysis import load
+from coartic.analysis.statistics import bootstrap_test, holm, task_mean
+from coartic.baselines.random_search import RandomSearch
+from coartic.benchmarks.runner import run_suite
+from coartic.estimates import LEVEL
+from coartic.method import Session
+from coartic.tasks.catalogue import load_task
+
+HERE = Path(__file__).parent
+TRIALS, RESAMPLES = 10_000, 99_999
+CELLS = {
+    "dual-process/EC4": "table",
+    "hill-climbing begin=best": "centres",
+    "hill-climbing": "as shipped",
+}
+"""Cells of the suite by label; a fourth, ``given``, has the hands of cell ``table``."""
+
+
+def run_given(task, hands, seed):
+    """Return the reward of random search with given hands and as many stages as trials."""
+    method = RandomSearch(RandomSearch.Parameters(trials=TRIALS, stages=TRIALS, hands=hands))
+    session = Session(load_task(task), seed, RandomSearch.information)
+    method.solve(session)
+    return max(reward for reward in session.rewards if reward is not None)
+
+
+def given(learner, folder):
+    """Return the runs with the learner's hands, of each task from its file, or made now."""
+    folder.mkdir(parents=True, exist_ok=True)
+    tables = []
+    for task, of_task in learner.groupby("task", sort=False):
+        file = folder / f"{task.replace('/', '.')}.csv"
+        if not file.exists():
+            rewards = [*map(run_given, of_task.task, of_task.hands, of_task.seed)]
+            of_task.assign(cell="given", reward=rewards).to_csv(file, index=False)
+        tables.append(pd.read_csv(file))
+    return pd.concat(tables)
+
+
+def measure_runs(folder):
+    """Return the runs of all four cells, a row each."""
+    runs = load(folder).runs
+    runs = runs.assign(cell=runs.label.map(CELLS), family=runs.task.str.partition("/")[0])
+    columns = ["family", "task", "cell", "run", "seed", "hands", "reward", "corrective_best"]
+    runs = runs[columns].astype({"reward": float, "seed": "int64"})
+    of_given = given(runs[runs.cell == "table"], folder / "given")
+    return pd.concat([runs, of_given])
+
+
+def two_tests(values):
+    """Return p of the two-sided test of values of tasks, and p without the task that favours their
+    mean most."""
+    test = bootstrap_test(values, 0.0, "two-sided", resamples=RESAMPLES)
+    most = (values if test.value > 0 else -values).argmax()
+    fewer = bootstrap_test(np.delete(values, most), 0.0, "two-sided", resamples=RESAMPLES)
+    return test.p, fewer.p
+
+
+def tabulate(runs):
+    """Return a row for each family: mean gains (ticks) of each cell, and by how much the table
+    gains more than centres, and than given hands, with tests of the former."""
+    runs = runs.assign(gain=runs.reward - runs.corrective_best)
+    gains = runs.pivot_table("gain", ["family", "task"], "cell")
+    rows, tests = {}, []
+    for family, of_family in gains.groupby("family", sort=False):
+        more = of_family.table - of_family.centres
+        tests.append(two_tests(more.to_numpy()))
+        row = {"tasks": len(of_family), **of_family.mean().to_dict(), "median_more": more.median()}
+        for name, values in {
+            "more": more,
+            "over_shipped": of_family.table - of_family["as shipped"],
+            "over_given": of_family.table - of_family.given,
+        }.items():
+            row |= task_mean([values]).columns(name)
+        rows[family] = row
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("family")
+    table["p"], table["p_without"] = map(holm, zip(*tests, strict=True))
+    sure = table[["p", "p_without"]].max(axis=1) < LEVEL
+    table["verdict"] = np.where(sure, np.where(table.more > 0, "pays", "costs"), "open")
+    return table
+
+
+def main(folder="results/memory-hands"):
+    """Make the runs and write both tables."""
+    print(run_suite(HERE / "hands.toml", folder), flush=True)
+    runs = measure_runs(Path(folder))
+    runs.to_csv(HERE / "hands.csv.xz", index=False, float_format="%.6g")
+    tabulate(runs).to_csv(HERE / "hands.csv", float_format="%.6g")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
