@@ -158,7 +158,7 @@ def spreads(contexts):
     right angles to n_A − n_B, in which no lean counts; the mean over people is taken out.
     """
     variances, across = {}, {}
-    for target, of_target in contexts.items():
+    for of_target in contexts.values():
         ways = {
             person: both[0][:, 2].mean(axis=0) - both[1][:, 2].mean(axis=0)
             for person, both in of_target.items()
