@@ -21,7 +21,6 @@ METHODS = {
     "posture-based/two-goals": "posture planning, all goals in view",
     "posture-qp/current-goal": "posture QP, one goal in view",
     "posture-qp/goals-ahead": "posture QP, all goals in view",
-    "trajectory-optimisation/path-length": "shortest path, all goals in view",
 }
 """Methods by id. On tasks with two goals, two goals in view are all."""
 RUNS = 5
