@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -334,7 +334,7 @@ def draw_shared_goal(study: Study) -> Parts | None:
     )  # fmt: skip
     control = place[place.method == RANDOM_SEARCH]
     lines = {name: float(value) for name in DOTS for value in control[name][:1]}
-    drawing = picture_of_dots(data, DOTS, lines)
+    drawing = style.dots(data, DOTS, lines)
     words = spoken(study, place, "{title} {distance:.2f} and {lean:.2f}").replace("nan", "none")
     alt = f"Posture difference and lean by method at goal {shared.goal}: {words}."
     more = f" Goal {shared.goal} of {marked(first)} and {marked(second)}."
@@ -343,47 +343,6 @@ def draw_shared_goal(study: Study) -> Parts | None:
         more += " No dot: the runs are too few, or the next postures nearly the same."
     names = ["method", "runs", *(f"{name}{end}" for name in DOTS for end in ("", "_low", "_high"))]
     return drawing, place[names].reset_index(drop=True), alt, more
-
-
-@style.styled
-def picture_of_dots(
-    rows: pd.DataFrame, panels: Mapping[str, str], lines: Mapping[str, float]
-) -> Figure:
-    """Return a dot plot: a row for each name, a panel for each quantity, with intervals.
-
-    Parameters
-    ----------
-    rows : DataFrame
-        A row for each dot, from the top on: ``name``, ``color`` and ``marker`` (of Matplotlib),
-        ``bold`` (True for a bold name), and for each quantity its column, with ``_low`` and
-        ``_high`` if it has intervals; NaN for a dot or an interval that is missing.
-    panels : dict
-        Labels of the axes by column.
-    lines : dict
-        Values at which panels have a dashed line, by column; NaN and other names are left out.
-    """
-    height = 0.55 + (0.135 if style.is_narrow() else 0.165) * len(rows)
-    size = style.TWO, height + 0.1 * sum(name.count("\n") for name in rows.name)
-    shape, least = (1, len(panels)), style.LEAST_SMALL_PANEL
-    drawing, every = style.panels(shape, size, None, least, sharey=True)
-    for axes, (name, label) in zip(every, panels.items(), strict=True):
-        axes.axvline(0, color=style.GREY, linewidth=0.5)
-        axes.grid(axis="y", color=style.GREY, alpha=0.3, linewidth=0.5)
-        if not math.isnan(lines.get(name, math.nan)):
-            axes.axvline(lines[name], color=style.INK, linewidth=0.8, linestyle=(0, (4, 2)))
-        for place, row in enumerate(rows.to_dict("records")):
-            look: Any = {"color": row["color"], "clip_on": False}
-            ends = row.get(f"{name}_low", math.nan), row.get(f"{name}_high", math.nan)
-            axes.hlines(-place, *ends, linewidth=2, alpha=0.6, color=row["color"])
-            (dot,) = axes.plot(row[name], -place, row["marker"], **look, markersize=4.2)
-            style.tip(dot, f"{row['name']}: {number(row[name], 2)}".replace("\n", " "))
-        axes.set_xlabel(label.partition("\n")[0] if style.is_narrow() else label)
-        axes.tick_params(axis="y", length=0)
-    style.name_rows(every[0], [*rows.name])
-    for text, is_bold in zip(every[0].get_yticklabels(), rows.bold, strict=True):
-        text.set_fontweight("bold" if is_bold else "normal")
-    style.letters(every)
-    return drawing
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 from coartic.analysis import lean
 
@@ -89,7 +90,7 @@ def contexts_of(table):
 
 def leans(contexts, own=False, average=np.mean):
     """Return a row for each person and target: the lean at the end less at the start (``more``),
-    both, and how far apart the next postures are in rad.
+        both, how far apart the next postures are, and the posture difference at the end, in rad.
 
     n_A − n_B are the means of the other people, or, if ``own``, of the person's odd and even
     repeats. ``average`` gives the postures of a person that are compared.
@@ -112,16 +113,28 @@ def leans(contexts, own=False, average=np.mean):
                 found = lean(*pairs, rng, toward=others)
             else:
                 continue
-            row = {"person": person, "target": target, "n": found.more.n, "more": found.more.value}
+            row = {"person": person, "target": target, "repeats": min(found.more.n)}
+            row |= {"more": found.more.value}
+            row |= {"low": found.more.low, "high": found.more.high}
             row |= {"at_end": found.at_goal, "at_start": found.at_start, "apart": found.apart}
-            rows.append(row | {"low": found.more.low, "high": found.more.high})
+            ends = [average(each[:, 1], axis=0) for each in both]
+            rows.append(row | {"difference": np.linalg.norm(ends[0] - ends[1])})
     return pd.DataFrame(rows)
 
 
 def people(rows):
-    """Return the mean over the targets of each person, and the number of targets."""
+    """Return the mean over the targets of each person, and the number of targets.
+
+    Raises ValueError if no lean applies.
+    """
     applies = rows.dropna(subset="more")
-    found = applies.groupby("person")[["more", "at_end", "at_start"]].mean()
+    if applies.empty:
+        raise ValueError(
+            f"no lean applies: the next postures are {rows.apart.median():.2g} rad apart, and need "
+            "0.1 rad and three standard errors. Are the angles in degrees?"
+        )
+    numbers = ["more", "at_end", "at_start", "difference", "apart"]
+    found = applies.groupby("person")[numbers].mean()
     return found.assign(targets=applies.groupby("person").size())
 
 
@@ -189,6 +202,34 @@ def tabulate_power(contexts):
         for name, sd in spreads(contexts).items()
     ]
     return pd.DataFrame(rows).set_index("spread")
+
+
+def repeats_needed(n, lean_of_people, between, sd, repeats):
+    """Return how many repeats of each context give 90 % power for a lean, if contexts alternate.
+
+    The variance of a person's value is ``between``² plus what ``sd``, the standard deviation from
+    ``repeats`` repeats, contributes. NaN if no number of repeats is enough. One-sided t test, 5 %.
+    """
+    for count in range(2, 201):
+        spread = (between**2 + sd**2 * repeats / count) ** 0.5
+        edge, shift = stats.t.ppf(0.95, n - 1), lean_of_people / spread * n**0.5
+        if stats.nct.sf(edge, n - 1, shift) >= POWER:
+            return count
+    return np.nan
+
+
+def tabulate_plan(spread):
+    """Return the repeats that a lab needs, by the number of people and the lean to be found.
+
+    ``alike``: all people lean as much; ``apart``: they differ with a standard deviation of half
+    the lean. ``spread`` is the spread from ten repeats.
+    """
+    rows = [
+        {"people": n, "lean": share, "alike": repeats_needed(n, share, 0.0, spread, 10),
+         "apart": repeats_needed(n, share, share / 2, spread, 10)}
+        for n in (7, 12, 20) for share in (0.02, 0.05)
+    ]  # fmt: skip
+    return pd.DataFrame(rows).set_index("people")
 
 
 if __name__ == "__main__":
