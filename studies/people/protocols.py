@@ -38,7 +38,9 @@ def pair(instance):
     first, second = task.goals[:2]
     at_start = task.robot.forward_kinematics(task.q0, "right").tolist()
     return [
-        task.model_copy(update={"name": name, "goals": (first, tuple(following))})
+        task.model_copy(
+            update={"name": name, "goals": (first, tuple(following)), "initial_hands": "RR"}
+        )
         for name, following in zip(names(instance), (second, at_start), strict=True)
     ]
 

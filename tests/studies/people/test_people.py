@@ -27,8 +27,8 @@ def direction(rng):
 
 def planted(rng, lean=0.0, drift=0.0, shift=0.0, apart=0.6, people=7, repeats=3, carried=0.7):
     """Contexts of a study: a way of length ``apart`` for each target; ``drift``: SD of an offset of
-    each block at the start, which is carried on; ``shift``: length of an offset of the end posture alone, in a
-    random direction, which is carried on to the next posture."""
+    each block at the start, which is carried on; ``shift``: length of an offset of the end posture
+    alone, in a random direction, which is carried on to the next posture."""
     contexts = {}
     for target in TARGETS:
         way, base = apart * direction(rng), rng.normal(size=(3, 4))
