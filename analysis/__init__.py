@@ -23,6 +23,7 @@ _MODULES = {
     "gaps": "coartic.analysis.frames",
     "hits_from_markers": "coartic.analysis.recordings",
     "interval": "coartic.analysis.words",
+    "lean": "coartic.analysis.signatures",
     "load": "coartic.analysis.study",
     "mean": "coartic.estimates",
     "mean_excess": "coartic.analysis.control",

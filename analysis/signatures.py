@@ -22,7 +22,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, takewhile
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -31,7 +31,17 @@ from numpy.typing import ArrayLike, NDArray
 from coartic import Execution, Hand, Task, corrective_trial, initial_hands
 from coartic.analysis.statistics import drawn_rows, places
 from coartic.errors import NotApplicableError
-from coartic.estimates import FEWEST, RESAMPLES, SEED, Resamples, centred, slices
+from coartic.estimates import (
+    FEWER_RESAMPLES,
+    FEWEST,
+    RESAMPLES,
+    SEED,
+    TAILS,
+    Estimate,
+    Resamples,
+    centred,
+    slices,
+)
 from coartic.internal.arguments import Numbers
 from coartic.motion.trial import reach_goals
 from coartic.robot import HANDS, Array
@@ -53,6 +63,8 @@ class Solutions:
     unfinished: int = 0
     """Number of recorded trials, not among ``runs``, in which a goal was never reached, as counted
     by :func:`.hits_from_markers`; 0 for others."""
+    deterministic: bool = False
+    """True if all runs of the method on this task are equal by construction."""
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
@@ -476,6 +488,173 @@ def _distances(first: Array, second: Array) -> Array:
     return np.asarray(np.linalg.norm(first - second, axis=1))
 
 
+NEXT_APART = 0.1
+"""Least distance of the mean next postures of two contexts for a lean, length unit and rad."""
+STANDARD_ERRORS = 3
+"""Least distance of these means in their standard errors."""
+FEWEST_RUNS = 5
+"""Least number of runs in each context for the interval of a lean or of a posture difference."""
+
+
+class Lean(NamedTuple):
+    """Lean of postures at a shared goal towards the next posture: shares of the way to it."""
+
+    more: Estimate
+    """Lean at the goal less lean at the start, with its interval over runs; ``n``: runs of each
+    context. This is what is interpreted."""
+    at_goal: float
+    """Lean of the postures at the shared goal."""
+    at_start: float
+    """Lean of the postures from which the movements to the shared goal start: the control."""
+    apart: float
+    """Distance of the mean next postures of the two contexts, length unit and rad mixed."""
+
+
+def lean(
+    first: Numbers,
+    second: Numbers,
+    rng: np.random.Generator,
+    *,
+    toward: Numbers | None = None,
+    deterministic: bool = False,
+    resamples: Resamples = FEWER_RESAMPLES,
+) -> Lean:
+    """Return the share of the way to the next posture that is already made at a shared goal.
+
+    The lean of contexts A and B is
+
+    (p_A − p_B)·(n_A − n_B) / ‖n_A − n_B‖²,
+
+    where p are mean postures at the shared goal, and n mean postures in which the next goal is
+    hit. It is 0 if the posture at the shared goal does not depend on the next goal, 1 if it is
+    already the posture for the next goal, and negative if it is away from there. The unit of the
+    postures cancels out. The same projection of the start postures is its control: what was there
+    before the movement is not a lean.
+
+    p and n of one run share the noise of that run, which would look like a lean. So p is the mean
+    of the odd runs and n the mean of the even runs, or the other way round; the lean is the mean
+    of both. Noise in n_A − n_B makes a lean smaller: by a ninth where a lean of four coordinates
+    just applies, by less elsewhere.
+
+    All numbers but ``apart`` are NaN if the lean is not applicable:
+
+    - ‖n_A − n_B‖ is below :data:`NEXT_APART`;
+    - ‖n_A − n_B‖ is below three of its standard errors (the root of the summed variances of the
+      means in all coordinates);
+    - a context has a single run, unless ``deterministic``.
+
+    Parameters
+    ----------
+    first, second : array_like, shape (runs, 3, k)
+        Postures of each run of context A and of context B: at the start of the movement to the
+        shared goal, at the shared goal, and at the next goal. The k coordinates are those that
+        move the hand which hits the shared goal, in length units and rad.
+    rng : numpy.random.Generator
+        Generator of the resamples.
+    toward : array_like, shape (m, k), optional
+        Values of n_A − n_B from other sources, such as other people: their mean replaces n_A −
+        n_B, and p is the mean of all runs.
+    deterministic : bool
+        True if all runs of a context are equal by construction, so that one is enough.
+    resamples : int
+        Number of bootstrap samples of the interval.
+
+    Returns
+    -------
+    Lean
+        The interval is of percentiles. Runs are resampled within the odd and within the even runs
+        of each context, with deviations from their mean times √(m / (m − 1)) for m runs; with
+        ``toward`` within each context. There is none for fewer than five runs in a context, or if
+        ``deterministic``.
+
+    Raises
+    ------
+    ValueError
+        If an array has another shape, or is empty or not finite.
+
+    Examples
+    --------
+    Each run makes a third of the way from its own start to the next posture:
+
+    >>> rng = np.random.default_rng(0)
+    >>> up, down = ([[[0.0], [end / 3], [end]]] * 5 for end in (1.0, -0.5))
+    >>> round(lean(up, down, rng).more.value, 6)
+    0.333333
+    """
+    contexts = [_postures(runs) for runs in (first, second)]
+    if contexts[0].shape[1:] != contexts[1].shape[1:]:
+        raise ValueError("the contexts have postures of different numbers of coordinates")
+    n = (len(contexts[0]), len(contexts[1]))
+    if toward is not None:
+        parts = [[runs] for runs in contexts]
+        ways = np.asarray(toward, np.float64)
+        if ways.ndim != 2 or ways.shape[1:] != contexts[0].shape[2:] or not ways.size:
+            raise ValueError(
+                f"toward has shape {ways.shape}; it needs a row for each source and "
+                f"{contexts[0].shape[2]} coordinates"
+            )
+        way, variance = ways.mean(axis=0), _variance_of_mean(ways)
+    else:
+        # One run alone is in both halves, which only a deterministic method may have.
+        halves = (slice(0, None, 2), slice(1, None, 2))
+        parts = [[runs[half] for half in halves] if len(runs) > 1 else [runs] * 2
+                 for runs in contexts]  # fmt: skip
+        way = contexts[0][:, 2].mean(axis=0) - contexts[1][:, 2].mean(axis=0)
+        variance = sum(_variance_of_mean(runs[:, 2]) for runs in contexts)
+    apart = float(np.linalg.norm(way))
+    few = min(n) < 2 and not deterministic
+    if few or apart < max(NEXT_APART, STANDARD_ERRORS * math.sqrt(variance)):
+        return Lean(Estimate(math.nan, n=n), math.nan, math.nan, apart)
+
+    def shares(means: Sequence[Sequence[Array]]) -> Array:
+        """Return the leans of start and goal, shape (..., 2), of means, shape (..., 3, k), of the
+        parts of both contexts."""
+        differences = [one - other for one, other in zip(*means, strict=True)]
+        ways = [way] if toward is not None else [each[..., 2, :] for each in differences[::-1]]
+        values = [
+            np.einsum("...pk,...k->...p", each[..., :2, :], to) / (to**2).sum(axis=-1)[..., None]
+            for each, to in zip(differences, ways, strict=True)
+        ]
+        return np.asarray(np.mean(values, axis=0))
+
+    start, goal = shares([[part.mean(axis=0) for part in of] for of in parts]).tolist()
+    more = Estimate(goal - start, n=n)
+    if min(n) >= FEWEST_RUNS and not deterministic:
+        drawn = shares([[_means_drawn(part, rng, resamples) for part in of] for of in parts])
+        low, high = np.quantile(drawn[:, 1] - drawn[:, 0], TAILS).tolist()
+        more = Estimate(more.value, low, high, n=n)
+    return Lean(more, goal, start, apart)
+
+
+def _postures(runs: Numbers) -> Array:
+    """Return the postures of runs as an array of shape ``(runs, 3, k)``. Raises ValueError."""
+    postures = np.asarray(runs, np.float64)
+    if postures.ndim != 3 or postures.shape[1] != 3 or not postures.size:
+        raise ValueError(
+            f"the postures of a context have shape {postures.shape}; they need a row for each run "
+            "with three postures: at the start, at the shared goal, and at the next goal"
+        )
+    if not np.isfinite(postures).all():
+        raise ValueError("the postures of a context have values that are not finite numbers")
+    return postures
+
+
+def _variance_of_mean(values: Array) -> float:
+    """Return the summed variances of the means of ``(n, k)`` values; 0 for a single row."""
+    if len(values) < 2:
+        return 0.0
+    return float(centred(values).var(axis=0, ddof=1).sum()) / len(values)
+
+
+def _means_drawn(runs: Array, rng: np.random.Generator, resamples: int) -> Array:
+    """Return means of runs ``(m, ...)`` drawn with replacement, shape ``(resamples, ...)``, with
+    deviations times √(m / (m − 1)): so their variance is that of a mean without bias."""
+    mean, m = runs.mean(axis=0), len(runs)
+    shares = rng.multinomial(m, np.full(m, 1 / m), size=resamples) / m
+    deviations = np.tensordot(shares, runs - mean, axes=1)
+    return np.asarray(mean + math.sqrt(m / max(m - 1, 1)) * deviations)
+
+
 SAME = 0.01
 """Posture difference, length unit and rad mixed, below which postures are the same: the robot's
 step."""
@@ -590,6 +769,37 @@ class TwoContexts:
     def posture_difference(self) -> float:
         """Distance between the mean postures of the two contexts, length unit and rad mixed."""
         return distance_of_means(*self.configurations)
+
+    @cached_property
+    def difference(self) -> Estimate:
+        """The posture difference with its interval: percentiles of bootstrap samples of runs within
+        each context. No interval for fewer than five runs in a context. Noise adds to distances,
+        so that an interval of a small difference lies rather too high."""
+        value, n = self.posture_difference, tuple(map(len, self.configurations))
+        if min(n) < FEWEST_RUNS or self.first.deterministic:
+            return Estimate(value, n=n)
+        rng = self._rng("difference")
+        drawn = [_means_drawn(runs, rng, FEWER_RESAMPLES) for runs in self.configurations]
+        low, high = np.quantile(_distances(*drawn), TAILS).tolist()
+        return Estimate(value, low, high, n=n)
+
+    @cached_property
+    def lean(self) -> Lean:
+        """Share of the way to the next posture that is already made at the goal
+        (:func:`.lean`), over the coordinates that move the hand. Runs count that hit the next goal
+        with the commonest hand for it in their context."""
+        joints = movable(self.first.task, self.hand)
+        goal, hand = self.goal - 1, HANDS.index(self.hand)
+        contexts = []
+        for runs in (self.first, self.second):
+            here, following = runs.hands[:, goal] == hand, runs.hands[:, goal + 1]
+            here &= following == np.bincount(following[here]).argmax()
+            hits = runs.configurations
+            postures = np.stack([runs.starts[:, goal], hits[:, goal], hits[:, goal + 1]], axis=1)
+            contexts.append(postures[here][..., joints])
+        deterministic = self.first.deterministic and self.second.deterministic
+        first, second = contexts
+        return lean(first, second, self._rng("lean"), deterministic=deterministic)
 
     @property
     def standardised_posture_difference(self) -> float:

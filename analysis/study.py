@@ -365,7 +365,13 @@ class Study:
                 if not (isinstance(run, Execution) and run.completed and run.ticks == ticks):
                     raise ValueError(f"run {run_id} does not do what is stored of it")
                 executed.append(run)
-        solved_runs = Solutions(self.tasks[task], method, tuple(executed), tuple(solutions))
+        solved_runs = Solutions(
+            self.tasks[task],
+            method,
+            tuple(executed),
+            tuple(solutions),
+            deterministic=not self.methods.stochastic[method],
+        )
         self._executed[task, method, replay] = solved_runs
         return solved_runs
 

@@ -598,7 +598,11 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
     place                   | shared goal                                           | | tex
     verdict                 | verdict
     runs                    | runs                                                  | | tex
-    distance                | posture difference                                    | 2 | tex
+    distance[]              | posture difference                                    | 2 | tex
+    lean[]                  | lean (share of the way to the next posture)           | 2 | tex
+    lean_start              | lean at the start
+    lean_runs               | runs of the lean
+    next_apart              | distance of the next postures                         | 2
     standardised_difference | standardised posture difference (SD of the runs)      | 1
     p_holm                  | p (corrected)                                         | p | tex
     control                 | random search                                         | 2 | tex
@@ -611,8 +615,8 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
 )
 def list_contexts(study: Study) -> Rows:
     """Yield a row for each method, pair of tasks, goal that both share, and hand: the posture
-    difference between the tasks, its verdict, and the posture difference of random search; p is
-    corrected over a method's rows (Holm)."""
+    difference between the tasks, its verdict, the lean (:func:`.lean`), and the posture difference
+    of random search; p is corrected over a method's rows (Holm)."""
     for label in study.methods.index:
         every = list(shared_goals(study, label))
         spreads = [shared.standardised_posture_difference for shared in every]
@@ -624,7 +628,11 @@ def list_contexts(study: Study) -> Rows:
                 "method": label,
                 "place": f"goal {shared.goal} of {first.label} and {second.label}",
                 "runs": shared.n,
-                "distance": shared.posture_difference,
+                **shared.difference.columns("distance"),
+                **shared.lean.more.columns("lean"),
+                "lean_start": shared.lean.at_start,
+                "lean_runs": sum(shared.lean.more.n),
+                "next_apart": shared.lean.apart,
                 "standardised_difference": shared.standardised_posture_difference,
                 "p_holm": adjusted,
                 "equivalent": shared.parts[0],

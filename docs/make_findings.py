@@ -28,7 +28,7 @@ STORED = DOCS / "stored"
 KEPT = {
     "comparison": (
         "contexts learning methods runtimes ranking signatures",
-        "postures ranking runtimes",
+        "postures ranking runtimes shared-goal",
     ),
     "families": ("family-gaps", ""),
 }

@@ -144,6 +144,137 @@ def test_pairs_of_contexts():
     assert context_pairs({"a": others["a"], "b": wider}) == []
 
 
+def postures(start, goal, following, noise=0.0, carried=0.7, runs=4, seed=1):
+    """Runs of a context with these mean postures: noise of SD ``noise`` is made at each posture,
+    and a share ``carried`` of it is still there at the next one."""
+    fresh = rng(seed).normal(size=(runs, 3, len(goal)))
+    for k in (1, 2):
+        fresh[:, k] = carried * fresh[:, k - 1] + math.sqrt(1 - carried**2) * fresh[:, k]
+    return np.array([start, goal, following]) + noise * fresh
+
+
+def test_lean_by_hand():
+    """Next postures (1, 0) and (−1, 0): the way is (2, 0), of which 0.5 is made at the goal, and
+    0.1 was there at the start; what is at right angles does not count."""
+    up = postures([0.1, 5.0], [0.5, -3.0], [1.0, 0.0], runs=5)
+    down = postures([-0.1, 0.0], [-0.5, 0.0], [-1.0, 0.0], runs=5)
+    found = signatures.lean(up, down, rng())
+    assert (found.at_goal, found.at_start) == pytest.approx((0.5, 0.1))
+    assert (found.more.value, found.more.low, found.more.high) == pytest.approx((0.4, 0.4, 0.4))
+    assert found.apart == pytest.approx(2.0)
+    assert found.more.n == (5, 5)
+    # On a way twice as long, which other sources name, the same distance is half the share.
+    other = signatures.lean(up, down, rng(), toward=[[3.0, 0.0], [5.0, 0.0]])
+    assert (other.more.value, other.apart) == pytest.approx((0.2, 4.0))
+    degrees = signatures.lean(np.degrees(up), np.degrees(down), rng())
+    assert degrees.more.value == pytest.approx(found.more.value)
+
+
+def test_lean_takes_both_postures_from_different_runs():
+    """Two runs each: p of the first with n of the second, and the other way round."""
+    zero = [0.0]
+    up = np.array([[zero, [0.2], [2.0]], [zero, [0.6], [4.0]]])
+    down = np.zeros((2, 3, 1))
+    down[:, 2] = [[-0.001], [0.001]]
+    found = signatures.lean(up, down, rng(), resamples=9)
+    assert math.isnan(found.more.value)  # the next postures spread too much
+    wide = np.tile(up + np.array([[0.0], [0.0], [100.0]]), (2, 1, 1))
+    value = (0.2 / 104 + 0.6 / 102) / 2
+    assert signatures.lean(wide, np.zeros((4, 3, 1)), rng()).more.value == pytest.approx(value)
+
+
+@pytest.mark.parametrize(("runs", "applies"), [(1, False), (2, True), (4, True), (5, True)])
+def test_lean_needs_two_runs_and_its_interval_five(runs, applies):
+    two = [postures([0.0, 0.0], [side / 4, 0.0], [side, 0.0], runs=runs) for side in (1, -1)]
+    found = signatures.lean(*two, rng())
+    assert math.isnan(found.more.value) != applies
+    assert math.isnan(found.more.low) == (runs < 5)
+    alone = signatures.lean(*two, rng(), deterministic=True)
+    assert alone.more.value == pytest.approx(0.25)
+    assert math.isnan(alone.more.low)
+
+
+def test_lean_does_not_apply_to_equal_next_postures():
+    """Equal up to noise, or nearer than a tenth of a rad: missing, and not 0."""
+    none, n = [0.0] * 4, 6
+    for seed in range(100):
+        two = [postures(none, none, none, 0.5, runs=n, seed=(seed, k)) for k in (0, 1)]
+        assert math.isnan(signatures.lean(*two, rng(), resamples=9).more.value)
+    near = [postures(none, none, [end, 0, 0, 0], runs=n) for end in (0.0, 0.099)]
+    assert math.isnan(signatures.lean(*near, rng()).more.value)
+    assert signatures.lean(*near, rng()).apart == pytest.approx(0.099)
+
+
+@pytest.mark.parametrize("planted", [0.0, 0.3])
+def test_lean_is_found_through_noise_that_is_carried_on(planted):
+    """300 studies: the mean is what was planted, less up to a tenth as the way is noisy, and 95 %
+    intervals hold it. If both postures come from the same runs, their noise looks like a lean."""
+    way, values, same_runs, held = np.array([0.6] + [0.0] * 7), [], [], []
+    for seed in range(300):
+        up = postures(0 * way, planted * way, way, 0.08, runs=6, seed=(seed, 0))
+        down = postures(0 * way, 0 * way, 0 * way, 0.08, runs=6, seed=(seed, 1))
+        found = signatures.lean(up, down, rng(seed), resamples=199).more
+        values.append(found.value)
+        held.append(found.low <= planted <= found.high)
+        _, goal, following = up.mean(axis=0) - down.mean(axis=0)
+        same_runs.append(goal @ following / (following @ following))
+    error = np.std(values) / math.sqrt(300)
+    assert 0.9 * planted - 3 * error < np.mean(values) < planted + 3 * error
+    assert np.mean(held) > 0.86
+    assert planted or np.mean(same_runs) > 4 * error
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [np.zeros((2, 3)), np.zeros((2, 2, 4)), np.zeros((0, 3, 4)), np.full((2, 3, 4), np.nan)],
+)
+def test_lean_refuses_other_arrays(wrong):
+    with pytest.raises(ValueError, match="postures of a context have"):
+        signatures.lean(wrong, np.zeros((2, 3, 4)), rng())
+    with pytest.raises(ValueError, match="coordinates"):
+        signatures.lean(np.zeros((2, 3, 4)), np.zeros((2, 3, 5)), rng())
+    with pytest.raises(ValueError, match="toward"):
+        signatures.lean(*[np.zeros((2, 3, 4))] * 2, rng(), toward=np.zeros(4))
+
+
+def solutions_with(task, hits, hands):
+    """Solutions whose runs hit the goals at ``hits`` (runs, goals, dof) with these hands."""
+    runs = (SimpleNamespace(configurations=q, hands=h) for q, h in zip(hits, hands, strict=True))
+    return Solutions(task, "", tuple(runs))
+
+
+def test_lean_of_two_contexts():
+    """Coordinates of the hand that hits the goal count, and runs with the commonest next hand."""
+    task = load_task("two-armed-1")
+    still = np.repeat(task.q0[None], len(task.goals), axis=0)
+    hits = np.repeat(still[None], 7, axis=0)
+    ahead = np.array(hits)
+    right, left = (task.robot.joints(hand) for hand in ("right", "left"))
+    ahead[:, 0, right] += 0.25
+    ahead[:, 1, right] += 1.0
+    ahead[:, :2, left] += 9.0  # of the idle arm
+    ahead[5:, :2, right] -= 7.0  # of runs that hit the next goal with the left hand
+    contexts = TwoContexts(
+        solutions_with(task, ahead, ["RRRR"] * 5 + ["RLRR"] * 2),
+        solutions_with(task, hits, ["RLRR"] * 7),
+        1,
+        "right",
+    )
+    assert contexts.lean.more.value == pytest.approx(0.25)
+    assert contexts.lean.more.n == (5, 7)
+    assert contexts.lean.at_start == 0.0
+
+
+def test_interval_of_a_posture_difference():
+    task, noise = load_task("ascending"), rng(2).normal(size=(2, 40, 10))
+    first, second = (posed(task, "", 0.05 * noise[k] + k) for k in (0, 1))
+    found = TwoContexts(first, second, 1, "right").difference
+    assert found.low < math.sqrt(10) < found.high
+    assert found.high - found.low < 0.2
+    few = posed(task, "", noise[0][:4])
+    assert math.isnan(TwoContexts(few, second, 1, "right").difference.low)
+
+
 JACOBIAN = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0]])
 
 

@@ -1,8 +1,8 @@
 """Figures of your own, which look like the figures of the report.
 
-:func:`panels` and :func:`means` draw in a function with the decorator ``styled``; :func:`picture`
-returns the bytes of a file. ``coartic.analysis.FIGURES["ranking"](study)`` draws a figure
-of the report.
+:func:`panels`, :func:`means` and :func:`dots` draw in a function with the decorator ``styled``;
+:func:`picture` returns the bytes of a file. ``coartic.analysis.FIGURES["ranking"](study)`` draws a
+figure of the report.
 """
 
 from coartic.analysis.figures.plot import Plot, picture
@@ -12,6 +12,7 @@ from coartic.analysis.figures.style import (
     ONE,
     PALETTE,
     TWO,
+    dots,
     legend,
     letters,
     means,
@@ -20,6 +21,6 @@ from coartic.analysis.figures.style import (
 )
 
 __all__ = [
-    "COVERAGE", "GREY", "ONE", "PALETTE", "TWO", "Plot", "legend", "letters", "means", "panels",
-    "picture", "styled",
+    "COVERAGE", "GREY", "ONE", "PALETTE", "TWO", "Plot", "dots", "legend", "letters", "means",
+    "panels", "picture", "styled",
 ]  # fmt: skip

@@ -55,7 +55,13 @@ from coartic.analysis.signatures import TwoContexts
 from coartic.analysis.standings import ranked_tasks, reference, runs_on, standings
 from coartic.analysis.statistics import other_tasks
 from coartic.analysis.study import Study, solved
-from coartic.analysis.tables import by_family, list_runtimes, list_saved, on_instances
+from coartic.analysis.tables import (
+    by_family,
+    list_contexts,
+    list_runtimes,
+    list_saved,
+    on_instances,
+)
 from coartic.analysis.words import capital, id_of, interval, listed, marked, number, titled_apart
 from coartic.estimates import FEWEST, Estimate
 from coartic.internal.text import counted
@@ -311,6 +317,52 @@ def draw_postures(study: Study) -> Parts | None:
         chance is not None
     )
     return drawing, pd.concat(parts, ignore_index=True), alt, compared
+
+
+DOTS = {
+    "distance": "posture difference\n(length unit and rad)",
+    "lean": "lean\n(share of the way to the next posture)",
+}
+"""Panels of the dot plot by column of :func:`list_contexts`, with the labels of their axes."""
+
+
+@figure(
+    "Postures at the shared goal, by method",
+    "Distance between the mean postures at the goal that two tasks share, and lean: the share of "
+    "the way to the next posture that is already made there. 0: the posture does not depend on "
+    f"the next goal. Lines: {style.COVERAGE} bootstrap intervals over runs, from five runs on.",
+)
+def draw_shared_goal(study: Study) -> Parts | None:
+    """Draw the posture difference and the lean of each method at the goal of :func:`shared_goal`,
+    a panel each, without settings whose method is there; random search, if it is there, is a
+    vertical line, too. None without a shared goal."""
+    shared = shared_goal(study)
+    if shared is None:
+        return None
+    rows, (first, second) = list_contexts(study), shared.tasks
+    place = rows[rows.place == f"goal {shared.goal} of {first.label} and {second.label}"]
+    place = place[[name.endswith(f" {shared.hand}") for name in place.index]]
+    kept = without_settings(study.methods[study.methods.index.isin(place.method)]).index
+    place = place[place.method.isin(kept)].sort_values("lean", ascending=False, kind="stable")
+    looks = looks_in(study, place.method)
+    data = place.assign(
+        name=[name_in_figure(study, label) for label in place.method],
+        color=[looks[label]["color"] for label in place.method],
+        marker=[looks[label]["marker"] for label in place.method],
+        bold=[not study.methods.built_in[label] or study.methods.is_learner[label]
+              for label in place.method],
+    )  # fmt: skip
+    control = place[place.method == RANDOM_SEARCH]
+    lines = {name: float(value) for name in DOTS for value in control[name][:1]}
+    drawing = style.dots(data, DOTS, lines)
+    words = spoken(study, place, "{title} {distance:.2f} and {lean:.2f}").replace("nan", "none")
+    alt = f"Posture difference and lean by method at goal {shared.goal}: {words}."
+    more = f" Goal {shared.goal} of {marked(first)} and {marked(second)}."
+    more += " Dashed: random search." * bool(lines)
+    if place.lean.isna().any():
+        more += " No dot: the runs are too few, or the next postures nearly the same."
+    names = ["method", "runs", *(f"{name}{end}" for name in DOTS for end in ("", "_low", "_high"))]
+    return drawing, place[names].reset_index(drop=True), alt, more
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
@@ -691,6 +743,7 @@ FIGURES: dict[str, DrawsFigure] = {
     id_of(draw): draw
     for draw in (
         draw_ranking,
+        draw_shared_goal,
         draw_postures,
         draw_saved,
         draw_runtimes,

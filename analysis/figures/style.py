@@ -7,7 +7,8 @@ Methods have colours of their own (:data:`.COLORS`), and marks and dashes that d
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -204,6 +205,44 @@ def means(
             low, high = (scale * rows[end] for end in ends)
             axes.vlines(places, low, high, looks["color"], linewidth=bars)
         axes.plot(places, scale * rows[y], **looks)
+
+
+def dots(rows: pd.DataFrame, quantities: Mapping[str, str], lines: Mapping[str, float]) -> Figure:
+    """Return a dot plot: a row for each name, a panel for each quantity, with intervals.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        A row for each dot, from the top on: ``name``, ``color`` and ``marker`` (of Matplotlib),
+        ``bold`` (True for a bold name), and for each quantity its column, with ``_low`` and
+        ``_high`` if it has intervals; NaN for a dot or an interval that is missing.
+    quantities : dict
+        Labels of the axes by column, a panel for each.
+    lines : dict
+        Values at which panels have a dashed line, by column; NaN and other names are left out.
+    """
+    height = 0.55 + (0.135 if is_narrow() else 0.165) * len(rows)
+    size = TWO, height + 0.1 * sum(name.count("\n") for name in rows.name)
+    shape, least = (1, len(quantities)), LEAST_SMALL_PANEL
+    drawing, every = panels(shape, size, None, least, sharey=True)
+    for axes, (name, label) in zip(every, quantities.items(), strict=True):
+        axes.axvline(0, color=GREY, linewidth=0.5)
+        axes.grid(axis="y", color=GREY, alpha=0.3, linewidth=0.5)
+        if not math.isnan(lines.get(name, math.nan)):
+            axes.axvline(lines[name], color=INK, linewidth=0.8, linestyle=(0, (4, 2)))
+        for place, row in enumerate(rows.to_dict("records")):
+            look: Any = {"color": row["color"], "clip_on": False}
+            ends = row.get(f"{name}_low", math.nan), row.get(f"{name}_high", math.nan)
+            axes.hlines(-place, *ends, linewidth=2, alpha=0.6, color=row["color"])
+            (dot,) = axes.plot(row[name], -place, row["marker"], **look, markersize=4.2)
+            tip(dot, f"{row['name']}: {row[name]:.2f}".replace("\n", " "))
+        axes.set_xlabel(label.partition("\n")[0] if is_narrow() else label)
+        axes.tick_params(axis="y", length=0)
+    name_rows(every[0], [*rows.name])
+    for text, is_bold in zip(every[0].get_yticklabels(), rows.bold, strict=True):
+        text.set_fontweight("bold" if is_bold else "normal")
+    letters(every)
+    return drawing
 
 
 def tip(artist: Artist, text: str) -> None:

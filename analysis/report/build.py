@@ -15,7 +15,7 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
-from coartic.analysis.figures.drawings import draw_postures, draw_ranking
+from coartic.analysis.figures.drawings import draw_ranking, draw_shared_goal
 from coartic.analysis.figures.plot import Plot, for_page, picture
 from coartic.analysis.figures.style import ONE
 from coartic.analysis.report import sections
@@ -162,7 +162,7 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
     parts that could not be made, by the name of the part; ``watch`` is called with each section's
     title.
     """
-    draw = draw_ranking if study.varied[0] else draw_postures
+    draw = draw_ranking if study.varied[0] else draw_shared_goal
     lead = sections.attempt(failures, "Picture", partial(draw, width=ONE), study)
     made = []
     for section in sections.visible_sections(study):

@@ -22,6 +22,7 @@ from coartic.analysis.figures.drawings import (
     draw_ranking,
     draw_runtimes,
     draw_saved,
+    draw_shared_goal,
     draw_tasks,
 )
 from coartic.analysis.figures.plot import DrawsFigure
@@ -155,7 +156,7 @@ smaller on the tasks that it solved: \
         "coarticulation",
         "Coarticulation",
         (list_contexts, list_signatures),
-        (draw_postures, draw_saved),
+        (draw_shared_goal, draw_postures, draw_saved),
         sentence="""\
 {% set of_best = rows[rows.method == first] if varied else rows[:0] %}
 {% for row in (of_best if of_best | length else rows).head(1).to_dict("records") %}

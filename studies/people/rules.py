@@ -1,0 +1,239 @@
+"""The rules of study people: which repeats count, the lean of each person, the test, its power."""
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from coartic.analysis import lean
+
+REST = "R"
+KINDS = ("start", "end", "next")
+KEYS = ["person", "target", "context"]
+LEVEL = 6 / 128
+"""Level of the test: at most 6 of the 128 sign flips of seven people."""
+POWER = 0.9
+
+
+def read(path):
+    """Return a table of postures with angles in rad, a row for each repeat.
+
+    Raises ValueError if a column is missing, or a number is.
+    """
+    table = pd.read_csv(path, dtype={"context": str})
+    angles = [name for name in table if name.partition("_")[0] in KINDS]
+    joints = len(angles) // 3
+    due = [f"{kind}_{joint}" for kind in KINDS for joint in range(1, joints + 1)]
+    missing = [name for name in (*KEYS, "repeat", *(due or ("start_1",))) if name not in table]
+    if missing:
+        raise ValueError(f"{path}: column {missing[0]} is missing")
+    values = table[due].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+    bad = ~np.isfinite(values).all(axis=1) | table[[*KEYS, "repeat"]].isna().any(axis=1).to_numpy()
+    if bad.any():
+        raise ValueError(f"{path}: line {bad.argmax() + 2} lacks a number or a name")
+    table[due] = np.radians(values)
+    return table
+
+
+def postures(table):
+    """Return the postures of a table in rad, shape (repeats, 3, joints): start, end, next."""
+    joints = sum(name.startswith("start_") for name in table)
+    names = [f"{kind}_{joint}" for kind in KINDS for joint in range(1, joints + 1)]
+    return table[names].to_numpy(float).reshape(len(table), 3, joints)
+
+
+def left_out(table):
+    """Return why repeats are left out, by the index of the table; empty for those that count.
+
+    - ``copy``: all angles equal those of an earlier repeat of the same person, target and context.
+    - ``other movement``: the start or the next posture is nearer to the median end posture of the
+      repeats than to its own median, or the end posture is nearer to the median start.
+    """
+    why = pd.Series("", table.index)
+    for _, of_cell in table.groupby(KEYS):
+        values = postures(of_cell)
+        start, end, following = np.median(values, axis=0)
+        pairs = ((0, start, end), (1, end, start), (2, following, end))
+        for kind, own, other in pairs:
+            away = np.linalg.norm(values[:, kind] - own, axis=1)
+            wrong = away > np.linalg.norm(values[:, kind] - other, axis=1)
+            why[of_cell.index[wrong]] = "other movement"
+        names = [name for name in of_cell if name.partition("_")[0] in KINDS]
+        why[of_cell.index[of_cell.duplicated(names)]] = "copy"
+    return why
+
+
+def contexts_of(table):
+    """Return, by target and person, the postures of the repeats in the two contexts, another
+    target and rest, for people with two repeats or more in each.
+
+    Raises ValueError if a target has more than one other target, or nobody has two contexts.
+    """
+    contexts = {}
+    for target, of_target in table.groupby("target"):
+        others = [each for each in of_target.context.unique() if each != REST]
+        if len(others) > 1:
+            raise ValueError(f"target {target} has the contexts {', '.join(others)}, not one")
+        for person, of_person in of_target.groupby("person"):
+            both = [postures(of_person[of_person.context == each]) for each in (*others, REST)]
+            if len(both) == 2 and min(map(len, both)) > 1:
+                contexts.setdefault(target, {})[person] = both
+    if not contexts:
+        raise ValueError(
+            f"nobody has a target in two contexts, another target and rest ({REST}), with two "
+            "repeats each"
+        )
+    return contexts
+
+
+def leans(contexts, own=False, average=np.mean):
+    """Return a row for each person and target: the lean at the end less at the start (``more``),
+        both, how far apart the next postures are, and the posture difference at the end, in rad.
+
+    n_A − n_B are the means of the other people, or, if ``own``, of the person's odd and even
+    repeats. ``average`` gives the postures of a person that are compared.
+    """
+    rows = []
+    for target, people in contexts.items():
+        ways = {
+            person: average(both[0][:, 2], axis=0) - average(both[1][:, 2], axis=0)
+            for person, both in people.items()
+        }
+        for person, both in people.items():
+            rng = np.random.default_rng(0)
+            others = [way for other, way in ways.items() if other != person]
+            if own:
+                found = lean(*both, rng)
+            elif others:
+                pairs = both if average is np.mean else [
+                    np.repeat(average(each, axis=0)[None], 2, axis=0) for each in both
+                ]  # fmt: skip
+                found = lean(*pairs, rng, toward=others)
+            else:
+                continue
+            row = {"person": person, "target": target, "repeats": min(found.more.n)}
+            row |= {"more": found.more.value}
+            row |= {"low": found.more.low, "high": found.more.high}
+            row |= {"at_end": found.at_goal, "at_start": found.at_start, "apart": found.apart}
+            ends = [average(each[:, 1], axis=0) for each in both]
+            rows.append(row | {"difference": np.linalg.norm(ends[0] - ends[1])})
+    return pd.DataFrame(rows)
+
+
+def people(rows):
+    """Return the mean over the targets of each person, and the number of targets.
+
+    Raises ValueError if no lean applies.
+    """
+    applies = rows.dropna(subset="more")
+    if applies.empty:
+        raise ValueError(
+            f"no lean applies: the next postures are {rows.apart.median():.2g} rad apart, and need "
+            "0.1 rad and three standard errors. Are the angles in degrees?"
+        )
+    numbers = ["more", "at_end", "at_start", "difference", "apart"]
+    found = applies.groupby("person")[numbers].mean()
+    return found.assign(targets=applies.groupby("person").size())
+
+
+def sign_flips(values):
+    """Return p of the one-sided test by all sign flips: their share with a mean as large."""
+    values = np.asarray(values, float)
+    signs = np.array([*product((1, -1), repeat=len(values))])
+    return float((signs @ values >= values.sum() - 1e-12).mean())
+
+
+def power(shift, n, studies=20_000):
+    """Return the share of studies in which the test rejects, for n normal values of SD 1."""
+    values = np.random.default_rng(1).normal(shift, size=(studies, n))
+    signs = np.array([*product((1, -1), repeat=n)], float)
+    sums = values @ signs.T
+    p = (sums >= sums[:, :1] - 1e-12).mean(axis=1)
+    return float((p <= LEVEL).mean())
+
+
+def smallest_shift(n):
+    """Return the smallest mean, in SDs of n people, that the test finds with 90 % power."""
+    low, high = 0.0, 20.0
+    while high - low > 0.005:
+        middle = (low + high) / 2
+        low, high = (low, middle) if power(middle, n) >= POWER else (middle, high)
+    return high
+
+
+def spreads(contexts):
+    """Return the SDs between people of a lean that is not there, without looking at the lean.
+
+    ``repeats``: what the variance of the repeats within contexts explains. ``at right angles``:
+    the spread between people of the same difference, end less start, on the three directions at
+    right angles to n_A − n_B, in which no lean counts; the mean over people is taken out.
+    """
+    variances, across = {}, {}
+    for of_target in contexts.values():
+        ways = {
+            person: both[0][:, 2].mean(axis=0) - both[1][:, 2].mean(axis=0)
+            for person, both in of_target.items()
+        }
+        for person, both in of_target.items():
+            way = np.mean([each for other, each in ways.items() if other != person], axis=0)
+            length = np.linalg.norm(way)
+            moved = [(each[:, 1] - each[:, 0]) / length for each in both]
+            variances.setdefault(person, []).append(
+                sum((each @ way / length).var(ddof=1) / len(each) for each in moved)
+            )
+            # The first column is the way; the others follow the joints in their order.
+            basis, triangle = np.linalg.qr(np.column_stack([way, np.eye(len(way))[:, :-1]]))
+            basis *= np.sign(np.diag(triangle))
+            difference = moved[0].mean(axis=0) - moved[1].mean(axis=0)
+            across.setdefault(person, []).append(basis[:, 1:].T @ difference)
+    within = [np.sum(each) / len(each) ** 2 for each in variances.values()]
+    between = np.array([np.mean(each, axis=0) for each in across.values()]).var(axis=0, ddof=1)
+    return {"repeats": float(np.mean(within)) ** 0.5, "at right angles": between.mean() ** 0.5}
+
+
+def tabulate_power(contexts):
+    """Return the smallest lean with 90 % power, by where the spread comes from."""
+    n = len({person for of_target in contexts.values() for person in of_target})
+    shift = smallest_shift(n)
+    rows = [
+        {"spread": name, "people": n, "sd": sd, "smallest": shift * sd}
+        for name, sd in spreads(contexts).items()
+    ]
+    return pd.DataFrame(rows).set_index("spread")
+
+
+def repeats_needed(n, lean_of_people, between, sd, repeats):
+    """Return how many repeats of each context give 90 % power for a lean, if contexts alternate.
+
+    The variance of a person's value is ``between``² plus what ``sd``, the standard deviation from
+    ``repeats`` repeats, contributes. NaN if no number of repeats is enough. One-sided t test, 5 %.
+    """
+    for count in range(2, 201):
+        spread = (between**2 + sd**2 * repeats / count) ** 0.5
+        edge, shift = stats.t.ppf(0.95, n - 1), lean_of_people / spread * n**0.5
+        if stats.nct.sf(edge, n - 1, shift) >= POWER:
+            return count
+    return np.nan
+
+
+def tabulate_plan(spread):
+    """Return the repeats that a lab needs, by the number of people and the lean to be found.
+
+    ``alike``: all people lean as much; ``apart``: they differ with a standard deviation of half
+    the lean. ``spread`` is the spread from ten repeats.
+    """
+    rows = [
+        {"people": n, "lean": share, "alike": repeats_needed(n, share, 0.0, spread, 10),
+         "apart": repeats_needed(n, share, share / 2, spread, 10)}
+        for n in (7, 12, 20) for share in (0.02, 0.05)
+    ]  # fmt: skip
+    return pd.DataFrame(rows).set_index("people")
+
+
+if __name__ == "__main__":
+    folder = Path(__file__).parent
+    stored = read(folder / "postures.csv")
+    counts = contexts_of(stored[left_out(stored) == ""])
+    tabulate_power(counts).to_csv(folder / "power.csv", float_format="%.4g", lineterminator="\n")

@@ -1,0 +1,170 @@
+"""The rules of study people on planted data, its refusals, and its table from made-up files."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat
+
+from tests.support.processes import ROOT, programs
+
+RULES, MAKE_TABLE = programs("people", "rules", "make_table")
+FOLDER = ROOT / "studies" / "people"
+TARGETS = (1, 9, 11)
+
+
+def noise(rng, repeats, carried):
+    """Noise of 0.05 rad at start, end and next posture, of which a share is carried on."""
+    fresh = 0.05 * rng.normal(size=(repeats, 3, 4))
+    for k in (1, 2):
+        fresh[:, k] = carried * fresh[:, k - 1] + np.sqrt(1 - carried**2) * fresh[:, k]
+    return fresh
+
+
+def direction(rng):
+    vector = rng.normal(size=4)
+    return vector / np.linalg.norm(vector)
+
+
+def planted(rng, lean=0.0, drift=0.0, shift=0.0, apart=0.6, people=7, repeats=3, carried=0.7):
+    """Contexts of a study: a way of length ``apart`` for each target; ``drift``: SD of an offset of
+    each block at the start, which is carried on; ``shift``: length of an offset of the end posture
+    alone, in a random direction, which is carried on to the next posture."""
+    contexts = {}
+    for target in TARGETS:
+        way, base = apart * direction(rng), rng.normal(size=(3, 4))
+        contexts[target] = {}
+        for person in range(people):
+            both = []
+            for ahead in (way, 0 * way):
+                mean = base + np.array([0 * way, lean * ahead, ahead])
+                mean = mean + np.outer([1, carried, carried**2], drift * rng.normal(size=4))
+                off = shift * direction(rng) if shift else np.zeros(4)
+                mean[1:] += np.array([off, carried * off])
+                both.append(mean + noise(rng, repeats, carried))
+            contexts[target][person] = both
+    return contexts
+
+
+def share_rejected(studies, **kinds):
+    rng = np.random.default_rng(7)
+    values = [RULES.people(RULES.leans(planted(rng, **kinds))) for _ in range(studies)]
+    return np.mean([RULES.sign_flips(each.more) <= RULES.LEVEL for each in values])
+
+
+@pytest.mark.parametrize(
+    "kind", [{}, {"drift": 0.1}, {"shift": 0.2}], ids=["noise", "drift", "shift"]
+)
+def test_without_a_lean_the_test_keeps_its_level(kind):
+    """Level 6/128; of 100 studies at most 11 % (three standard errors)."""
+    assert share_rejected(100, **kind) < 0.111
+
+
+def test_a_planted_lean_is_found():
+    rng, values, held = np.random.default_rng(3), [], []
+    for _ in range(60):
+        each = RULES.people(RULES.leans(planted(rng, lean=0.3))).more
+        values.append(each.mean())
+        half = 2.447 * each.std() / np.sqrt(7)  # t with 6 degrees of freedom
+        held.append(abs(each.mean() - 0.3) <= half)
+    assert 0.28 < np.mean(values) < 0.31
+    assert np.mean(held) > 0.85
+    assert share_rejected(10, lean=0.3) == 1.0
+
+
+def test_own_next_postures_would_take_a_shift_for_a_lean():
+    """What a person carries on counts with n of the same person, and not with n of others."""
+    rng, own, others = np.random.default_rng(5), [], []
+    for _ in range(30):
+        contexts = planted(rng, shift=0.2)
+        own.append(RULES.people(RULES.leans(contexts, own=True)).more.mean())
+        others.append(RULES.people(RULES.leans(contexts)).more.mean())
+    assert np.mean(own) > 0.05
+    assert abs(np.mean(others)) < 0.02
+
+
+def test_equal_next_postures_have_no_lean():
+    contexts = planted(np.random.default_rng(0), apart=0.0)
+    with pytest.raises(ValueError, match="no lean applies"):
+        RULES.people(RULES.leans(contexts))
+
+
+def test_sign_flips_are_exact():
+    assert RULES.sign_flips([1, 2, 3, 4, 5, 6, 7]) == 1 / 128
+    assert RULES.sign_flips([-1, 2, 3, 4, 5, 6, 7]) == 2 / 128
+    assert RULES.sign_flips([1, -1]) == 3 / 4
+    assert RULES.power(0.0, 7, 4000) == pytest.approx(RULES.LEVEL, abs=0.012)
+    assert RULES.power(RULES.smallest_shift(7), 7) >= 0.9
+
+
+def stored():
+    return pd.read_csv(FOLDER / "postures.csv", dtype={"context": str})
+
+
+def written(table, folder):
+    table.to_csv(folder / "postures.csv", index=False)
+    return RULES.read(folder / "postures.csv")
+
+
+def test_a_table_without_contexts_is_refused(tmp_path):
+    table = stored()
+    with pytest.raises(ValueError, match="column context is missing"):
+        written(table.drop(columns="context"), tmp_path)
+    with pytest.raises(ValueError, match="in two contexts"):
+        RULES.contexts_of(written(table[table.context == "R"], tmp_path))
+    with pytest.raises(ValueError, match="target 1 has the contexts"):
+        RULES.contexts_of(written(table.replace({"target": {9: 1}}), tmp_path))
+    table.loc[3, "end_2"] = np.nan
+    with pytest.raises(ValueError, match="line 5 lacks"):
+        written(table, tmp_path)
+
+
+def test_a_person_with_a_single_repeat_is_left_out(tmp_path):
+    table = stored()
+    single = table[(table.person != 3) | (table.repeat == 1)]
+    assert RULES.people(RULES.leans(RULES.contexts_of(written(single, tmp_path)))).shape[0] == 6
+    with pytest.raises(ValueError, match="two repeats each"):
+        RULES.contexts_of(written(table[table.repeat == 1], tmp_path))
+
+
+def test_angles_in_another_unit_are_refused_or_seen(tmp_path):
+    """In rad they are too near for a lean; in minutes of arc they are 60 times as far apart."""
+    table = stored()
+    angles = [name for name in table if name[-2] == "_"]
+    small = table.assign(**np.radians(table[angles]))
+    with pytest.raises(ValueError, match="degrees"):
+        RULES.people(RULES.leans(RULES.contexts_of(written(small, tmp_path))))
+    minutes = written(table.assign(**60 * table[angles]), tmp_path)
+    large = RULES.people(RULES.leans(RULES.contexts_of(minutes)))
+    usual = RULES.people(RULES.leans(RULES.contexts_of(written(table, tmp_path))))
+    assert large.more.to_numpy() == pytest.approx(usual.more.to_numpy())
+    assert large.apart.min() > 50 > 2 > usual.apart.max()
+
+
+def test_copies_and_other_movements_do_not_count():
+    table = RULES.read(FOLDER / "postures.csv")
+    why = RULES.left_out(table)
+    assert why.value_counts()[["copy", "other movement"]].tolist() == [7, 1]
+    assert table.person[why != ""].isin([3, 4, 7]).all()
+
+
+def test_the_table_comes_from_files(tmp_path):
+    """Two repeats of four tasks, whose samples say where they are from; the second lacks task 1."""
+    tasks = np.empty((2, 4), dtype=object)
+    for repeat in range(2):
+        for task in range(4):
+            motions = np.empty((8, 1), dtype=object)
+            for motion in range(8):
+                first = 1000 * repeat + 100 * (task + 1) + 10 * (motion + 1)
+                motions[motion, 0] = np.array([[first, 0, first + 1]] * 4, dtype=float)
+            tasks[repeat, task] = motions
+    tasks[1, 0] = np.empty((0, 0))
+    for person in range(1, 8):
+        savemat(tmp_path / f"S{person:02d}_trajs.mat", {"tasks": tasks})
+    table = MAKE_TABLE.make_table(tmp_path).reset_index()
+    of_first = table[table.person == 1].set_index(["target", "context", "repeat"])
+    assert len(of_first) == 11
+    assert of_first.loc[(9, "11", 2), ["start_1", "end_4", "next_2"]].tolist() == [1240, 1241, 1251]
+    assert of_first.loc[(1, "R", 1), ["start_1", "end_4", "next_2"]].tolist() == [410, 411, 421]
+    (tmp_path / "S05_trajs.mat").unlink()
+    with pytest.raises(SystemExit, match=r"S05_trajs.mat does not exist\. Get .* from https://"):
+        MAKE_TABLE.make_table(tmp_path)
