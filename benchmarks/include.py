@@ -62,6 +62,8 @@ def include_folders(
                     f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
                 )
             sources[name] = stack.enter_context(open_store(folder))
+        for source in sources.values():
+            source.check_file()  # before the first row is copied
         joined = _join(plan, sources, tasks)
         target = stack.enter_context(writing(out))
         _check_same_results({str(out): target, **sources})

@@ -282,6 +282,12 @@ class Store:
                     rewards=packed,
                 )
 
+    def check_file(self) -> None:
+        """Raise CoarticError if pages of the file, or JSON in table ``results``, are damaged."""
+        broken = "SELECT 1 FROM results WHERE NOT (json_valid(details) AND json_valid(movements))"
+        if self._rows("PRAGMA quick_check(1)") != [("ok",)] or self._rows(f"{broken} LIMIT 1"):
+            raise CoarticError(f"cannot use {plain(str(self.folder / RUNS_FILE))}: {_DAMAGED}")
+
     def include(self, other: Store) -> None:
         """Copy the runs that the plan asks for and this folder lacks from another folder. Runs that
         both have stay as they are here."""
