@@ -1,21 +1,23 @@
 """A cascade of two prioritised quadratic programmes over changes x of the joints.
 
-Level 1, an inequality task, as nearly as damping allows::
+Level 1 meets an inequality task as nearly as damping allows::
 
     min  s² + λ² |x|²     subject to   A x + s >= b,       |x_i| <= L
     s, x
 
-Level 2, the change nearest to the preferred z among the changes that meet level 1 as nearly, to ε::
+Level 2 finds the change that is nearest to the preferred change z, among the changes that meet the
+task as nearly as the solution of level 1, to within ε::
 
     min  |x - z|²         subject to   A x >= b - s⁺ - ε,  |x_i| <= L
      x
 
-with λ = ``DAMPING``, L = ``LIMIT``, ε = ``SLACK`` and s⁺ = max(s, 0).
+Here A and b state the task, s is its slack, s⁺ = max(s, 0), λ is ``DAMPING``, L is ``LIMIT`` and ε
+is ``SLACK``.
 
-Inequality tasks in lexicographic quadratic programmes: O. Kanoun, F. Lamiraux, P.-B. Wieber (2011),
-Kinematic control of redundant manipulators: generalizing the task-priority framework to inequality
-tasks, IEEE Transactions on Robotics. The matrices go to the solver, DAQP, as they are: cvxpy, in
-which the tests state the same programmes, takes far longer.
+Inequality tasks in lexicographic quadratic programmes come from O. Kanoun, F. Lamiraux, P.-B.
+Wieber (2011), Kinematic control of redundant manipulators: generalizing the task-priority framework
+to inequality tasks, IEEE Transactions on Robotics. The solver is DAQP, which gets the matrices
+directly. The tests state the same programmes in cvxpy, which takes far longer.
 """
 
 from __future__ import annotations
@@ -29,14 +31,14 @@ from coartic.method import MethodError
 from coartic.robot import Array
 
 DAMPING = 0.01
-"""λ, length unit per unit of change: some 1e-4 of the task is given up where the singular value is
-1, and changes stay small where it is 0."""
+"""λ, length unit per unit of change. It costs about 1e-4 of the task where the singular value of A
+is 1, and keeps changes small where it is 0."""
 
 LIMIT = 2.0
-"""L, largest absolute change of any joint."""
+"""L, the largest absolute change of a joint."""
 
 SLACK = 1e-6
-"""ε, length unit: without it level 2 could be left with a single point where limits bind."""
+"""ε, length unit. Without it a single point may remain for level 2 where limits bind."""
 
 
 class Solution(NamedTuple):
@@ -44,36 +46,49 @@ class Solution(NamedTuple):
 
     changes: Array
     """Changes of the joints by both levels, shape ``(joints,)``."""
-    first: Array
-    """Changes that level 1 alone would make, shape ``(joints,)``."""
+    level_1: Array
+    """Changes of the joints if there were no level 2, shape ``(joints,)``."""
     iterations: int
     """Iterations of the solver in both levels."""
 
 
 def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
-    """Find changes x of the joints with A x >= b as nearly as damping allows, at most 2 in absolute
-    value (level 1), then the x nearest to z that is as good for level 1, to 1e-6 (level 2); return
-    both, with the iterations.
+    """Solve both levels of the cascade of quadratic programmes.
 
-    ``rows`` is A, shape ``(m, joints)``, length unit per unit of change; ``least`` is b, shape
-    ``(m,)``, length unit; ``preferred`` is z, shape ``(joints,)``. Raises MethodError if the solver
-    fails.
+    Parameters
+    ----------
+    rows : ndarray, shape (m, joints)
+        Matrix A of the task, length unit per unit of change.
+    least : ndarray, shape (m,)
+        Vector b of the task, length unit: the least values of A x.
+    preferred : ndarray, shape (joints,)
+        Preferred change z.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    MethodError
+        The solver fails.
     """
     joints = rows.shape[1]
     weights = np.diag([2.0] + [2.0 * DAMPING**2] * joints)
-    first, count = _solve_level(1, weights, np.zeros(1 + joints), rows, least)
-    short = max(0.0, float(first[0])) + SLACK
+    level_1, iterations_1 = _solve_level(1, weights, np.zeros(1 + joints), rows, least)
+    slack = max(0.0, float(level_1[0])) + SLACK
     weights = np.diag([2.0] * joints)
-    changes, further = _solve_level(2, weights, -2.0 * preferred, rows, least - short)
-    return Solution(changes, first[1:], count + further)
+    changes, iterations_2 = _solve_level(2, weights, -2.0 * preferred, rows, least - slack)
+    return Solution(changes, level_1[1:], iterations_1 + iterations_2)
 
 
 def _solve_level(
     level: int, hessian: Array, gradient: Array, rows: Array, least: Array
 ) -> tuple[Array, int]:
-    """Minimise ½ vᵀ H v + gᵀ v (``hessian`` H, ``gradient`` g), v = (s, x) at level 1 and x at
-    level 2, with A x + s >= b (``rows`` A, ``least`` b; s = 0 at level 2) and |x_i| <= 2; return v
-    and the number of iterations. Raises MethodError, which names ``level``, if the solver fails."""
+    """Minimise ½ vᵀ H v + gᵀ v under the constraints of a level; return v and the iterations.
+
+    H is ``hessian`` and g is ``gradient``; v is (s, x) at level 1 and x at level 2.
+    """
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))
     matrix[:task, :-joints] = -1.0

@@ -1,26 +1,36 @@
 """CMA-ES over target configurations; hand sequences by a bandit, or goal by goal.
 
-Each hand sequence has an evolution strategy (CMA-ES) over the targets of all explored joints, which
-sees the total reward of each trial and nothing else. Its first mean are the configurations of the
-corrective process **A** alone, which takes one trial; its first step size is ``sigma``; where it
-stops by its own criteria it starts again from the first mean with twice the population (IPOP). A
-failed trial ranks last. UCB1 on the best reward of each sequence, scaled by the spread of the first
-rewards, decides in ``cma-es/bandit`` which strategy makes the next generation of trials.
+Each hand sequence has its own evolution strategy (CMA-ES) over the targets of all explored joints:
 
-Tuning, three or four runs a value. c = 0.02, 0.05, 0.1, 0.2, 0.5 on the two-armed tasks: no
-reward differs by more than 2.4; with the other arm kept still, up to 0.05 can settle on RRRR in
-two-armed-2 (-339 in the mean, where 0.1 and more give -331). Step sizes 0.02, 0.05, 0.1
-and 0.2 within one given sequence are within 5 of each other after 2000 trials; after 300
-0.05 leads or is 2 behind. To learn from where the goals were hit, not from the targets
-(Lamarckian), cost 6 to 9 after 2000 trials.
+- It uses only the total reward of each trial. A failed trial ranks last.
+- Its first mean is the postures in which the corrective process **A** alone hits the goals. Finding
+  them takes one trial.
+- Its first step size is ``sigma``.
+- When it stops by its own criteria, it restarts from the first mean with twice the population
+  (IPOP).
 
-``cma-es/bandit`` tries every hand sequence, while trials are left, before it prefers one; of more
-than 4096 it has the initial one alone. In ``cma-es/goal-by-goal`` each pair of hands at two goals
-in a row has a value, the highest reward of any trial that used it. Goal by goal the hand of higher
-value is chosen, with probability ε a random one. A sequence that comes for the first time takes one
-trial by the corrective process; if that succeeds, each time it comes again, a generation of its own
-strategy. On six random tasks with 14 goals and two arms, mean reward with ε = 0.05 and 0.2: -1439
-and -1351; the learner EC4 -1799.
+``cma-es/bandit`` tries each hand sequence once while trials are left. If there are more than 4096,
+it uses only the initial sequence. Then UCB1 on the best reward of each sequence decides which
+strategy makes the next generation of trials. The bonus for exploration is scaled by the range of
+the first rewards.
+
+``cma-es/goal-by-goal`` has a value for each pair of hands at two goals in a row: the best reward of
+the hand sequences with this pair that it has tried. For each goal it chooses the hand with the
+higher value, or, with probability ε, a random hand. A new sequence takes one trial by the
+corrective process. If that trial succeeds, the sequence gets a generation of its own strategy each
+time it is chosen again.
+
+Tuning, with three or four runs for each value:
+
+- c = 0.02, 0.05, 0.1, 0.2 and 0.5 on the two-armed tasks: rewards differ by at most 2.4. If the
+  other arm does not move, c up to 0.05 can settle on RRRR in two-armed-2 (mean reward -339; 0.1 and
+  above give -331).
+- Step sizes 0.02, 0.05, 0.1 and 0.2 with one hand sequence: rewards are within 5 of each other
+  after 2000 trials. After 300 trials 0.05 is best, or within 2 of the best.
+- Updating from the postures at the goals instead of the targets (Lamarckian) costs 6 to 9 ticks
+  after 2000 trials.
+- ε = 0.05 and 0.2 on six random tasks with 14 goals and two arms: mean rewards -1439 and -1351. The
+  learner with EC4 gets -1799.
 """
 
 from __future__ import annotations
@@ -51,31 +61,46 @@ class BanditParameters(UninformedParameters):
     """Parameters of CMA-ES with a bandit over hand sequences."""
 
     exploration: Annotated[float, Field(ge=0, le=100)] = 0.2
-    """c of UCB1, as a multiple of the range of the first rewards, which counts as 1 or more."""
+    """Constant c of UCB1, as a multiple of the range of the first rewards (at least 1 tick)."""
 
 
 class Strategy:
-    """CMA-ES over the targets of one hand sequence, after a trial by the corrective process."""
+    """CMA-ES over the targets of one hand sequence.
+
+    Making a strategy makes a trial by the corrective process. :attr:`reward` is -inf if that trial
+    fails, and the strategy then cannot make generations.
+
+    Parameters
+    ----------
+    session : Session
+    attempts : Attempts
+        Account of the trials of the run.
+    hands : str
+        Hand sequence, such as ``"RRLR"``.
+    sigma : float
+        First step size, length unit (base) and rad (joints).
+    """
 
     def __init__(self, session: Session, attempts: Attempts, hands: str, sigma: float) -> None:
         self.hands = hands
         self.sigma = sigma
-        self.generations = 1  # the trial by A counts as the first
+        self.generations = 1  # the trial by the corrective process counts as a generation
         self.trials = 1
         self._rng = session.rng
         self._attempts = attempts
-        first = attempts.by_correction(hands)
-        self.reward = float(first.rewards[0])
-        """Best reward so far; -inf where **A** did not complete the sequence."""
-        self._mean: Array = first.reached[0, attempts.explored]
+        corrective_trial = attempts.run_corrective(hands)
+        self.reward = float(corrective_trial.rewards[0])
+        """Best reward so far; -inf if the corrective process does not complete the sequence."""
+        self._mean: Array = corrective_trial.reached[0, attempts.explored]
         self.evolution: EvolutionStrategy | None = None
         """The present strategy; None before the first generation."""
 
     def generation(self) -> None:
-        """Make the trials of one generation of CMA-ES, or as many as are left (at least one must
-        be), and, if the generation is complete, update CMA-ES from their rewards. Where CMA-ES has
-        ended, it first restarts with twice the population. To be called only if the corrective
-        process completes the hand sequence."""
+        """Make the trials of a generation, and update CMA-ES from their rewards.
+
+        At least one trial must be left. If the generation is cut short because none is left, CMA-ES
+        is not updated. If CMA-ES has ended, it first restarts with twice the population.
+        """
         evolution = self.evolution
         if evolution is None or evolution.has_ended():
             default = 4 + int(3 * math.log(len(self._mean)))
@@ -115,8 +140,7 @@ def spend_trials(strategies: Sequence[Strategy], attempts: Attempts, exploration
 
 
 class CMAES(Method):
-    """CMA-ES for each hand sequence; the sequence of highest upper confidence bound makes the next
-    generation."""
+    """CMA-ES for each hand sequence, among which a bandit chooses (UCB1)."""
 
     name = "cma-es/bandit"
     version = 2
@@ -130,9 +154,24 @@ class CMAES(Method):
     Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
-        """Make a trial by the corrective process with each hand sequence while trials are left (of
-        more than 4096 only with the initial one), then, if one succeeds, generations of trials;
-        return the movements of the best trial. Raises MethodError if no trial hit every goal."""
+        """Make trials until none is left, and return the movements of the best trial.
+
+        Each hand sequence first gets a trial by the corrective process; of more than 4096 sequences
+        only the initial one does. If all of these trials fail, the method stops.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            No trial hits every goal.
+        """
         attempts = Attempts(session, self.parameters.trials)
         with session.solving():
             strategies = [
@@ -151,8 +190,7 @@ class GoalByGoalParameters(UninformedParameters):
 
 
 class GoalByGoal(Method):
-    """CMA-ES for each hand sequence; the hand of each goal is the hand with the best reward after
-    the hand before, or random."""
+    """CMA-ES for each hand sequence, which is chosen hand by hand from the best rewards."""
 
     name = "cma-es/goal-by-goal"
     version = 2
@@ -163,17 +201,37 @@ class GoalByGoal(Method):
     Parameters = GoalByGoalParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until none is left, every hand sequence has failed, or, with ``epsilon`` 0, a
-        failed sequence is chosen again; return the movements of the best trial. Raises MethodError
-        if no trial hit every goal, and NotApplicableError if no initial hands are found."""
+        """Make trials, and return the movements of the best trial.
+
+        The method stops if
+
+        - no trial is left;
+        - all hand sequences have failed;
+        - ``epsilon`` is 0 and a failed sequence is chosen again.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            No trial hits every goal.
+        NotApplicableError
+            No initial hands are found.
+        """
         attempts = Attempts(session, self.parameters.trials)
         letters = sorted(letters_of(session.hands))
         values: dict[tuple[int, str], float] = defaultdict(lambda: -math.inf)
         strategies: dict[str, Strategy] = {}
         hands = session.find_initial_hands()
         with session.solving():
-            most = len(letters) ** session.goals_count
-            while attempts.left > 0 and (attempts.hands or len(strategies) < most):
+            sequences = len(letters) ** session.goals_count
+            while attempts.left > 0 and (attempts.hands or len(strategies) < sequences):
                 if hands not in strategies:
                     strategies[hands] = Strategy(session, attempts, hands, self.parameters.sigma)
                 elif strategies[hands].reward > -math.inf:

@@ -1,8 +1,9 @@
 """Controllers of a hand by prioritised quadratic programmes, and the search over hand sequences.
 
-A controller takes control steps of ``period`` ticks until the hand is in its goal. Each step is the
-answer of the cascade (:mod:`coartic.baselines.cascade`): level 1 is for the hand, level 2 for what
-the joints prefer. Every hand sequence is simulated as far as it can still be the best.
+A controller makes control steps of at most ``period`` ticks until the hand is in its goal. The
+cascade (:mod:`coartic.baselines.cascade`) computes each step: level 1 moves the hand, and level 2
+chooses among the joint changes that do so. The search simulates each hand sequence as long as the
+sequence can still be the best.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from coartic.motion.movement import follow
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import beyond_reach, letters_of
 
-_HIT_MARGIN = 1e-9  # the scorer's interpolation along the path rounds
-_STALL_STEPS = 50  # without coming nearer by a tenth of a control step
-_BINDS = 1e-3  # least difference of joint changes by which a level binds, in control steps
+_HIT_MARGIN = 1e-9  # length unit: the scorer interpolates along the path, and rounds
+_STALL_STEPS = 50  # steps after which a hand is stuck that comes no tenth of a step nearer
+_BINDS = 1e-3  # least difference of joint changes at which a level counts as binding
 
 
 CITATION_AHEAD = (
@@ -54,12 +55,16 @@ class Leg(NamedTuple):
     ticks: int
     """Control ticks of the movement."""
     q: Array
-    """Configuration in which the goal is hit, shape ``(dof,)``."""
+    """Configuration in which the hand hits the goal, shape ``(dof,)``."""
     memory: Any
-    """Memory of the controller after the last control step, with which the next leg goes on."""
+    """Memory of the controller after the last control step. The next leg begins with it."""
     steps: NDArray[np.int64]
-    """Numbers of control steps, shape ``(3,)``: of all, of steps with changes other than preferred
-    (level 1 binds), and of steps with other changes than level 1 alone makes (level 2 binds)."""
+    """Numbers of control steps, shape ``(3,)``:
+
+    - all steps;
+    - steps in which level 1 binds: the changes are not the preferred ones;
+    - steps in which level 2 binds: the changes are not those of level 1.
+    """
 
 
 class _StuckError(Exception):
@@ -68,15 +73,18 @@ class _StuckError(Exception):
 
 @dataclass
 class Controller(ABC):
-    """Control loop on a task; the session counts evaluations and iterations. Changes ``(joints,)``
-    are of all entries of a configuration that are not locked."""
+    """Simulate the control of a hand on a task.
+
+    *Joints* are the entries of a configuration that are not locked, base coordinates among them.
+    The session counts evaluations and iterations.
+    """
 
     session: Session
     task: Task
     period: int
     """Most ticks of a control step."""
     solves: int = 0
-    """Quadratic programmes solved so far."""
+    """Number of quadratic programmes solved so far."""
 
     def __post_init__(self) -> None:
         locked = ["xy".index(coordinate) for coordinate in self.task.locked_base]
@@ -87,51 +95,90 @@ class Controller(ABC):
 
     @abstractmethod
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Any) -> Any:
-        """Return the memory (data that the controller keeps from step to step) with which it begins
-        a leg, the movement from configuration ``q``, ``(dof,)``, to the goal of the first of
-        ``aims`` (hand and goal); ``memory`` is the memory at the end of the leg before, None for
-        the first leg."""
+        """Return the memory with which the controller begins a leg.
+
+        The memory is data that the controller passes from step to step.
+
+        Parameters
+        ----------
+        q : ndarray, shape (dof,)
+            Configuration at the beginning of the leg.
+        aims : tuple of Aim
+            Goal of the leg with its hand, then the goals ahead with theirs.
+        memory
+            Memory at the end of the leg before; None for the first leg.
+        """
 
     @abstractmethod
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Any, first: bool
     ) -> tuple[Solution, Array, Any]:
-        """Return three things for a control step from ``q``, ``(dof,)``: the solution of the
-        cascade; the changes that the joints prefer, ``(joints,)``; the memory after the step.
-        Changes are of the joints that are not locked, in lengths of a control step. ``aims``: the
-        goal of the leg with its hand, then goals ahead. ``first``: True for the first step of a
-        leg."""
+        """Compute a control step.
+
+        Parameters
+        ----------
+        q : ndarray, shape (dof,)
+            Configuration before the step.
+        aims : tuple of Aim
+            Goal of the leg with its hand, then the goals ahead with theirs.
+        memory
+            Memory before the step.
+        first : bool
+            True for the first step of a leg.
+
+        Returns
+        -------
+        Solution
+            Solution of the cascade. Its changes are in lengths of a control step.
+        ndarray, shape (joints,)
+            Preferred changes of the joints, in the same unit.
+        object
+            Memory after the step.
+        """
 
     def leg(self, before: Leg | None, aims: tuple[Aim, ...]) -> Leg:
-        """Simulate control steps from the end of the leg ``before``, or, for None, from the task's
-        start, until the hand of the first of ``aims`` (hand and goal) is in its goal; return this
-        leg. Further aims are the goals ahead. Raises _StuckError if the hand does not reach its
-        goal, and MethodError if the solver fails."""
+        """Simulate control steps until the hand is in its goal.
+
+        Parameters
+        ----------
+        before : Leg or None
+            The leg before, from whose end the simulation begins; None to begin at the task's start.
+        aims : tuple of Aim
+            Goal of the leg with its hand, then the goals ahead with theirs.
+
+        Raises
+        ------
+        _StuckError
+            The hand does not reach its goal.
+        MethodError
+            The solver fails.
+        """
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
         model, radius = self.session.model, self.task.radius
         _, tolerance = model.tolerances(radius)
         short = beyond_reach(self.task, hand, self.task.goals[goal], tolerance)
         if short > radius:
             raise _StuckError(
-                f"{name} ends {short:.3g} short of it with the base "
-                f"locked in {' and '.join(self.task.locked_base)}"
+                f"{name} ends {short:.3g} length units short of the goal with the base locked in "
+                f"{' and '.join(self.task.locked_base)}"
             )
         q = start = self.session.q0 if before is None else before.q
         waypoints: list[Array] = []
         memory = self.begin(q, aims, None if before is None else before.memory)
-        nearest, since, steps = np.inf, 0, np.zeros(3, dtype=np.int64)
+        nearest, stalled_steps, steps = np.inf, 0, np.zeros(3, dtype=np.int64)
         while (distance := float(np.hypot(*self.error(q, aims[0])))) > radius - _HIT_MARGIN:
             if distance < nearest - 0.1 * self.length:
-                nearest, since = distance, 0
-            since += 1
-            if since > _STALL_STEPS:
+                nearest, stalled_steps = distance, 0
+            stalled_steps += 1
+            if stalled_steps > _STALL_STEPS:
                 raise _StuckError(
-                    f"{name} is still {distance:.3g} from its centre "
-                    f"after {len(waypoints)} control steps and comes no nearer"
+                    f"{name} is stuck {distance:.3g} length units from the goal's centre after "
+                    f"{len(waypoints)} control steps"
                 )
             solution, preferred, memory = self.step(q, aims, memory, not waypoints)
             rates = solution.changes
-            binds = [np.abs(rates - other).max() > _BINDS for other in (preferred, solution.first)]
+            alternatives = preferred, solution.level_1
+            binds = [np.abs(rates - changes).max() > _BINDS for changes in alternatives]
             steps += 1, *binds
             q = self.add(q, self.length * rates / max(1.0, float(np.linalg.norm(rates))))
             waypoints.append(q)
@@ -144,27 +191,36 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Return the joint changes of both levels of the cascade (:func:`solve_cascade`): changes x
-        with A x >= b (``rows`` A, ``(m, joints)``; ``least`` b, ``(m,)``) as nearly as damping
-        allows, and the changes nearest to ``preferred``, ``(joints,)``, that are as good. Count two
-        programmes in ``solves``, and the iterations in the session. Raises MethodError if the
-        solver fails."""
+        """Solve the cascade (:func:`solve_cascade`), and count programmes and iterations."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)
         return solution
 
     def error(self, q: Array, aim: Aim) -> Array:
-        """Return the vector from the hand of an aim (hand and goal) in configuration ``q`` to the
-        goal's centre, shape ``(2,)``, length unit; the session counts an evaluation."""
+        """Return the vector from a hand to the centre of its goal.
+
+        Parameters
+        ----------
+        q : ndarray, shape (dof,)
+            Configuration of the robot.
+        aim : Aim
+            Hand and goal.
+
+        Returns
+        -------
+        ndarray, shape (2,)
+            Vector, length unit. The session counts an evaluation.
+        """
         return np.asarray(
             self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
         )
 
     def add(self, q: Array, change: Array) -> Array:
-        """Return a copy of configuration ``q``, ``(dof,)``, with ``change`` added to its entries
-        that are not locked; ``change`` has a number for each of these alone, shape ``(joints,)``,
-        length unit and rad."""
+        """Return a copy of configuration ``q``, ``(dof,)``, changed by ``change``, ``(joints,)``.
+
+        The base coordinates are in length units, the angles in rad.
+        """
         result = q.copy()
         result[self.moving] += change
         return result
@@ -178,7 +234,7 @@ class ControlParameters(Parameters):
 
 
 class Control(Method):
-    """A controller under every hand sequence; base of the methods that control a hand."""
+    """Base of the methods that simulate a controller for all hand sequences."""
 
     citation = (
         "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
@@ -191,19 +247,33 @@ class Control(Method):
     quick: ClassVar[dict[str, Any]] = {"period": 20}
     controller: ClassVar[type[Controller]]
     goals_ahead: ClassVar[int] = 0
-    """Goals after the current one that the controller takes into account."""
+    """Number of goals after the current goal that the controller takes into account."""
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence that a task has more than 4096 hand sequences; else None."""
+        """Return a sentence if a task has more than 4096 hand sequences; else None."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
-        """Simulate the control of all hand sequences as far as they can be best; return the paths,
-        a movement for each goal, of the sequence that hits every goal in the fewest ticks, with
-        counts of the search as details; of equal sequences the sequence with the fewest changes of
-        hand, then the first. The sequence with the fewest ticks so far is extended by the path to
-        its next goal until such a sequence is complete. Raises MethodError if the hand gets stuck
-        in all sequences, or the solver fails."""
+        """Find the hand sequence that takes the controller the fewest ticks.
+
+        The search extends the sequence with the fewest ticks so far by the path to its next goal,
+        until that sequence is complete. Between sequences with equal ticks it chooses the one with
+        the fewest changes of hand, then the first one.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+            A movement for each goal, and counts of the search as details.
+
+        Raises
+        ------
+        MethodError
+            The hand gets stuck in all sequences, or the solver fails.
+        """
         task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = self.controller(session, task, self.parameters.period)
         ordered = [hand for hand in HANDS if hand in task.hands]
@@ -213,7 +283,7 @@ class Control(Method):
             for index, hands in enumerate(candidates)
         ]
         heapq.heapify(heap)
-        legs: dict[Any, Leg | _StuckError] = {}  # sequences share their beginnings
+        legs: dict[Any, Leg | _StuckError] = {}  # sequences with a common beginning share legs
         stuck: list[_StuckError] = []
         with session.solving():
             while heap:

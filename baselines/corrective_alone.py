@@ -1,7 +1,8 @@
-"""The corrective process alone: with given hands, and with the best hands.
+"""The corrective process alone, with the task's hands or with the best hands.
 
-The best hands come from the paper's exhaustive strategy (section *Exploration Condition 3*):
-try all 2^G hand sequences, each target from **A**, without further exploration.
+The best hands come from the paper's exhaustive strategy (section *Exploration Condition 3*). It
+tries all 2^G hand sequences for G goals; the corrective process **A** chooses each target, and
+nothing else is explored.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from coartic.motion.solution import corrective_movements
 
 
 class GivenHands(Method):
-    """The corrective process with the task's initial hands: trial 0 of a learner with all hands."""
+    """The corrective process with the task's initial hands, as in trial 0 of the learner."""
 
     name = "corrective-alone/given"
     tuned_on = "nothing: all constants are the paper's"
@@ -27,9 +28,25 @@ class GivenHands(Method):
     stochastic = False
 
     def solve(self, session: Session) -> Result:
-        """Make one trial in which the corrective process alone goes to each goal with the task's
-        initial hands; return its movements. Raises MethodError if the trial misses a goal,
-        NotApplicableError if no initial hands are found, and BudgetError if no trial is left."""
+        """Make one trial with the task's initial hands, and return its movements.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            The trial misses a goal.
+        NotApplicableError
+            No initial hands are found.
+        BudgetError
+            No trial is left.
+        """
         hands = session.find_initial_hands()
         with session.solving():
             execution = session.trial(corrective_movements(hands))
@@ -39,19 +56,34 @@ class GivenHands(Method):
 
 
 class BestHands(GivenHands):
-    """The corrective process with every hand sequence; the best sequence is kept."""
+    """The corrective process with the hand sequence that gets the highest reward."""
 
     name = "corrective-alone/best-hands"
     title = "Corrective process alone, best hands"
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence that a task has more than 4096 hand sequences; else None."""
+        """Return a sentence if a task has more than 4096 hand sequences; else None."""
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
-        """Make one trial for each hand sequence while trials are left; return the movements of the
-        best trial, of equal rewards the trial with the fewest changes of hand. Raises MethodError
-        if no trial hit every goal."""
+        """Make a trial for each hand sequence, and return the movements of the best trial.
+
+        Trials stop when the budget ends. Between trials with equal rewards the one with the fewest
+        changes of hand is best.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            No trial hits every goal.
+        """
         completed: list[Execution] = []
         for hands in sequences_with(session.hands, session.goals_count, session.task_name):
             if session.trials_left == 0:
@@ -62,7 +94,7 @@ class BestHands(GivenHands):
                 completed.append(execution)
         if not completed:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
-        best = min(completed, key=lambda each: (each.ticks, changes_of_hand(each.hands)))
+        best = min(completed, key=lambda trial: (trial.ticks, changes_of_hand(trial.hands)))
         return Result(best.movements)
 
 

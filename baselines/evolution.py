@@ -1,12 +1,18 @@
-"""CMA-ES as in the package ``cma``, bit for bit, but in less time and without its slow import.
+"""CMA-ES as in the package ``cma``, bit for bit, but faster and without its slow import.
 
-N. Hansen (2016), The CMA evolution strategy: a tutorial (arXiv 1604.00772), whose equations have
-their numbers in brackets here; with negative weights. Constants, stopping criteria and the order of
-operations come from the package ``cma`` 4.5 with its defaults, so that the points are the same to
-the last bit, except in generations of less than six points, as in one dimension: the package
-mirrors some of them. Where the package begins to rescale the coordinates, at variances 1e8 apart or
-a condition number of 1e12, this strategy ends. Weights are added from left to right, as the package
-does up to Python 3.11; later versions round ``sum`` otherwise.
+The algorithm is that of N. Hansen (2016), The CMA evolution strategy: a tutorial
+(arXiv:1604.00772), with negative weights. Symbols are the tutorial's, and numbers in brackets are
+those of its equations. Constants, stopping criteria and the order of operations come from the
+package ``cma`` 4.5 with its default options, so that the points agree to the last bit. There are
+two differences:
+
+- The package mirrors some points of a generation with fewer than six points. This strategy does
+  not.
+- The package begins to rescale the coordinates at variances 1e8 apart or a condition number of
+  1e12. This strategy stops there.
+
+Weights are added from left to right, as the package adds them up to Python 3.11. The ``sum`` of
+later versions of Python rounds differently.
 """
 
 from __future__ import annotations
@@ -21,92 +27,110 @@ from numpy import exp
 
 from coartic.robot import Array
 
-_LEAST = 1e-11  # change of coordinates, and of costs within and between generations
-_LEAST_OVER_TEN = 1e-12  # of the best costs of ten or more generations
-_STILL = 1e-9  # a shift of the mean that is none
-_WIDER = 1e3  # standard deviations, in those of the start
-_APART = 1e8  # variances of coordinates
-_ILL = 1e12  # condition number of the covariance matrix
-_NOTED_EACH = 5  # generations: how often best and median are noted
-_MOST_NOTED = 20_000
+# Tolerances of the stopping criteria, with the names of the package.
+_TOL_X = 1e-11  # least standard deviation of a coordinate
+_TOL_FUN = 1e-11  # least range of costs, within a generation and between generations
+_TOL_FUN_HIST = 1e-12  # least range of the best costs of ten or more generations
+_TOL_STAGNATION = 1e-9  # least shift of the mean that counts as a shift
+_TOL_FACUPX = 1e3  # largest standard deviation, as a multiple of the first step size
+_TOL_VARIANCES = 1e8  # largest ratio of the variances of two coordinates
+_TOL_CONDITION = 1e12  # largest condition number of the covariance matrix
+_HISTORY_STEP = 5  # generations from one entry of the long histories to the next
+_HISTORY_LENGTH = 20_000  # entries of the long histories
 
 
-def _added(weights: list[float]) -> float:
-    """Return the sum of weights, added from left to right; 0 for none."""
+def _sum(weights: list[float]) -> float:
+    """Return the sum of weights, added from left to right."""
     return reduce(add, weights, 0.0)
 
 
 class EvolutionStrategy:
-    """Evolution strategy: :meth:`ask` for ``size`` points, :meth:`tell` their costs, until
-    :meth:`has_ended`. It begins at ``mean``, shape ``(dim,)``, with SD ``step_size`` (to 0.01 %) in
-    each coordinate."""
+    """Evolution strategy with covariance matrix adaptation, by an ask-and-tell interface.
 
-    def __init__(self, mean: Array, step_size: float, size: int, rng: np.random.Generator) -> None:
+    Call :meth:`ask` for points and :meth:`tell` for their costs in turn until :meth:`has_ended`.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (dim,)
+        Mean of the first generation.
+    sigma : float
+        Standard deviation of each coordinate in the first generation, to within 0.01 %.
+    size : int
+        Number λ of points in a generation.
+    rng : numpy.random.Generator
+        Generator of all random numbers.
+    """
+
+    def __init__(self, mean: Array, sigma: float, size: int, rng: np.random.Generator) -> None:
         dim = len(mean)
         self.size = size
-        """Points in a generation, λ."""
-        raw = [math.log((size + 1) / 2) - math.log(rank) for rank in range(1, size + 1)]  # (49)
-        self._parents = sum(weight > 0 for weight in raw)  # points that are recombined, μ
-        total = _added(raw[: self._parents])
-        positive = [weight / total for weight in raw[: self._parents]]
-        selected = 1 / _added([weight**2 for weight in positive])
-        c_1 = min(1, size / 6) * 2 / ((dim + 1.3) ** 2 + selected)  # (57)
+        """Number λ of points in a generation."""
+        # Weights before they are scaled (49). The points with positive weights are recombined.
+        weights_prime = [math.log((size + 1) / 2) - math.log(rank) for rank in range(1, size + 1)]
+        self._mu = mu = sum(weight > 0 for weight in weights_prime)
+        total = _sum(weights_prime[:mu])
+        positive = [weight / total for weight in weights_prime[:mu]]
+        mu_eff = 1 / _sum([weight**2 for weight in positive])
+        c_1 = min(1, size / 6) * 2 / ((dim + 1.3) ** 2 + mu_eff)  # (57)
 
         def scaled(weights: list[float], to: float) -> list[float]:
-            factor = abs(to / (_added(weights) or 1))
+            factor = abs(to / (_sum(weights) or 1))
             return [weight * factor for weight in weights]
 
         # Negative weights make up for the positive ones, but cannot make a variance negative
-        # (50 to 53). They are scaled twice, with a rate that differs in its last bit, as in the
-        # package.
-        negative = [weight / total for weight in raw[self._parents :]]
-        negative = [weight / -_added(negative) for weight in negative]
-        for mass in (0.25 + selected + 1 / selected - 2, 0.25 + selected - 2 + 1 / selected):
-            rate = min(1 - c_1, 2 * mass / ((dim + 2) ** 2 + selected))  # c_μ (58)
-            negative = scaled(negative, 1 + c_1 / rate)
-            square = _added([weight**2 for weight in negative])
-            rejected = _added(negative) ** 2 / (square or 1)
-            for most in ((1 - c_1 - rate) / rate / dim, 1 + 2 * rejected / (selected + 2)):
-                if _added(negative) < -most:
-                    negative = scaled(negative, most)
-        self._recombined = np.array(positive)  # weights of the best points, which sum to 1
-        self._selected = selected  # variance effective selection mass, μ_eff
-        # Learning rates: of the covariance from its path, of this path, of the step size's path.
-        self._c_1 = c_1
-        self._c_path = (4 + selected / dim) / (dim + (4 + 2 * selected / dim))  # c_c (56)
-        self._c_step = min(0.5, (selected + 2) / (dim + (selected + 3)))  # c_σ (55)
-        # Weights of the evolution path and of all points in the covariance matrix, also while the
-        # path is stalled.
-        of_points = [rate * weight for weight in (*positive, *negative)]
-        self._learned = np.array([c_1, *of_points])
-        self._stalled = np.array([c_1 * (1 - self._c_path * (2 - self._c_path)), *of_points])
-        narrow = max(1, 3 * (1 - 0.5 ** (dim / 9))) * ((selected - 1) / (dim + 1)) ** 0.5 - 1
-        self._damping = 1 + 2 * max(0, narrow) + self._c_step  # of the step size, d_σ (55)
-        if dim > 100:  # expected length of a standard normal vector
-            self._length = dim**0.5 * (1 - 1 / (4 * dim) + 1 / (32 * dim**2))
+        # (50 to 53). As in the package they are scaled twice, with values of c_mu that differ in
+        # the last bit.
+        negative = [weight / total for weight in weights_prime[mu:]]
+        negative = [weight / -_sum(negative) for weight in negative]
+        for mass in (0.25 + mu_eff + 1 / mu_eff - 2, 0.25 + mu_eff - 2 + 1 / mu_eff):
+            c_mu = min(1 - c_1, 2 * mass / ((dim + 2) ** 2 + mu_eff))  # (58)
+            negative = scaled(negative, 1 + c_1 / c_mu)
+            squares = _sum([weight**2 for weight in negative])
+            mu_eff_minus = _sum(negative) ** 2 / (squares or 1)
+            for limit in ((1 - c_1 - c_mu) / c_mu / dim, 1 + 2 * mu_eff_minus / (mu_eff + 2)):
+                if _sum(negative) < -limit:
+                    negative = scaled(negative, limit)
+        self._weights = np.array(positive)  # weights of the mean; their sum is 1
+        self._mu_eff = mu_eff  # variance effective selection mass
+        self._c_1 = c_1  # learning rate of the rank-one update
+        self._c_c = (4 + mu_eff / dim) / (dim + (4 + 2 * mu_eff / dim))  # (56)
+        self._c_sigma = min(0.5, (mu_eff + 2) / (dim + (mu_eff + 3)))  # (55)
+        excess = max(1, 3 * (1 - 0.5 ** (dim / 9))) * ((mu_eff - 1) / (dim + 1)) ** 0.5 - 1
+        self._d_sigma = 1 + 2 * max(0, excess) + self._c_sigma  # damping of the step size (55)
+        # Weights of p_c and of all points in the update of the covariance: if h_sigma is 1, and if
+        # it is 0.
+        of_points = [c_mu * weight for weight in (*positive, *negative)]
+        self._update_weights = np.array([c_1, *of_points])
+        self._stalled_weights = np.array([c_1 * (1 - self._c_c * (2 - self._c_c)), *of_points])
+        # Expected length of a standard normal vector.
+        if dim > 100:
+            self._chi_n = dim**0.5 * (1 - 1 / (4 * dim) + 1 / (32 * dim**2))
         else:
-            from scipy.special import gamma  # slow, and a command that names methods needs none
+            from scipy.special import gamma  # slow to import, and most commands do not need it
 
-            self._length = float(2**0.5 * gamma((dim + 1) / 2) / gamma(dim / 2))
-        self._gap = 1 / (c_1 + rate) / dim / 10  # generations between decompositions, at least
-        self._patience = int(100 + 100 * dim**1.5 / size)  # generations that it may stagnate
-        self._most_generations = 100 + 150 * (dim + 3) ** 2 // size**0.5
+            self._chi_n = float(2**0.5 * gamma((dim + 1) / 2) / gamma(dim / 2))
+        self._lazy_gap = 1 / (c_1 + c_mu) / dim / 10  # least generations between decompositions
+        self._patience = int(100 + 100 * dim**1.5 / size)  # generations without improvement
+        self._max_generations = 100 + 150 * (dim + 3) ** 2 // size**0.5
 
         self._rng = rng
         self._mean = mean.copy()
-        self._first_step_size = self._step_size = float(step_size)
-        # Almost the identity: its eigenvalues differ.
-        self._covariance = np.diag(exp(1e-4 / dim * np.arange(dim)))
-        self._lengths, self._axes = np.diag(self._covariance) ** 0.5, np.eye(dim)
-        self._path, self._step_path = np.zeros(dim), np.zeros(dim)
-        self._generation, self._decomposed = 0, 0
-        self._still_at, self._still_since = self._mean, 0
+        self._first_sigma = self._sigma = float(sigma)
+        # The covariance matrix C = B D² Bᵀ. It begins as almost the identity, with eigenvalues
+        # that differ.
+        self._C = np.diag(exp(1e-4 / dim * np.arange(dim)))
+        self._D, self._B = np.diag(self._C) ** 0.5, np.eye(dim)
+        self._p_c, self._p_sigma = np.zeros(dim), np.zeros(dim)  # evolution paths
+        self._generation, self._decomposed_at = 0, 0
+        self._moved_to, self._moved_at = self._mean, 0  # last shift of the mean, and its generation
         self._costs: Array = np.empty(0)  # of the last generation, sorted
-        self._bests: deque[float] = deque(maxlen=int(10 + 30 * dim / size))
-        self._noted_bests: deque[float] = deque(maxlen=_MOST_NOTED)
-        self._noted_medians: deque[float] = deque(maxlen=_MOST_NOTED)
-        self._best, self._best_point = math.inf, 0
-        self._flat = 0
+        # Histories with the newest entry first: best costs of the last generations, and best and
+        # median costs of every fifth generation.
+        self._best_costs: deque[float] = deque(maxlen=int(10 + 30 * dim / size))
+        self._long_best: deque[float] = deque(maxlen=_HISTORY_LENGTH)
+        self._long_median: deque[float] = deque(maxlen=_HISTORY_LENGTH)
+        self._best, self._best_point = math.inf, 0  # least cost, and the number of its point
+        self._flat_generations = 0  # in a row whose best cost equals the upper quartile
 
     @property
     def mean(self) -> Array:
@@ -119,107 +143,137 @@ class EvolutionStrategy:
         return self._costs
 
     def ask(self) -> Array:
-        """Draw and return the points of the next generation, shape ``(size, dim)``."""
-        if self._generation >= self._decomposed + self._gap:
-            self._covariance = (self._covariance + self._covariance.T) / 2
-            variances, axes = np.linalg.eigh(self._covariance)
-            self._axes = np.asfortranarray(axes)
-            self._lengths = variances**0.5
-            self._decomposed = self._generation
-        noise = self._rng.standard_normal((self.size, len(self._mean)))
-        drawn: Array = np.dot(self._axes, (self._lengths * noise).T).T  # (38 to 40)
-        return self._mean + self._step_size * drawn
+        """Draw the points of the next generation.
+
+        Returns
+        -------
+        ndarray, shape (size, dim)
+        """
+        if self._generation >= self._decomposed_at + self._lazy_gap:
+            self._C = (self._C + self._C.T) / 2
+            variances, axes = np.linalg.eigh(self._C)
+            self._B = np.asfortranarray(axes)
+            self._D = variances**0.5
+            self._decomposed_at = self._generation
+        z = self._rng.standard_normal((self.size, len(self._mean)))
+        y: Array = np.dot(self._B, (self._D * z).T).T  # (38 to 40)
+        return self._mean + self._sigma * y
 
     def tell(self, points: Array, costs: Array) -> None:
-        """Update mean, covariance and step size of the strategy from the points ``(size, dim)`` of
-        the last :meth:`ask` and their finite costs ``(size,)``; the least cost is best."""
+        """Update the mean, the covariance and the step size from the costs of a generation.
+
+        Parameters
+        ----------
+        points : ndarray, shape (size, dim)
+            The points of the last :meth:`ask`.
+        costs : ndarray, shape (size,)
+            Their costs, all finite. The strategy minimises the cost.
+        """
         self._generation += 1
+        self._note_costs(costs)
+        points = points[np.argsort(costs)]
+        old_mean, self._mean = self._mean, np.dot(self._weights, points[: self._mu])  # (41, 42)
+        shift = self._mean - old_mean
+        n = len(shift)
+
+        # Path of the step size (43), in coordinates in which the points are standard normal.
+        whitened = np.dot(self._B, np.dot(self._B.T, shift) / self._D)
+        normalised = whitened * (self._mu_eff**0.5 / self._sigma)
+        self._p_sigma *= 1 - self._c_sigma
+        self._p_sigma += math.sqrt(self._c_sigma * (2 - self._c_sigma)) * normalised
+        square = np.sum(self._p_sigma**2) / (1 - (1 - self._c_sigma) ** (2 * self._generation))
+        h_sigma = square / n - 1 < 1 + 4 / (n + 1)
+
+        # Path of the covariance (45). It stalls while the path of the step size is long.
+        self._p_c = (1 - self._c_c) * self._p_c
+        if h_sigma:
+            factor = (self._c_c * (2 - self._c_c) * self._mu_eff) ** 0.5 / self._sigma
+            self._p_c += factor * shift
+            weights, path = self._update_weights, self._p_c
+        else:
+            weights = self._stalled_weights
+            path = (self._c_1 / weights[0]) ** 0.5 * self._p_c
+        # Points with negative weights count as if they had the expected length (46, 47).
+        weights, rejected = weights.copy(), slice(1 + self._mu, None)
+        vectors = np.vstack([path, (points - old_mean) / self._sigma])
+        self._C *= 1 - weights.cumsum()[-1]
+        scaled = np.matmul(self._B.T, vectors[rejected, :, None])[..., 0] / self._D
+        squares = (scaled**2).cumsum(axis=1)[:, -1]  # added one by one, as the package does
+        weights[rejected] *= [n / (square**0.5 + 1e-9) ** 2 for square in squares.tolist()]
+        self._C += np.dot(weights * vectors.T, vectors)
+
+        # Step size (44).
+        length = np.sqrt(np.sum(np.square(self._p_sigma)))
+        change = (length / self._chi_n - 1) * (self._c_sigma / self._d_sigma)
+        self._sigma *= float(exp(min(max(change, -1), 1)))
+
+        threshold = 20 + 0.1 * self._generation
+        delta = _TOL_STAGNATION * max(1, (self._generation - self._moved_at) / threshold) ** 0.5
+        if np.sum((self._moved_to - self._mean) ** 2) ** 0.5 > delta:
+            self._moved_to, self._moved_at = self._mean, self._generation
+
+    def _note_costs(self, costs: Array) -> None:
+        """Enter the costs of a generation into the histories of the stopping criteria."""
         least = int(np.argmin(costs))
         if costs[least] < self._best:
             self._best, self._best_point = float(costs[least]), self._generation * self.size
             self._best_point += least + 1 - self.size
         self._costs = ranked = np.sort(costs)
-        self._bests.appendleft(ranked[0])
-        if self._generation % _NOTED_EACH == 0:
-            self._noted_bests.appendleft(ranked[0])
-            self._noted_medians.appendleft(np.median(ranked))
-        self._flat = 0 if ranked[0] < ranked[int(0.75 * self.size)] else self._flat + 1
-
-        points = points[np.argsort(costs)]
-        # The mean (41, 42), then the path of the step size (43).
-        before, self._mean = self._mean, np.dot(self._recombined, points[: self._parents])
-        shift = self._mean - before
-
-        # In coordinates in which the points are normal with unit variance.
-        whitened = np.dot(self._axes, np.dot(self._axes.T, shift) / self._lengths)
-        normalised = whitened * (self._selected**0.5 / self._step_size)
-        self._step_path *= 1 - self._c_step
-        self._step_path += math.sqrt(self._c_step * (2 - self._c_step)) * normalised
-        square = np.sum(self._step_path**2) / (1 - (1 - self._c_step) ** (2 * self._generation))
-        is_stalled = not square / len(shift) - 1 < 1 + 4 / (len(shift) + 1)
-
-        self._path = (1 - self._c_path) * self._path  # (45)
-        weights, path = self._stalled, (self._c_1 / self._stalled[0]) ** 0.5 * self._path
-        if not is_stalled:
-            factor = (self._c_path * (2 - self._c_path) * self._selected) ** 0.5 / self._step_size
-            self._path += factor * shift
-            weights, path = self._learned, self._path
-        # Points with negative weights count as if they had the expected length (46, 47).
-        weights, rejected = weights.copy(), slice(1 + self._parents, None)
-        vectors = np.vstack([path, (points - before) / self._step_size])
-        self._covariance *= 1 - weights.cumsum()[-1]
-        scaled = np.matmul(self._axes.T, vectors[rejected, :, None])[..., 0] / self._lengths
-        squares = (scaled**2).cumsum(axis=1)[:, -1]  # term by term, as the package sums
-        weights[rejected] *= [len(shift) / (square**0.5 + 1e-9) ** 2 for square in squares.tolist()]
-        self._covariance += np.dot(weights * vectors.T, vectors)
-
-        length = np.sqrt(np.sum(np.square(self._step_path)))
-        change = (length / self._length - 1) * (self._c_step / self._damping)  # (44)
-        self._step_size *= float(exp(min(max(change, -1), 1)))
-        threshold = 20 + 0.1 * self._generation
-        delta = _STILL * max(1, (self._generation - self._still_since) / threshold) ** 0.5
-        if np.sum((self._still_at - self._mean) ** 2) ** 0.5 > delta:
-            self._still_at, self._still_since = self._mean, self._generation
+        self._best_costs.appendleft(ranked[0])
+        if self._generation % _HISTORY_STEP == 0:
+            self._long_best.appendleft(ranked[0])
+            self._long_median.appendleft(np.median(ranked))
+        is_flat = not ranked[0] < ranked[int(0.75 * self.size)]
+        self._flat_generations = self._flat_generations + 1 if is_flat else 0
 
     def has_ended(self) -> bool:
-        """Return whether a criterion to stop is met, False before the first :meth:`tell`: points or
-        costs change too little or costs do not improve, steps have become too long, the covariance
-        is ill-conditioned, or there were too many generations."""
+        """Return whether a stopping criterion is met; False before the first :meth:`tell`."""
         if not self._generation:
             return False
-        deviations = self._step_size * np.sqrt(np.diag(self._covariance))
-        least, most = deviations.min(), deviations.max()
-        between = max(self._bests) - min(self._bests)
+        deviations = self._sigma * np.sqrt(np.diag(self._C))
+        smallest, largest = deviations.min(), deviations.max()
+        cost_range = max(self._best_costs) - min(self._best_costs)
         axis = self._generation % len(self._mean)
-        longest = 0.1 * self._step_size * self._lengths[axis] * self._axes[:, axis]
+        axis_step = 0.1 * self._sigma * self._D[axis] * self._B[:, axis]
         return bool(
+            # Neither best nor median costs have improved for many generations.
             self._stagnates()
-            # Costs hardly differ within the generation, or the best ones between generations.
-            or self._flat > 1
-            or (self._costs[-1] - self._costs[0] < _LEAST and between < _LEAST)
-            or (len(self._bests) > 9 and between < _LEAST_OVER_TEN)
-            or (most < _LEAST and (self._step_size * self._path).max() < _LEAST)
-            or self._generation - self._still_since > 20 + 0.1 * self._generation
+            # The best cost equalled the upper quartile in two generations in a row.
+            or self._flat_generations > 1
+            # Costs of this generation, and best costs of the last generations, hardly differ.
+            or (self._costs[-1] - self._costs[0] < _TOL_FUN and cost_range < _TOL_FUN)
+            # Best costs of ten or more generations hardly differ.
+            or (len(self._best_costs) > 9 and cost_range < _TOL_FUN_HIST)
+            # Standard deviations and the evolution path are too small.
+            or (largest < _TOL_X and (self._sigma * self._p_c).max() < _TOL_X)
+            # The mean has not moved for many generations.
+            or self._generation - self._moved_at > 20 + 0.1 * self._generation
+            # A fifth of a standard deviation does not change some coordinate of the mean.
             or (self._mean == self._mean + 0.2 * deviations).any()
-            or (self._mean == self._mean + longest).all()
-            or most > self._first_step_size * _WIDER
-            or (most / least) ** 2 >= _APART
-            or (self._lengths[-1] / self._lengths[0]) ** 2 >= _ILL
-            or self._generation >= self._most_generations
+            # A tenth of a standard deviation along a principal axis does not change the mean.
+            or (self._mean == self._mean + axis_step).all()
+            # Standard deviations have grown far beyond the first step size.
+            or largest > self._first_sigma * _TOL_FACUPX
+            # The variances of two coordinates are too far apart.
+            or (largest / smallest) ** 2 >= _TOL_VARIANCES
+            # The covariance matrix is ill-conditioned.
+            or (self._D[-1] / self._D[0]) ** 2 >= _TOL_CONDITION
+            # The number of generations has reached its limit.
+            or self._generation >= self._max_generations
         )
 
     def _stagnates(self) -> bool:
         """Return whether neither the best nor the median cost has improved for many generations."""
-        noted = len(self._noted_bests)
-        recent = int(max(self._patience / 10, noted / 10))
-        evaluated = self._generation * self.size
+        entries = len(self._long_best)
+        recent = int(max(self._patience / 10, entries / 10))
+        evaluations = self._generation * self.size
         if (
             self._generation <= len(self._mean) * (5 + 100 / self.size)
-            or (evaluated - self._best_point) / self.size <= self._patience / 2
-            or noted <= max(100, 2 * recent)
+            or (evaluations - self._best_point) / self.size <= self._patience / 2
+            or entries <= max(100, 2 * recent)
         ):
             return False
         return all(
             np.median(history[:recent]) >= np.median(history[recent : 2 * recent])
-            for history in (list(self._noted_medians), list(self._noted_bests))
+            for history in (list(self._long_median), list(self._long_best))
         )

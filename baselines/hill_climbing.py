@@ -1,12 +1,15 @@
-"""Hill climbing: Gaussian noise and drawn hands, a (1+1) hill climber for each hand sequence.
+"""Hill climbing: Gaussian noise and random hands, with a (1+1) climber for each hand sequence.
 
-A sequence has a centre, at first the configurations in which its first trial hits the goals. In
-this trial the corrective process **A** acts alone (or see ``begin``). Each later trial perturbs all
-explored joints of the centre at once; any better one moves the centre to the configurations in
-which it hit the goals, as in the learner.
-To keep its targets would gain more: random search with 1,000 ``stages`` gains 0 to 16 ticks more
-with targets on the paper's tasks. Hands are explored as the learner does, with ε for each goal
-around the best sequence known. SD (by default) and ε are the learner's, untuned.
+Each hand sequence has a centre. The first trial of a sequence is made by the corrective process
+**A** alone (but see ``begin``), and the configurations in which it hits the goals are the first
+centre. Each later trial perturbs all explored joints of the centre at once. A better trial moves the centre to the
+configurations in which it hit the goals, as in the learner. Moving the centre to the trial's
+targets instead would gain more: on the paper's tasks random search with 1,000 ``stages`` gains 0 to
+16 ticks more with targets.
+
+Hands are explored as in the learner: for each goal of the best sequence known, with probability ε,
+a random hand replaces the hand. The default standard deviation and ε are the learner's; they were
+not tuned.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
 _EPSILON = 0.2  # probability of a random hand, for each goal
-_MOST_DRAWN = 128  # trials that are drawn before they are made, at most
+_MOST_DRAWN = 128  # most trials that are drawn before the first of them is made
 
 
 class HillClimbingParameters(UninformedParameters):
@@ -51,21 +54,39 @@ class HillClimbing(Method):
     Parameters = HillClimbingParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until none is left, or every hand sequence has failed; return the movements
-        of the best trial. Raises MethodError if no trial hit every goal, and NotApplicableError if
-        no initial hands are found."""
-        first, rng, letters = session.find_initial_hands(), session.rng, letters_of(session.hands)
+        """Make trials until none is left or all hand sequences have failed.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+            The movements of the best trial.
+
+        Raises
+        ------
+        MethodError
+            No trial hits every goal.
+        NotApplicableError
+            No initial hands are found.
+        """
+        initial_hands, rng = session.find_initial_hands(), session.rng
+        letters = letters_of(session.hands)
         attempts = Attempts(session, self.parameters.trials)
-        most, ahead = len(letters) ** session.goals_count, 1
+        sequences, ahead = len(letters) ** session.goals_count, 1
         explored, dim = attempts.explored, attempts.explored.sum()
-        centres: dict[str, Array] = {}  # their values, (G, dof); NaN for the other joints
-        rewards: dict[str, float] = {}  # a trial with more moves the centre
-        hopeless: set[str] = set()  # A alone does not complete them, ever
+        centres: dict[str, Array] = {}  # by hand sequence, (G, dof); NaN for joints not explored
+        rewards: dict[str, float] = {}  # of the centre, by hand sequence
+        hopeless: set[str] = set()  # sequences that the corrective process does not complete
 
         def draw() -> str:
-            """Draw a hand sequence: hands of the best trial, each replaced with probability 0.2 by
-            a random hand, or, before a success, random hands; never a sequence with which the
-            corrective process alone failed."""
+            """Draw a hand sequence that is not hopeless.
+
+            Its hands are random before the first success. Later they are the hands of the best
+            trial, each replaced by a random hand with probability 0.2.
+            """
             while True:
                 chosen = list(attempts.hands or letters[0] * session.goals_count)
                 for goal in range(len(chosen)):
@@ -86,22 +107,23 @@ class HillClimbing(Method):
             return targets
 
         with session.solving():
-            while attempts.left > 0 and len(hopeless) < most:
-                # The next draws are known until a centre moves, which is rare: they are tried
-                # together, and what was drawn beyond the trial that moves one is drawn again.
+            while attempts.left > 0 and len(hopeless) < sequences:
+                # Draws do not depend on rewards until a centre moves, which is rare. So trials are
+                # drawn ahead and made side by side. After a trial that moves a centre, the draws
+                # beyond it are discarded, and the generator goes back to its state after the trial.
                 drawn, noise, states = list[str](), list[Array](), [rng.bit_generator.state]
                 while len(drawn) < min(ahead, attempts.left):
-                    hands = draw() if attempts.trials_made else first
+                    hands = draw() if attempts.trials_made else initial_hands
                     if hands not in centres:
                         break
                     drawn.append(hands)
                     noise.append(rng.standard_normal(dim))
                     states.append(rng.bit_generator.state)
                 if drawn:
-                    than = np.array([rewards[hands] for hands in drawn])
+                    thresholds = np.array([rewards[hands] for hands in drawn])
                     targets = np.array([centres[hands] for hands in drawn])
                     targets[:, explored] += self.parameters.sigma * np.array(noise)
-                    attempt = attempts.by_targets(drawn, targets, until=than)
+                    attempt = attempts.run_targets(drawn, targets, until=thresholds)
                     tried = len(attempt.rewards)
                     rng.bit_generator.state = states[tried]
                     hands, ahead = drawn[tried - 1], min(2 * ahead, _MOST_DRAWN)
@@ -110,7 +132,7 @@ class HillClimbing(Method):
                 else:
                     rewards[hands] = -np.inf
                     targets = begin(hands)
-                    attempt = attempts.by_targets([hands], targets[None])
+                    attempt = attempts.run_targets([hands], targets[None])
                     if attempt.rewards[-1] == -np.inf and np.isnan(targets).all():
                         hopeless.add(hands)
                 if attempt.rewards[-1] > rewards[hands]:

@@ -1,24 +1,27 @@
 """Prioritised null-space control by quadratic programmes: the hand first, then the joints.
 
-At every control step level 1 of the cascade (:mod:`coartic.baselines.cascade`) moves the hand
-straight towards the centre of its goal, and level 2 chooses among the joint changes x that do so,
-which differ by motion in the null space of the hand's Jacobian J. With the unit vector u from the
-hand to the centre, and lengths in lengths of a control step::
+At each control step level 1 of the cascade (:mod:`coartic.baselines.cascade`) moves the hand
+straight towards the centre of its goal. Many joint changes x do so; they differ by motion in the
+null space of the hand's Jacobian J. Level 2 chooses among them. Level 1 is::
 
     J x = v J J⁺ u,  that is  A = (J; -J),  b = A v J⁺ u,      v = min(1 / |J⁺ u|, d)
 
-The pace v is the speed of the hand in the minimum-norm solution, and never more than its distance d
-from the centre. If what level 2 adds makes the joint step longer than a control step may be, all of
-the step is shortened, and the hand goes straight and slower. Level 2 takes the x nearest to
+Here u is the unit vector from the hand to the centre, d is their distance and v is the speed of the
+hand. Lengths are in lengths of a control step. The speed is that of the minimum-norm solution, but
+at most d. If level 2 makes the joint step longer than a control step may be, the whole step is
+shortened: the hand still goes straight, but slower.
 
-- ``least-motion``: 0, so that x is v J⁺ u, nearly;
-- ``next-goal-posture``: an even step towards a posture of the next goal, which would be there when
-  the hand is at its goal, and no longer than a control step. The corrective process finds the
-  posture from where the robot stands when the goal becomes current.
+Level 2 chooses the x that is nearest to
+
+- 0 in ``least-motion``, so that x is almost v J⁺ u;
+- a step towards a posture of the next goal in ``next-goal-posture``. With equal steps of this kind
+  the robot would be in the posture when the hand is at its goal. The step is at most as long as a
+  control step. The corrective process finds the posture at the moment when a goal becomes current,
+  from the configuration of that moment.
 
 Sources: Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987), Task-priority based redundancy control of
-robot manipulators; O. Kanoun, F. Lamiraux, P.-B. Wieber (2011); the next goal as the objective of
-lower priority: K. Rohanimanesh et al. (2004), B. Thibodeau et al. (2004).
+robot manipulators; O. Kanoun, F. Lamiraux, P.-B. Wieber (2011); with the next goal as the objective
+of lower priority: K. Rohanimanesh et al. (2004), B. Thibodeau et al. (2004).
 """
 
 from __future__ import annotations
@@ -32,48 +35,68 @@ from coartic.robot import Array
 
 
 class HandController(Controller):
-    """Move the hand straight towards its goal with the least joint changes; base of the controllers
-    that prefer other changes. The memory is a configuration, shape ``(dof,)``."""
+    """Move the hand straight towards its goal with the least joint changes.
+
+    Controllers that prefer other joint changes are subclasses. The memory is a configuration, shape
+    ``(dof,)``.
+    """
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return ``q`` itself as the memory (kept from step to step), which is not used here."""
+        """Return ``q`` as the memory, which this class does not use."""
         return q
 
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: Array, first: bool
     ) -> tuple[Solution, Array, Array]:
-        """Return three things for a control step from configuration ``q``: the solution, which
-        moves the hand of the first aim straight towards its goal, to first order and if the joints
-        can, with changes as near to the preferred ones as that allows; the preferred changes,
-        ``(joints,)``, in lengths of a control step; and ``memory`` itself. ``first`` is not used.
+        """Compute a control step that moves the hand straight towards its goal, to first order.
+
+        Parameters and returned values are those of :meth:`Controller.step`. The memory does not
+        change.
         """
         jacobian = self.session.jacobian(q, aims[0].hand)[:, self.moving]
         error = self.error(q, aims[0])
         direction = error / np.linalg.norm(error)
-        pace = 1.0 / max(float(np.linalg.norm(np.linalg.pinv(jacobian) @ direction)), 1e-9)
+        speed = 1.0 / max(float(np.linalg.norm(np.linalg.pinv(jacobian) @ direction)), 1e-9)
         distance = float(np.linalg.norm(error)) / self.length
-        steps, pace = max(1.0, distance / pace), min(pace, distance)
+        steps, speed = max(1.0, distance / speed), min(speed, distance)
         preferred = self.preferred(q, memory, steps)
         rows = np.vstack([jacobian, -jacobian])
-        solution = self.solve(rows, rows @ np.linalg.pinv(jacobian) @ direction * pace, preferred)
+        solution = self.solve(rows, rows @ np.linalg.pinv(jacobian) @ direction * speed, preferred)
         return solution, preferred, memory
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the changes that are preferred in a control step, ``(joints,)``, in lengths of a
-        control step, for the coordinates that are not locked (``self.moving``): here zeros. A
-        subclass can use the configuration ``q``, ``(dof,)``, the ``memory`` of :meth:`begin`, and
-        the number of control ``steps`` to the goal."""
+        """Return the preferred joint changes of a control step: zeros, unless a subclass overrides.
+
+        Parameters
+        ----------
+        q : ndarray, shape (dof,)
+            Configuration before the step.
+        memory : ndarray, shape (dof,)
+            Memory of the controller.
+        steps : float
+            Number of control steps to the goal.
+
+        Returns
+        -------
+        ndarray, shape (joints,)
+            Changes in lengths of a control step.
+        """
         return np.zeros(len(self.moving))
 
 
 class NextGoalController(HandController):
-    """Move the hand straight towards its goal, and the joints, as far as that allows, towards a
-    posture of the next goal. The memory is this posture, shape ``(dof,)``."""
+    """Move the hand straight towards its goal, and the joints towards the next goal's posture.
+
+    The hand goes first: the joints change only as far as its movement allows. The memory is the
+    posture, shape ``(dof,)``.
+    """
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return, as the memory, the posture ``(dof,)`` in which the corrective process from ``q``
-        hits a goal ahead: the first of ``aims`` (hand and goal) after the current one for which it
-        converges. Return ``q`` itself if there is none."""
+        """Return a posture of the next goal as the memory, shape ``(dof,)``.
+
+        It is the posture in which the corrective process from ``q`` hits the first goal ahead for
+        which it converges, or ``q`` if it converges for none.
+        """
         for hand, goal in aims[1:]:
             correction = self.session.correct(q, hand, goal + 1)
             if correction.converged:
@@ -81,9 +104,11 @@ class NextGoalController(HandController):
         return q
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the joint changes from ``q`` to the posture ``memory`` divided by ``steps`` (below
-        1 as 1), for the joints that are not locked, shape ``(joints,)``, in lengths of a control
-        step; all shortened in proportion where they are longer than 1 together."""
+        """Return an equal share of the joint changes from ``q`` to the posture ``memory``.
+
+        The changes are divided by ``steps``, or by 1 if ``steps`` is smaller. If their norm is
+        above 1, they are scaled to norm 1. Shapes and units are those of the base class.
+        """
         path = (memory - q)[self.moving] / self.length
         return np.asarray(path / max(steps, float(np.linalg.norm(path)), 1.0))
 

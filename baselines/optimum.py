@@ -1,13 +1,15 @@
 """The search for the optimum: the best reward that a global search finds.
 
-Reward is lost in proportion to the joint-space path, so the shortest path that touches every disc
-in turn is sought over hand sequences, from the chains of posture graphs (layered dynamic
-programming). Plans that may be best are then rounded to whole control ticks, with and without goals
-that are hit as their turn comes because the hand is already there. A reference for the gaps of all
-other methods, not a competitor. Bounds on the optima are proven in ``studies/optima``.
+A trial loses reward in proportion to the length of its path in joint space. So this method
+searches, over hand sequences, for the shortest path that touches the discs of all goals in turn. It
+starts from the chains of posture graphs (layered dynamic programming). It then rounds the plans
+that may be best to whole control ticks. In some roundings a goal takes no movement, because the
+hand is already inside the goal when its turn comes.
 
-Another search for the same paths is ``trajectory-optimisation/path-length``, from graphs and starts
-of its own.
+The method is the reference for the gaps of all other methods, not a competitor. The study
+``studies/optima`` proves bounds on the optima.
+
+``trajectory-optimisation/path-length`` searches for the same paths from other graphs and starts.
 """
 
 from __future__ import annotations
@@ -23,24 +25,25 @@ from coartic.baselines.trajectory_problem import trajectory_problem
 from coartic.method import Method, MethodError, Parameters, Result, Session
 from coartic.tasks.task import letters_of
 
-MOST_KEPT = 64  # hand sequences whose shortest paths are kept with the solution
+MOST_KEPT = 64  # hand sequences whose shortest paths are stored with the solution
 
 
 class OptimumParameters(Parameters):
     """Restriction of the movements, and effort of the search."""
 
     other_arm: Literal["free", "still"] = "free"
-    """``still``: the arm whose hand is not chosen for a goal does not move on the way to it."""
+    """``"free"``, or ``"still"`` if the arm whose hand is not chosen for a goal must not move on
+    the way to the goal."""
     base: Literal["task", "y", "xy"] = "task"
-    """Base coordinates that are locked in addition to the task's own locks: ``y``, ``xy``, or none
-    for ``task``."""
+    """Base coordinates to lock in addition to the task's own locks: ``"y"``, ``"xy"``, or
+    ``"task"`` for none."""
     nodes: Nodes = 200
-    """Most postures per goal and hand in a graph."""
+    """Most postures for a goal and hand in a graph."""
     graphs: Count = 3
-    """Independent graphs; more are made while chains are too few."""
+    """Least number of independent graphs. More are made until there are enough chains."""
     chains: Count = 100
-    """Least number of chains, over all graphs and hand sequences. With three, the best path known
-    was missed on 9 of 40 random tasks for one arm."""
+    """Least number of chains, over all graphs and hand sequences. With three chains the search
+    missed the best known path on 9 of 40 random tasks for one arm."""
 
 
 class OptimumSearch(Method):
@@ -60,9 +63,24 @@ class OptimumSearch(Method):
     quick = QUICK
 
     def solve(self, session: Session) -> Result:
-        """Search for the shortest path over hand sequences (at most 64 a graph), round plans to
-        whole ticks, and return the movements with the fewest ticks found. Raises MethodError if no
-        movements that hit every goal are found, and if locks of the base make the task invalid."""
+        """Search for the movements with the fewest ticks.
+
+        At most 64 hand sequences are searched in each graph.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            No movements that hit every goal are found, or the locks of the base make the task
+            invalid.
+        """
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
         task = with_locks(session.reveal(*self.information), parameters.base)
@@ -93,9 +111,19 @@ class OptimumSearch(Method):
 
 
 def with_locks(task: Task, base: str) -> Task:
-    """Return a task with base coordinates locked in addition to its own: ``base`` is ``"y"``,
-    ``"xy"``, or ``"task"`` for none, which returns the task itself. Raises MethodError if the task
-    with these locks is not valid."""
+    """Return a task with further base coordinates locked.
+
+    Parameters
+    ----------
+    task : Task
+    base : {"task", "y", "xy"}
+        Coordinates to lock; ``"task"`` for none.
+
+    Raises
+    ------
+    MethodError
+        The task with these locks is not valid.
+    """
     if base == "task":
         return task
     locked = sorted({*task.locked_base, *base})

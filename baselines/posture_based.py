@@ -1,24 +1,30 @@
 """Posture-based planning: stored postures, a constraint hierarchy, diffusion.
 
-For every goal a posture is planned first, then the straight joint-space movement to it
+For each goal the planner first finds a posture, and then moves to it straight in joint space
 (Rosenbaum, Meulenbroek, Vaughan & Jansen 2001):
 
-1. *Instance retrieval.* Of the stored postures, corrected, first all survive whose hand is at the
-   goal, then the posture with the least cost of travel.
-2. *Instance generation.* Postures that resemble it are generated and evaluated in the same way
-   until a deadline. What a generated posture lacks in accuracy, feedforward correction makes up for
+1. *Instance retrieval.* The stored postures are corrected towards the goal. Among those whose hand
+   is then at the goal, the posture with the least cost of travel is retrieved.
+2. *Instance generation.* Until a deadline the planner generates postures that resemble the
+   retrieved one, and evaluates them in the same way. Feedforward correction improves their accuracy
    (Rosenbaum, Loukopoulos, Meulenbroek, Vaughan & Engelbrecht 1995).
-3. An internal simulation says where the movement ends; the planned postures join the store.
+3. An internal simulation computes where the movement ends. The planned postures are added to the
+   store.
 
-With a horizon of two goals the cost of travel includes the way on to a posture for the next goal.
-Only the first movement is made; the second posture is planned again from there. The authors name
-anticipation as an extension (1995); this form is ours.
+With a horizon of two goals the cost of travel includes the path from the posture to a posture for
+the next goal. Only the first movement is made. The second posture is planned again when the first
+goal is hit. The authors name anticipation as an extension (1995); this form of it is ours.
 
-Where this differs from the theory: the cost of travel is the joint-space distance, which the tasks
-charge, not each joint's expense. The hierarchy has two levels: there are no obstacles. The store
-begins with random postures of the arms about the start, with the base wherever that takes the hand
-to the goal. Diffusion gets narrower until the deadline, about a weighted sum of the better postures
-(the rule of 1995), so that it converges. The hand is planned with the posture.
+The method differs from the theory in these points:
+
+- The cost of travel is the joint-space distance, because the tasks charge it. In the theory each
+  joint has its own expense.
+- The hierarchy has two levels, because there are no obstacles.
+- The store begins with random postures of the arms around the start. The base is placed so that the
+  hand is at the goal.
+- Diffusion becomes narrower until the deadline, around a weighted sum of the better postures (the
+  rule of 1995). This makes it converge.
+- The hand is planned together with the posture.
 """
 
 from __future__ import annotations
@@ -42,14 +48,14 @@ from coartic.robot import BASE_DOF, Array, Hand
 Mask = NDArray[np.bool_]
 
 PER_ROUND = 60
-"""Postures generated in a round for each hand sequence."""
+"""Number of postures that a round generates for each hand sequence."""
 # Feedforward correction: damped Gauss-Newton steps on the hand's error.
 _DAMPING = 1e-3  # length unit squared: the Jacobian of a straight arm is singular
-_LONGEST = 0.5  # length unit: most of the error that one step takes on
-_RETRIEVED = 40  # steps for a stored posture, which may be far off
-_GENERATED = 3  # steps for a generated one, which is close by
-_INSIDE = 0.999  # part of the tolerated error that is aimed at
-_SPREAD = 1.0  # largest SD of stored postures about the starting posture, rad
+_LONGEST = 0.5  # length unit: largest part of the error that one step corrects
+_RETRIEVED = 40  # steps for a stored posture, which may be far from the goal
+_GENERATED = 3  # steps for a generated posture, which is near the goal
+_INSIDE = 0.999  # a step aims at this part of the tolerated error
+_SPREAD = 1.0  # largest SD of stored postures around the starting posture, rad
 _FIRST_SD = 0.3  # first SD of the diffusion, length unit (base) or rad (joints)
 _LAST_SD = 0.01  # last SD of the diffusion, as a part of the first
 
@@ -57,20 +63,24 @@ _LAST_SD = 0.01  # last SD of the diffusion, as a part of the first
 class PostureBasedParameters(Parameters):
     """Parameters of posture-based planning.
 
-    Tried by hand: over 5 seeds on each shipped task 50, 300 and 1000 stored postures (mean rewards
-    within 3 of each other); over 6 seeds on the first two goals of three tasks 60 and 100 rounds of
-    60, 40 of 100, first SDs of 0.1 and 0.3, last ones of 0.001 and 0.01 of these (within 3 ticks),
-    equal weights, and diffusion at all widths in each round (up to 4 ticks).
+    These settings were tried by hand:
+
+    - 50, 300 and 1000 stored postures, over 5 seeds on each shipped task: mean rewards are within 3
+      of each other;
+    - 60 and 100 rounds of 60 postures, 40 rounds of 100, first SDs of 0.1 and 0.3, and last SDs of
+      0.001 and 0.01 of the first, over 6 seeds on the first two goals of three tasks: within 3
+      ticks;
+    - equal weights, and diffusion at all widths in each round, on the same goals: up to 4 ticks.
     """
 
     stored: Annotated[int, Field(ge=0, le=2000)] = 300
-    """Random postures in the first store, in addition to the starting posture."""
+    """Number of random postures in the first store, in addition to the starting posture."""
     rounds: Annotated[int, Field(ge=0)] = 60
-    """Rounds of generation for each goal, until the deadline."""
+    """Number of rounds of generation for each goal; the last one is the deadline."""
 
 
 class PostureBased(Method):
-    """Posture-based planning that looks at ``horizon`` goals at a time, one or two."""
+    """Base of posture-based planning, which plans for ``horizon`` goals (1 or 2) at a time."""
 
     version = 2
     horizon: ClassVar[Literal[1, 2]]
@@ -85,8 +95,21 @@ class PostureBased(Method):
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
 
     def solve(self, session: Session) -> Result:
-        """Plan a movement for each goal, from where the movement before it is expected to end;
-        return the movements. Raises MethodError if correction brings no posture to a goal."""
+        """Plan a movement to each goal from the expected end of the movement before.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            Correction brings no posture to a goal.
+        """
         with session.building():
             planner = PosturePlanner(session, self.parameters, self.horizon)
         with session.solving():
@@ -95,7 +118,7 @@ class PostureBased(Method):
 
 
 class OneGoal(PostureBased):
-    """Posture-based planning of each posture for its own goal alone."""
+    """Posture-based planning of each posture for its own goal only."""
 
     name = "posture-based/one-goal"
     title = "Posture-based planning, one goal at a time"
@@ -114,8 +137,11 @@ METHODS: tuple[type[Method], ...] = (OneGoal, TwoGoals)
 
 
 class PosturePlanner:
-    """Plan movements from ``store``, postures of shape ``(n, dof)``; ``q`` is the configuration in
-    which the movements planned so far are expected to end."""
+    """Plan the movements of a task from a store of postures.
+
+    Attribute ``store`` has the postures, shape ``(n, dof)``. Attribute ``q`` is the configuration
+    in which the movements planned so far are expected to end, shape ``(dof,)``.
+    """
 
     def __init__(
         self, session: Session, parameters: PostureBasedParameters, horizon: Literal[1, 2]
@@ -125,7 +151,8 @@ class PosturePlanner:
         self.horizon = horizon
         self.robot = session.reveal(Information.FORWARD_KINEMATICS, Information.JACOBIAN).robot
         self.goals = session.goals
-        # ‖F(q) − x_g‖ of a target at most θ^g − θ^a: the movement hits before it arrives.
+        # A target this near to the goal's centre, the radius less the arrival tolerance, is hit
+        # before the movement arrives.
         arrival, _ = session.model.tolerances(session.radius)
         self.tolerance = session.radius - arrival
         self.base_and_arm = {hand: np.zeros(session.dof, bool) for hand in session.hands}
@@ -133,8 +160,8 @@ class PosturePlanner:
             mask[:BASE_DOF] = mask[session.joints(hand)] = True
         self.movable: Mask = explored_joints(session)
         self.free = {hand: self.movable & mask for hand, mask in self.base_and_arm.items()}
-        """True for joints that may move towards a posture for each hand, shape ``(dof,)``."""
-        # SDs from zero up: dense near the start, sparse far from it.
+        """True for joints that may move towards a posture, by hand, shape ``(dof,)``."""
+        # SDs are uniform from zero: postures are dense near the start and sparse far from it.
         sds = _SPREAD * session.rng.uniform(size=(parameters.stored, 1))
         noise = session.rng.standard_normal((parameters.stored, session.dof))
         self.q = session.q0
@@ -144,9 +171,22 @@ class PosturePlanner:
         self.weights = np.log(better + 0.5) - np.log(np.arange(1, better + 1))
 
     def plan(self) -> tuple[tuple[Movement, ...], list[int]]:
-        """Return the movement to each goal, and the ticks that each movement is expected to take.
-        To be called once: ``q`` and ``store`` of the planner change. Raises MethodError if there is
-        a goal to which correction brings no posture (:meth:`retrieve`)."""
+        """Plan the movements to all goals.
+
+        Call it once: it changes ``q`` and ``store``.
+
+        Returns
+        -------
+        tuple of Movement
+            The movement to each goal.
+        list of int
+            Ticks that each movement is expected to take.
+
+        Raises
+        ------
+        MethodError
+            Correction brings no posture to a goal.
+        """
         movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
             ahead = range(goal, min(goal + self.horizon, len(self.goals)))
@@ -162,15 +202,16 @@ class PosturePlanner:
                 able = {goal for (goal, _), postures in retrieved.items() if len(postures)}
                 raise MethodError(
                     "infeasible",
-                    f"goal {min({*ahead} - able) + 1}: no correction of any of {len(self.store)} "
-                    f"stored postures puts the {' or '.join(self.session.hands)} hand within "
-                    f"{self.tolerance:g} of it",
+                    f"goal {min({*ahead} - able) + 1}: correction brings none of "
+                    f"{len(self.store)} stored postures to it, with the "
+                    f"{' or '.join(self.session.hands)} hand within {self.tolerance:g} length "
+                    "units of its centre",
                 )
             chains = self.generate(promising, np.stack(noise), ahead)
             _, (hand, *_), postures = min(chains, key=lambda chain: chain[0])
             self.store = np.vstack([self.store, postures])
             movements.append(Movement(goal + 1, hand, "planned", postures[0]))
-            # Internal simulation: where the movement hits the goal, and the ticks until then.
+            # Internal simulation of the movement until it hits the goal.
             distance = float(np.linalg.norm(postures[0] - self.q))
             along = np.arange(math.ceil(distance / step))[:, None] * step
             line = self.q + along / max(distance, step) * (postures[0] - self.q)
@@ -182,11 +223,25 @@ class PosturePlanner:
         return tuple(movements), ticks
 
     def retrieve(self, goals: range) -> Layers:
-        """Return, by goal (from 0) and hand, postures ``(n, dof)`` with the hand at the goal. Each
-        has the angles of the hand's arm from a posture of the planner's ``store``, and all else
-        from the planner's ``q``, where the robot is to stand. Each free base coordinate is moved by
-        the way from hand to goal; then base and arm are corrected (:meth:`correct`). Postures that
-        are not at the goal then are left out."""
+        """Return postures with a hand at a goal, from the store.
+
+        A posture is made in three steps:
+
+        1. It has the angles of the hand's arm from a stored posture, and all else from ``q``.
+        2. The free base coordinates move by the displacement from the hand to the goal.
+        3. Base and arm are corrected (:meth:`correct`). Postures whose hand is still not at the
+           goal are left out.
+
+        Parameters
+        ----------
+        goals : range
+            Numbers of the goals, from 0.
+
+        Returns
+        -------
+        dict
+            Postures, shape ``(n, dof)``, by goal and hand.
+        """
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
             postures = np.tile(self.q, (len(self.store), 1))
@@ -198,31 +253,58 @@ class PosturePlanner:
         return retrieved
 
     def most_promising(self, hands: HandSequence, layers: list[Array]) -> Array:
-        """Return the sequence of postures with the shortest joint-space path from the planner's
-        ``q``, one out of each of ``layers``, the retrieved postures ``(n, dof)`` for one goal or
-        for two goals in turn, hit by ``hands``; shape ``(goals, dof)``. From the first to the
-        second only base and arm of the second hand move: the other arm stays as in the first."""
-        first = layers[0]
-        cost = np.linalg.norm(first - self.q, axis=1)
+        """Return the retrieved postures with the shortest joint-space path from ``q``.
+
+        On the way to a second posture only the base and the arm of its hand move.
+
+        Parameters
+        ----------
+        hands : tuple of str
+            Hand of each goal.
+        layers : list of ndarray, shape (n, dof)
+            Retrieved postures of one goal, or of two goals in turn.
+
+        Returns
+        -------
+        ndarray, shape (goals, dof)
+            A posture for each goal.
+        """
+        postures = layers[0]
+        cost = np.linalg.norm(postures - self.q, axis=1)
         if len(layers) == 1:
-            return first[[np.argmin(cost)]]
-        second = layers[1]
+            return postures[[np.argmin(cost)]]
+        next_postures = layers[1]
         used = self.base_and_arm[hands[1]]
-        # No posture that alone costs more than some pair can be the first of the best pair.
-        onward = np.linalg.norm(first[np.argmin(cost)][used] - second[:, used], axis=1)
+        # A posture that costs more than some pair cannot begin the best pair.
+        onward = np.linalg.norm(postures[np.argmin(cost)][used] - next_postures[:, used], axis=1)
         near = np.flatnonzero(cost <= cost.min() + onward.min())
-        onward = np.linalg.norm(first[near][:, None, used] - second[None][:, :, used], axis=2)
+        onward = np.linalg.norm(
+            postures[near][:, None, used] - next_postures[None][:, :, used], axis=2
+        )
         i, j = np.unravel_index(np.argmin(cost[near][:, None] + onward), onward.shape)
         i = near[i]
-        return np.stack([first[i], np.where(used, second[j], first[i])])
+        return np.stack([postures[i], np.where(used, next_postures[j], postures[i])])
 
     def generate(
         self, promising: dict[HandSequence, Array], noises: Array, goals: range
     ) -> list[tuple[float, HandSequence, Array]]:
-        """Return for each hand sequence the cheapest postures ``(goals, dof)`` found around its
-        ``promising`` postures, these included, as a triple: their cost (joint-space length of the
-        path from the planner's ``q``), the hands, the postures. ``noises`` are standard normal,
-        shape ``(hand sequences, rounds, PER_ROUND, goals, dof)``; ``goals`` are from 0."""
+        """Generate postures around the retrieved ones, and return the cheapest.
+
+        Parameters
+        ----------
+        promising : dict
+            Retrieved postures, shape ``(goals, dof)``, by hand sequence.
+        noises : ndarray, shape (hand sequences, rounds, PER_ROUND, goals, dof)
+            Standard normal noise.
+        goals : range
+            Numbers of the goals, from 0.
+
+        Returns
+        -------
+        list of tuple
+            For each hand sequence: the cost of its cheapest postures (joint-space length of the
+            path from ``q`` through them), the hand sequence, and the postures, ``(goals, dof)``.
+        """
         sequences = [*promising]
         centre = best = np.stack([*promising.values()])
         costs = _path_length(self.q, best)
@@ -230,7 +312,7 @@ class PosturePlanner:
             noise = sd * noises[:, number]
             noise[:, 0] = 0.0  # the weighted sum itself is evaluated, too
             postures = centre[:, None] + noise
-            # Corrected goal by goal, the arm that is not chosen standing where it stood before.
+            # Postures are corrected goal by goal. The arm that is not chosen does not move.
             accurate = np.ones(postures.shape[:2], bool)
             before = np.broadcast_to(self.q, (*postures.shape[:2], postures.shape[-1])).copy()
             for k, goal in enumerate(goals):
@@ -254,9 +336,24 @@ class PosturePlanner:
         return list(zip(costs.tolist(), sequences, best, strict=True))
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
-        """Bring a hand of contiguous postures ``(..., dof)``, in place, towards a goal (from 0), in
-        at most ``steps`` steps each; return True where the hand is then within the planner's
-        ``tolerance`` of the goal's centre, shape ``(...)``. The session counts the evaluations."""
+        """Move a hand towards a goal, by changing postures in place.
+
+        Parameters
+        ----------
+        postures : ndarray, shape (..., dof)
+            Contiguous postures, which are changed.
+        goal : int
+            Number of the goal, from 0.
+        hand : {"left", "right"}
+        steps : int
+            Most steps for a posture.
+
+        Returns
+        -------
+        ndarray of bool, shape (...)
+            True where the hand is then within ``tolerance`` of the goal's centre. The session
+            counts the evaluations.
+        """
         flat = postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)
         far = np.arange(len(flat))
@@ -276,9 +373,9 @@ class PosturePlanner:
             transpose = across.transpose(0, 2, 1)
             gram = across @ transpose + _DAMPING * np.eye(2)
             flat[far] += (transpose @ np.linalg.solve(gram, wanted[:left]))[..., 0]
-        there = np.ones(len(flat), bool)
-        there[far] = False
-        return there.reshape(postures.shape[:-1])
+        at_goal = np.ones(len(flat), bool)
+        at_goal[far] = False
+        return at_goal.reshape(postures.shape[:-1])
 
 
 @entry
@@ -294,10 +391,13 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Keep at the beginning of ``far``, indices of rows of ``postures``, the indices of postures
-    whose hand is farther than ``tolerance`` from (x, y); return their number. For each kept index
-    fill a row of ``wanted``, the hand's step towards (x, y), shortened, and of ``jacobian``, the
-    columns of the arm's joints. ``xs`` and ``ys`` are space for the points of an arm."""
+    """Linearise the hand of the postures that are still far from (x, y); return their number.
+
+    ``far`` has indices of rows of ``postures``. The indices of postures whose hand is farther than
+    ``tolerance`` are moved to its beginning. For each of them a row of ``wanted`` gets the hand's
+    step towards (x, y), at most 0.5 long, and a row of ``jacobian`` gets the columns of the arm's
+    joints. ``xs`` and ``ys`` are work space for the points of an arm.
+    """
     tip = len(arm.links)
     left = 0
     for row in far:  # with the C library's cosine and sine, as in the robot's own kinematics
@@ -319,8 +419,10 @@ def _linearise_far(
 
 
 def _path_length(q: Array, postures: Array) -> Array:
-    """Return the joint-space length of the path from ``q`` ``(dof,)`` through k postures in turn,
-    shape ``(...)`` for postures ``(..., k, dof)``."""
+    """Return the joint-space length of paths from ``q`` ``(dof,)`` through k postures in turn.
+
+    The result has shape ``(...)`` for postures of shape ``(..., k, dof)``.
+    """
     start = np.broadcast_to(q, (*postures.shape[:-2], 1, postures.shape[-1]))
     legs = np.diff(np.concatenate([start, postures], axis=-2), axis=-2)
     length: Array = np.linalg.norm(legs, axis=-1).sum(axis=-1)

@@ -1,10 +1,11 @@
 """Layered dynamic programming over sampled inverse-kinematics postures and hands.
 
-A layer is a goal; its nodes are postures (base and one arm) that put a hand inside the
-goal's disc. A movement moves the base and the arm that is chosen; the other arm keeps the
-posture it was last used in. The state at a goal is therefore a pair of nodes, one for
-each arm, and the cheapest chain for a hand sequence follows exactly, given the nodes.
-It is the global part of a search whose local part is :mod:`coartic.baselines.trajectory_problem`.
+Each goal is a layer. Its nodes are postures (base and one arm) that put a hand inside the goal's
+disc. A movement moves the base and the chosen arm; the other arm stays in the posture in which it
+was last used. So the state at a goal is a pair of nodes, one for each arm, and dynamic programming
+finds the cheapest chain of nodes for a hand sequence exactly.
+
+This is the global part of a search. The local part is :mod:`coartic.baselines.trajectory_problem`.
 """
 
 from __future__ import annotations
@@ -23,39 +24,42 @@ from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task
 
 KINEMATICS = frozenset({Information.GOALS, Information.FORWARD_KINEMATICS, Information.JACOBIAN})
-"""Information of a planner about goals and hands."""
+"""Information that planners use about goals and hands."""
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
-"""A hand sequence with a configuration per goal, ``(G, dof)``, as a start of a solver."""
+"""A hand sequence with a configuration for each goal, ``(G, dof)``, from which a solver starts."""
 Layers = dict[tuple[int, Hand], Array]
-"""Nodes of each goal (0-based) and hand, shape ``(n, dof)``."""
+"""Nodes, shape ``(n, dof)``, by goal (from 0) and hand."""
 Nodes = Annotated[int, Field(ge=10, le=1000)]
 """Parameter: number of samples for a layer."""
 Count = Annotated[int, Field(ge=1)]
 """Parameter: a number of graphs, chains or starts."""
 BEAM_WIDTH = 64
-"""Most hand sequences that are planned for each graph: all sequences of two hands for up to six
-goals; of more sequences those with which a beam search of this width over the goals ends."""
+"""Most hand sequences that are planned for each graph. With two hands these are all sequences for
+up to six goals. For more goals a beam search of this width over the goals chooses the sequences."""
 QUICK = {"nodes": 40, "graphs": 1, "chains": 1}
-"""Parameters of a planner for a check in seconds."""
+"""Parameters of a planner for a check that takes seconds."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
-_NARROWEST, _WIDEST = 0.05, 1.5  # spread of samples, length unit and rad
-_NEAR = 2.0  # length unit: from farther away the base carries the hand there first
+_NARROWEST, _WIDEST = 0.05, 1.5  # SD of samples, length unit (base) and rad (joints)
+_NEAR = 2.0  # length unit: at a larger distance the base first moves the hand this near
 
 
 def _sample_postures(
     task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
-    """Bring a sample around each of ``starts``, ``(count, dof)``, with ``hand`` to a random point
-    of the disc of goal ``goal`` (from 0); return the samples that get into the disc, ``(n, dof)``.
-    The other arm stays as in its start. Evaluations are added to ``spent``, in place."""
+    """Sample a posture around each of ``starts`` that puts a hand inside a goal's disc.
+
+    Samples that do not get into the disc are left out. The other arm stays as in its start.
+    ``starts`` has shape ``(count, dof)``, the result ``(n, dof)``; ``goal`` is from 0. Evaluations
+    are added to ``spent``.
+    """
     robot, count = task.robot, len(starts)
     moving = np.zeros(robot.dof, dtype=np.bool_)
     moving[robot.joints(hand)] = True
     moving[:BASE_DOF] = ["x" not in task.locked_base, "y" not in task.locked_base]
     spread = _NARROWEST * (_WIDEST / _NARROWEST) ** rng.random((count, 1))
     q = starts + spread * rng.standard_normal((count, robot.dof)) * moving
-    # Anywhere in the disc, more often towards its rim, where short paths end.
+    # Aim at random points of the disc, more often near its rim, where short paths end.
     offset = rng.standard_normal((count, 2))
     offset *= task.radius * rng.random((count, 1)) ** 0.25 / np.linalg.norm(offset, axis=1)[:, None]
     aim = task.goal_array[goal] + 0.98 * offset
@@ -82,22 +86,35 @@ class Beginning(NamedTuple):
 
     hands: HandSequence
     nodes: dict[Hand, Array]
-    """Nodes of the layer in which each hand was last used, ``(n, dof)``; else the start."""
+    """Nodes of the layer in which each hand was last used, shape ``(n, dof)``. For a hand that was
+    not used yet, it is the start."""
     cost: Array
-    """``cost[i, j]``: the joint-space length of the shortest chain to node i of the hand used last
-    and node j of the other hand."""
+    """``cost[i, j]`` is the joint-space length of the shortest chain to node i of the hand used
+    last and node j of the other hand."""
     back: tuple[NDArray[np.int32], ...]
-    """For each goal, ``back[i, j]``: the index of the node from which the goal's hand came to this
-    state."""
+    """For each goal, ``back[i, j]`` is the index of the node from which the goal's hand came to
+    this state."""
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
-    """Sample at most ``count`` nodes (postures with the hand in the goal, ``(n, dof)``), or none,
-    for each goal and hand; return them by ``(goal, hand)``, goals from 0, and the numbers of
-    ``forward_kinematics`` and ``jacobians`` evaluated.
+    """Sample postures with the hand in the goal, for each goal and hand.
 
-    Half of the samples begin at nodes of the goal before, by whichever hand, if it has any; others
-    begin at the start.
+    Half of the samples begin at nodes of the goal before, with either hand, if there are any. The
+    other samples begin at the task's start.
+
+    Parameters
+    ----------
+    task : Task
+    count : int
+        Number of samples for a goal and hand. Samples that miss the goal are left out.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    dict
+        Nodes, shape ``(n, dof)``, by goal (from 0) and hand.
+    Counter
+        Numbers of ``forward_kinematics`` and ``jacobians`` evaluated.
     """
     spent: Counter[str] = Counter()
     layers: Layers = {}
@@ -114,18 +131,31 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
 
 
 def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain]:
-    """Return the cheapest chain of nodes of each hand sequence that has a chain, in alphabetical
-    order: the hands, and a configuration for each goal. At each goal the ``most`` cheapest
-    beginnings of sequences are kept (None: all); if there are at most so many sequences, no chain
-    is lost."""
+    """Find the cheapest chain of nodes of each hand sequence.
+
+    Parameters
+    ----------
+    task : Task
+    layers : dict
+        Nodes, shape ``(n, dof)``, by goal (from 0) and hand.
+    most : int, optional
+        Width of the beam search: at each goal it continues with so many cheapest beginnings of
+        sequences. By default it continues with all.
+
+    Returns
+    -------
+    list of tuple
+        Hand sequence and configurations, shape ``(G, dof)``, of each chain, in alphabetical order
+        of the hands. Hand sequences without a chain are left out.
+    """
     start = dict.fromkeys(HANDS, np.array(task.q0)[None, :])
-    kept = [Beginning((), start, np.zeros((1, 1)), ())]
+    beam = [Beginning((), start, np.zeros((1, 1)), ())]
     for _ in range(len(task.goals)):
-        longer = [more for beginning in kept for more in _extend(task, layers, beginning)]
+        longer = [extended for begun in beam for extended in _extend(task, layers, begun)]
         ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
-        kept = [longer[i] for i in sorted(ranked[:most])]
+        beam = [longer[i] for i in sorted(ranked[:most])]
     chains: list[Chain] = []
-    for hands, _, cost, back in kept:
+    for hands, _, cost, back in beam:
         i, j = np.unravel_index(cost.argmin(), cost.shape)
         picked = []
         for goal in reversed(range(len(hands))):
@@ -144,8 +174,7 @@ def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain
 
 
 def _extend(task: Task, layers: Layers, begun: Beginning) -> Iterator[Beginning]:
-    """Yield ``begun``, the cheapest chains for the beginning of a hand sequence, extended by one
-    goal, once for each hand that has a node for it in ``layers``, left before right."""
+    """Yield ``begun`` extended by one goal, for each hand that has a node at this goal."""
     hands, nodes, cost, back = begun
     goal = len(hands)
     for hand in sorted(task.hands):  # left before right
@@ -155,8 +184,8 @@ def _extend(task: Task, layers: Layers, begun: Beginning) -> Iterator[Beginning]
         last = hands[-1] if hands else hand
         base = _squared_distances(nodes[last], layer, slice(0, BASE_DOF))
         arm = _squared_distances(nodes[hand], layer, task.robot.joints(hand))
-        # A hand comes from its own node. If it is the last one, (i, j) leads to (k, j) by the
-        # least over i, else to (k, i) by the least over j.
+        # A hand comes from its own node. If it was used last, (i, j) leads to (k, j) by the
+        # minimum over i, else to (k, i) by the minimum over j.
         came_from, step = (cost, np.sqrt(base + arm)) if hand == last else (cost.T, None)
         came = np.empty((len(layer), came_from.shape[1]), dtype=np.int32)
         reached = np.empty(came.shape)
@@ -178,12 +207,36 @@ def cheapest_chains(
     most: int = BEAM_WIDTH,
     spread: bool = False,
 ) -> Iterator[Chain]:
-    """Yield hands and configurations ``(G, dof)`` of the cheapest chain of each hand sequence, at
-    most ``most`` a graph in alphabetical order (:func:`chains_of`), of ``graphs`` random graphs
-    with at most ``nodes`` postures per goal and hand, then of more graphs until at least ``chains``
-    are yielded. With ``spread`` and two hands each chain is followed by a copy in which the idle
-    arm moves in equal steps (:func:`move_other_arm`), which does not count for ``chains``. The
-    session counts the evaluations. Raises MethodError if a goal has no posture in a graph."""
+    """Yield the cheapest chain of each hand sequence from random posture graphs.
+
+    Parameters
+    ----------
+    session : Session
+        Session that counts the evaluations.
+    task : Task
+    rng : numpy.random.Generator
+    nodes : int
+        Number of samples for a goal and hand of a graph.
+    graphs : int
+        Least number of graphs.
+    chains : int
+        Least number of chains. More graphs are made until there are so many.
+    most : int
+        Most hand sequences of a graph (:func:`chains_of`).
+    spread : bool
+        True to yield, after each chain of a task for two hands, a copy in which the idle arm moves
+        in equal steps (:func:`move_other_arm`). The copies do not count for ``chains``.
+
+    Yields
+    ------
+    tuple
+        Hand sequence and configurations, shape ``(G, dof)``.
+
+    Raises
+    ------
+    MethodError
+        A goal has no posture in a graph.
+    """
     yielded = 0
     for number in itertools.count(1):
         layers, spent = sample_layers(task, nodes, rng)
@@ -192,7 +245,7 @@ def cheapest_chains(
         if missing := {*range(len(task.goals))} - able:
             raise MethodError(
                 "infeasible",
-                f"goal {min(missing) + 1}: no posture was found that puts the "
+                f"goal {min(missing) + 1}: the search found no posture with the "
                 f"{' or the '.join(task.hands)} hand inside its disc",
             )
         for hands, configurations in chains_of(task, layers, most):
@@ -205,9 +258,23 @@ def cheapest_chains(
 
 
 def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
-    """Return a copy of a chain's configurations, shape ``(G, dof)``, with ``hands`` for its goals,
-    in which each arm moves in equal steps, goal by goal, from the start to the first goal that its
-    hand hits and from each such goal to the next; after its last goal it keeps still."""
+    """Return a copy of a chain in which idle arms move towards their next posture.
+
+    From the start to the first goal that its hand hits, and from each such goal to the next, an arm
+    moves in equal steps, goal by goal. After its last goal it does not move.
+
+    Parameters
+    ----------
+    task : Task
+    hands : tuple of str
+        Hand of each goal.
+    chain : ndarray, shape (G, dof)
+        Configuration at each goal.
+
+    Returns
+    -------
+    ndarray, shape (G, dof)
+    """
     configurations = chain.copy()
     for hand in task.hands:
         joints = task.robot.joints(hand)
@@ -221,7 +288,9 @@ def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
 
 
 def _squared_distances(before: Array, after: Array, joints: slice) -> Array:
-    """Return the squared distances, over some joints, of each configuration of ``before`` ``(n,
-    dof)`` from each of ``after`` ``(m, dof)``: shape ``(n, m)``."""
+    """Return the squared distances over some joints between two sets of configurations.
+
+    ``before`` has shape ``(n, dof)``, ``after`` ``(m, dof)``, and the result ``(n, m)``.
+    """
     difference = before[:, None, joints] - after[None, :, joints]
     return np.asarray((difference**2).sum(axis=-1))

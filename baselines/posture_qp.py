@@ -1,50 +1,54 @@
 """Posture QP: a controller that goes straight in joint space to postures that hit the goals.
 
-It plans postures more than it controls in the null space (:mod:`coartic.baselines.nullspace_qp`):
-the priority of the hand hardly ever binds (``details`` of a run count how often), because the
-joints prefer to go straight to a posture that hits the goal.
+Unlike null-space control (:mod:`coartic.baselines.nullspace_qp`), it mainly plans postures. The
+priority of the hand rarely binds, because the joints prefer to go straight to a posture that hits
+the goal. The ``details`` of a run count how often it binds.
 
-The controller keeps a **posture** for the current goal and for each goal that it looks ahead to.
-Both the postures and the control steps are answers of one cascade (:mod:`coartic.baselines.
-cascade`): level 1 asks for a hand in a disc, level 2 for what the joints prefer. With p(q) the
-hand, J its Jacobian, c and r the centre and radius of the disc, and n_i the normals of a regular
-polygon in the unit circle, in place of the disc stands
+The controller has a **posture** for the current goal and for each goal ahead. The cascade
+(:mod:`coartic.baselines.cascade`) computes both the changes of postures and the control steps:
+level 1 puts the hand into a disc, and level 2 moves the joints towards the preferred configuration.
+A regular polygon replaces the disc, so that the constraint is linear in the change x of the
+joints::
 
-    n_i · (c - p(q) - J x) <= ρ  for all i,  that is  A = (n_i · J),  b = (n_i · (c - p(q)) - ρ),
+    n_i · (c - p(q) - J x) <= ρ  for all i,  that is  A = (n_i · J),  b = (n_i · (c - p(q)) - ρ)
 
-linear in the change x of the joints, where ρ is the distance of the polygon's sides from c.
+Here p(q) is the position of the hand, J its Jacobian, c the centre of the disc, n_i are the normals
+of the polygon's sides and ρ is their distance from c.
 
-- A posture has its hand in its goal's disc. Of such postures it makes, locally, the path from one
-  to the next shortest in the metric of the reward, which is Euclidean in joint space.
-- A control step has the hand in a disc about the goal that shrinks from where the hand is towards
-  the goal's own; the joints prefer to go straight to the posture. So the hand comes nearer step
-  by step, on whatever path suits the joints.
+- A posture has its hand in its goal's disc. Changes of postures make the path from one posture to
+  the next shorter, in the metric of the reward, which is Euclidean in joint space. They find a
+  local minimum.
+- A control step has the hand in a disc around the goal that shrinks from the hand's present
+  distance to the goal's radius. The joints prefer to go straight to the posture. So the hand comes
+  nearer step by step, on any path that suits the joints.
 
-Postures are found once for each goal to come and kept up by a step of the same kind at every
-control step except the first to a goal. The objective decides which posture hits the current goal:
+A posture is found once for each goal. Later each control step, except the first step to a goal,
+also makes a step of the postures. The objective decides which posture hits the current goal:
 
-- current goal: the nearest to where the robot stands;
-- goals ahead: the posture from which the path on to the next goal's posture is shortest, too. The
-  next goal's posture is itself chosen with a view to the goal after it.
+- ``current-goal``: the posture that is nearest to the robot's configuration;
+- ``goals-ahead``: the posture for which the path to it and on to the next goal's posture is
+  shortest. The next goal's posture is chosen in the same way, with the goal after it.
 
-Tuned on thirty development instances (``d000`` to ``d009`` of families one-armed, two-armed and
-aligned), and on nothing else: 12 settings of the controller as it is, tabled here, and before that
-some 50 of a prototype. Mean gap to the best path known of ``goals-ahead``, one setting changed at a
-time, * the value used:
+The controller was tuned only on thirty development instances (``d000`` to ``d009`` of families
+one-armed, two-armed and aligned): 12 settings of the controller, tabled here, and before that some
+50 settings of a prototype. The table has the mean gap of ``goals-ahead`` to the best known path,
+with one setting changed at a time. The value used is marked with *:
 
 =========================  ====================================================================
-hand comes nearer, at      0: 2.2 %, 0.03*: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
-this share of even pace    1: 6.9 %
+least speed of the hand    0: 2.2 %, 0.03*: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
+(share of even speed)      1: 6.9 %
 weight of paths to come    0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1*: 2.3 %, 1.2: 2.6 %
-(share at 0.1)
-goals ahead (same)         none: 20.1 %, 1: 5.6 %, 2*: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
+(speed of 0.1)
+goals ahead                none: 20.1 %, 1: 5.6 %, 2*: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
+(speed of 0.1)
 =========================  ====================================================================
 
-On the same instances the corrective process alone with its best hand sequence has 24.8 %, and
-``current-goal`` 20.1 %.
+On the same instances the gap of the corrective process alone with its best hand sequence is 24.8 %,
+and that of ``current-goal`` 20.1 %.
 
-The remaining gap is local: postures are found by descent from where the robot is, and another
-branch of the inverse kinematics may be far shorter (35 % on the worst of the thirty).
+The remaining gap comes from local minima. Postures are found by descent from the robot's
+configuration, and another branch of the inverse kinematics may be far shorter (35 % on the worst of
+the thirty instances).
 """
 
 from __future__ import annotations
@@ -57,31 +61,50 @@ from coartic.method import Information
 from coartic.robot import Array, directions
 
 FACES = 16
-"""Sides of the polygon that stands for a goal's disc; it leaves out 2 % of the radius at most."""
+"""Number of sides of the polygon that replaces a goal's disc. The polygon is inside the disc, and
+its sides are at most 2 % of the radius from the rim."""
 
 _FACE_NORMALS = directions(2 * np.pi * np.arange(FACES) / FACES)
 _INSET = float(directions(np.pi / FACES)[0])
-_MARGIN = 1e-4  # length unit: the polygon is approached without end, the disc is entered
-_CLOSING = 0.03  # of the even pace at which the hand has to come nearer
-_POSTURE_STEPS = 400  # at most, when a posture is first looked for
-_POSTURE_STEP = 0.1  # longest of them, length unit and rad: longer ones end far off
-_POSTURE_GAIN = 0.5  # of the path to the preferred one in one of them: 1 may swing
-_POSTURE_TOLERANCE = 1e-3  # of such a step, length unit and rad
-_SHORTEST = 0.02  # path whose share still counts, length unit and rad
+_MARGIN = 1e-4  # length unit: the hand approaches the polygon without end, but enters the disc
+_CLOSING = 0.03  # least speed of the hand towards the goal, as a share of even speed
+_POSTURE_STEPS = 400  # most steps of a search for a posture
+_POSTURE_STEP = 0.1  # longest of these steps, length unit and rad: longer steps end far away
+_POSTURE_GAIN = 0.5  # share of the path to the preferred posture in a step: 1 may oscillate
+_POSTURE_TOLERANCE = 1e-3  # length of a step at which a search ends, length unit and rad
+_SHORTEST = 0.02  # shorter paths get the weight of this length, length unit and rad
 
 
 class PostureController(Controller):
-    """Go straight in joint space to the posture of the current goal. The memory has a posture,
-    shape ``(dof,)``, by aim: for the current goal and the goals ahead."""
+    """Go straight in joint space to a posture that hits the current goal.
+
+    The memory has a posture, shape ``(dof,)``, for each aim: the current goal and the goals ahead.
+    """
 
     def begin(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
-        """Return, by aim, a posture ``(dof,)`` that hits the goal of each of ``aims`` (hand and
-        goal), for the movement from configuration ``q``. A posture that ``memory`` has for an aim
-        is taken over; any other is sought by descent from the posture of the aim before, the first
-        from ``q``. With several aims all are then moved to shorten the path from ``q`` through
-        them. A search that does not converge ends after 400 steps, perhaps outside of the goal."""
+        """Return a posture that hits its goal for each aim.
+
+        A posture of an aim is the one in ``memory``, if there is one. Otherwise descent finds it,
+        beginning at the posture of the aim before, or at ``q`` for the first aim. With more than
+        one aim all postures then move to shorten the path from ``q`` through them. A search that
+        does not converge ends after 400 steps, and its posture may be outside the goal.
+
+        Parameters
+        ----------
+        q : ndarray, shape (dof,)
+            Configuration at the beginning of the movement.
+        aims : tuple of Aim
+            Hand and goal: the current goal, then the goals ahead.
+        memory : dict or None
+            Postures, shape ``(dof,)``, by aim; None for the first movement.
+
+        Returns
+        -------
+        dict
+            Postures, shape ``(dof,)``, by aim.
+        """
         earlier, postures = memory or {}, list[Array]()
         for aim in aims:
             before = postures[-1] if postures else q
@@ -99,10 +122,11 @@ class PostureController(Controller):
     def step(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array], first: bool
     ) -> tuple[Solution, Array, dict[Aim, Array]]:
-        """Move the postures of ``memory`` a step on, except at the ``first`` step of a movement,
-        and solve for a control step from ``q`` towards the posture of the current goal. Return
-        solution, preferred changes ``(joints,)`` in lengths of a control step, and the postures by
-        aim in a new dictionary."""
+        """Compute a control step towards the posture of the current goal.
+
+        Except at the first step of a movement, the postures of ``memory`` first make a step of
+        their own. Parameters and returned values are those of :meth:`Controller.step`.
+        """
         postures = [memory[aim] for aim in aims]
         if not first:
             self.sweep(q, aims, postures)
@@ -115,11 +139,26 @@ class PostureController(Controller):
         return solution, preferred, dict(zip(aims, postures, strict=True))
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
-        """Move each of ``postures``, one for each aim (hand and goal), in place, by a step of
-        :meth:`step_nearer`, so that the path from ``q`` through all of them gets shorter; return
-        the largest length of these steps before they were limited, length unit and rad mixed. As
-        preferred a step gets the mean of the postures before and after, weighted by inverse
-        distances (Weiszfeld 1937), and the last step the posture before."""
+        """Move each posture by a step that shortens the path from ``q`` through all of them.
+
+        The preferred posture of a step (:meth:`step_nearer`) is the mean of the postures before and
+        after, weighted by inverse distances (Weiszfeld 1937). For the last posture it is the
+        posture before.
+
+        Parameters
+        ----------
+        q : ndarray, shape (dof,)
+            Configuration at the beginning of the path.
+        aims : tuple of Aim
+            Hand and goal of each posture.
+        postures : list of ndarray, shape (dof,)
+            Postures, which are replaced in the list.
+
+        Returns
+        -------
+        float
+            Length of the longest step before it was limited, in length unit and rad mixed.
+        """
         largest = 0.0
         for k, aim in enumerate(aims):
             before = q if k == 0 else postures[k - 1]
@@ -134,18 +173,34 @@ class PostureController(Controller):
         return largest
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
-        """Return the posture ``(dof,)`` after a Gauss-Newton step from ``posture``, a new array,
-        and the length of the step before it was limited to 0.1, length unit and rad mixed. The
-        steps lead to the posture that hits the goal of an aim (hand and goal) and is nearest to
-        ``preferred``, ``(dof,)``; joints have no limits. Where a step brings the hand hardly
-        nearer, the arm is bent besides."""
+        """Make a Gauss-Newton step towards the posture that hits a goal and is nearest to another.
+
+        If the step hardly brings the hand nearer to the goal, it also bends the arm. Joints do not
+        have limits.
+
+        Parameters
+        ----------
+        posture : ndarray, shape (dof,)
+            Posture before the step.
+        preferred : ndarray, shape (dof,)
+            Preferred posture.
+        aim : Aim
+            Hand and goal.
+
+        Returns
+        -------
+        ndarray, shape (dof,)
+            Posture after the step, a new array.
+        float
+            Length of the step before it was limited to 0.1, in length unit and rad mixed.
+        """
         rows, outside = self.faces(posture, aim)
         wanted = _POSTURE_GAIN * (preferred - posture)[self.moving]
         change = self.solve(rows, outside, wanted).changes
         short = outside.max()
         if short > _MARGIN and (outside - rows @ change).max() > 0.9 * short:
-            # Singular in the very direction of the goal, such as a straight arm with its goal
-            # behind: bend, and the next step finds a way.
+            # The arm is singular in the direction of the goal, such as a straight arm whose goal is
+            # behind the hand. Bending it lets the next step come nearer.
             arm = self.session.joints(aim.hand)
             bent = (self.moving >= arm.start) & (self.moving < arm.stop)
             change[bent] += np.resize([1.0, -1.0], bent.sum())
@@ -153,16 +208,29 @@ class PostureController(Controller):
         return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
     def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
-        """Return A, ``(16, joints)``, and b, ``(16,)``, length unit: to first order a change x of
-        the joints that are not locked brings the hand of an aim (hand and goal) from configuration
-        ``q`` into a polygon within its goal's disc if A x >= b."""
+        """Return the constraint that a hand is in its goal's polygon, A x >= b to first order.
+
+        Parameters
+        ----------
+        q : ndarray, shape (dof,)
+            Configuration before the change x of the joints.
+        aim : Aim
+            Hand and goal.
+
+        Returns
+        -------
+        ndarray, shape (16, joints)
+            Matrix A, length unit per unit of change.
+        ndarray, shape (16,)
+            Vector b, length unit.
+        """
         jacobian = self.session.jacobian(q, aim.hand)[:, self.moving]
         radius = (self.task.radius - _MARGIN) * _INSET
         return _FACE_NORMALS @ jacobian, _FACE_NORMALS @ self.error(q, aim) - radius
 
 
 class CurrentGoal(Control):
-    """Posture QP that looks at the current goal alone."""
+    """Posture QP that considers only the current goal."""
 
     name = "posture-qp/current-goal"
     version = 2
@@ -172,7 +240,7 @@ class CurrentGoal(Control):
 
 
 class GoalsAhead(CurrentGoal):
-    """Posture QP whose posture for the current goal is chosen with a view to the next two goals."""
+    """Posture QP that chooses its postures for the current goal and the next two goals together."""
 
     name = "posture-qp/goals-ahead"
     title = "Posture QP, goals ahead"

@@ -1,19 +1,19 @@
-"""Random search: the paper's learner without its memory; the best trial is kept.
+"""Random search: the paper's learner without its memory. The solution is the best trial.
 
-Every trial draws Gaussian noise, by default with the learner's standard deviation, around the
-postures in which the corrective process hits the goals; the first trials are the corrective process
-alone. With one stage, the default, no noise depends on earlier rewards, so that random search
-cannot coarticulate by learning: its best trial shows the effect of selecting one of many noisy
-trials by the reward of the whole task. It is the control of signatures of coarticulation
+The first trials are made by the corrective process alone. Each later trial draws Gaussian noise
+around the postures in which the corrective process hits the goals, by default with the learner's
+standard deviation. With one stage, the default, the noise does not depend on earlier rewards. So
+random search cannot learn to coarticulate: its best trial shows the effect of selecting one of many
+noisy trials by the reward of the whole task. It is the control of signatures of coarticulation
 (:mod:`coartic.analysis.control`).
 
-With ``stages`` above 1 the trials are equal parts, and after each part the centre of the noise
-moves to the best trial so far, to the postures that this trial reached or to the targets that it
-aimed at (``keep``).
+With ``stages`` above 1 the trials are divided into equal parts. After each part the centre of the
+noise moves to the best trial so far: to the postures that this trial reached, or to the targets
+that it aimed at (``keep``).
 
-``random-search`` has the hands with which the corrective process alone does best, or hands given.
-In ``random-search/hands`` every hand sequence gets as many of the trials; the best of all is the
-solution.
+``random-search`` uses the hands with which the corrective process alone does best, or the hands of
+its parameter. ``random-search/hands`` divides its trials equally among all hand sequences. Its
+solution is the best trial of all.
 """
 
 from __future__ import annotations
@@ -41,25 +41,25 @@ class RandomSearchHandsParameters(Parameters):
     """Parameters of random search with every hand sequence."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run, trials of the corrective process alone among them."""
+    """Trials of a run, with those of the corrective process alone."""
     sigma: Annotated[float, Field(gt=0, le=MOST_NOISE)] = 0.05
-    """SD of the noise on each explored joint, length unit (base) and rad (joints); the default is
+    """SD of the noise on each explored joint, length unit (base) and rad (joints). The default is
     the learner's."""
     stages: Annotated[int, Field(ge=1)] = 1
-    """Number r of equal parts of the T trials with a hand sequence: part k ends after ⌊kT/r⌋
-    trials, and then noise is drawn around the best trial so far. 1: nothing is kept."""
+    """Number r of equal parts of the T trials with a hand sequence. Part k ends after ⌊kT/r⌋
+    trials; then noise is drawn around the best trial so far. With 1 the centre does not move."""
     keep: Literal["postures", "targets"] = "postures"
     """Centre of the noise after a part: the postures in which the best trial hit its goals, or the
-    targets that it aimed at. No effect with one stage."""
+    targets that it aimed at. It has no effect with one stage."""
     idle_arm: bool = True
-    """True if an arm gets noise also at goals that the other hand is to hit. If False, it keeps
-    still there, as under the learner's condition EC3."""
+    """True if an arm gets noise also at goals of the other hand. With False it does not move there,
+    as under the learner's condition EC3."""
 
     @model_validator(mode="after")
     def _check_stages(self) -> Self:
         if self.stages > self.trials:
             raise sentence_error(
-                f"stages is {self.stages}; it may be at most the number of trials, {self.trials}"
+                f"stages is {self.stages}; it must be at most the number of trials, {self.trials}"
             )
         return self
 
@@ -68,29 +68,43 @@ class RandomSearchParameters(RandomSearchHandsParameters):
     """Parameters of random search."""
 
     hands: str | None = None
-    """Hand sequence, such as ``"RRLR"``; by default the sequence with which the corrective process
-    alone gets the highest reward (of as many as there are trials), or the task's initial sequence
-    where more than 4096 exist."""
+    """Hand sequence, such as ``"RRLR"``. By default the method tries as many sequences as there are
+    trials, and uses the one with which the corrective process alone gets the highest reward. If
+    there are more than 4096 sequences, it uses the task's initial one."""
 
 
 def draw_trials(
     session: Session, hands: str | None, parameters: RandomSearchHandsParameters
 ) -> tuple[Attempts, int]:
-    """Make a trial of the corrective process alone with one or more hand sequences, then trials
-    with noise with the best of them until none is left; return an account of the trials, which
-    keeps the best trial of all, and the number of trials with noise.
+    """Make trials with noise around the corrective process until none is left.
 
-    ``hands``: a hand sequence, or None for the sequence with which the process alone does best,
-    among as many as there are trials; where more than 4096 exist, the task's initial sequence.
-    ``parameters.trials``: most trials, both kinds together. Raises MethodError without a single
-    trial, and if the process completes none of the sequences; ValueError for ``hands`` that do not
-    fit the task.
+    Parameters
+    ----------
+    session : Session
+    hands : str or None
+        Hand sequence. None for the default of :class:`RandomSearchParameters`.
+    parameters : RandomSearchHandsParameters
+        Parameters; ``trials`` counts trials of the corrective process and trials with noise.
+
+    Returns
+    -------
+    Attempts
+        Account of the trials, with the best trial.
+    int
+        Number of trials with noise.
+
+    Raises
+    ------
+    MethodError
+        No trial is left to make, or the corrective process completes none of the sequences tried.
+    ValueError
+        ``hands`` do not fit the task.
     """
     attempts = Attempts(session, parameters.trials)
     trials = attempts.left
     if trials <= 0:
-        raise MethodError("infeasible", "the budget leaves no trial to make")
-    attempts.by_correction(*(sequences_of(session) if hands is None else [hands])[:trials])
+        raise MethodError("infeasible", "no trial can be made: the trial budget is used up")
+    attempts.run_corrective(*(sequences_of(session) if hands is None else [hands])[:trials])
     if not (chosen := attempts.hands):
         raise MethodError("infeasible", "the corrective process completes no hand sequence")
     explored = attempts.explored.copy()
@@ -98,27 +112,30 @@ def draw_trials(
         for other in HANDS:
             if other != hand and not parameters.idle_arm:
                 explored[goal, session.joints(other)] = False
-    centre, alone = attempts.reached[explored], attempts.trials_made
+    centre, corrective_trials = attempts.reached[explored], attempts.trials_made
     targets = np.full((_POINTS_AT_ONCE, *explored.shape), np.nan)
-    stage, more = 0, True
-    while more:
-        more = attempts.left >= _POINTS_AT_ONCE
+    stage, goes_on = 0, True
+    while goes_on:
+        goes_on = attempts.left >= _POINTS_AT_ONCE
         noise = session.rng.normal(0.0, parameters.sigma, (_POINTS_AT_ONCE, len(centre)))
         while len(noise) and attempts.left > 0:
             while (ends := trials * (stage + 1) // parameters.stages) <= attempts.trials_made:
                 stage += 1
-                if attempts.best_trial >= alone:
-                    kept = attempts.reached if parameters.keep == "postures" else attempts.targets
-                    centre = kept[explored]
+                if attempts.best_trial >= corrective_trials:
+                    is_posture = parameters.keep == "postures"
+                    best = attempts.reached if is_posture else attempts.targets
+                    centre = best[explored]
             part, noise = np.split(noise, [ends - attempts.trials_made])
             targets[: len(part), explored] = centre + part
-            attempts.by_targets(chosen, targets[: min(len(part), attempts.left)])
-    return attempts, attempts.trials_made - alone
+            attempts.run_targets(chosen, targets[: min(len(part), attempts.left)])
+    return attempts, attempts.trials_made - corrective_trials
 
 
 class RandomSearchHands(Method):
-    """Random search that divides its trials evenly among all hand sequences; if more than 4096
-    exist, it has the task's initial hand sequence alone."""
+    """Random search that divides its trials equally among all hand sequences.
+
+    If there are more than 4096 sequences, it uses only the task's initial one.
+    """
 
     name = "random-search/hands"
     tuned_on = "nothing: the paper's values"
@@ -131,15 +148,31 @@ class RandomSearchHands(Method):
     Parameters = RandomSearchHandsParameters
 
     def max_batch(self) -> int:
-        """Return the largest number of sessions for one call of :meth:`solve_together`: 72, or
-        fewer if their runs have more than 4,000,000 trials together; at least 1. The runs are made
-        one after the other."""
+        """Return the most sessions of one call of :meth:`solve_together`.
+
+        It is 72, or fewer if their runs would have more than 4,000,000 trials in all, but at least
+        1.
+        """
         return runs_at_once(self.parameters.trials)
 
     def solve(self, session: Session) -> Result:
-        """Give one hand sequence after the other an equal share of the trials, to a trial; if the
-        corrective process fails there, only the first is made. Return the movements of the best
-        trial. Raises MethodError if that process completes no hand sequence that has a trial.
+        """Divide the trials among the hand sequences, and return the movements of the best trial.
+
+        Shares differ by at most one trial. If the corrective process fails with a sequence, the
+        rest of its share is not used.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            The corrective process completes no hand sequence that has a trial.
         """
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
@@ -165,11 +198,23 @@ class RandomSearch(RandomSearchHands):
     Parameters = RandomSearchParameters
 
     def solve(self, session: Session) -> Result:
-        """Make a trial of the corrective process alone with parameter ``hands``, or by default with
-        each of the sequences that :func:`draw_trials` names, then trials with noise with the best
-        of them until none is left; return the movements of the best trial. Raises MethodError if
-        there is no trial to make, or if that process completes no sequence tried; ValueError for
-        ``hands`` that do not fit the task."""
+        """Make trials until none is left, and return the movements of the best trial.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            No trial is left to make, or the corrective process completes no hand sequence tried.
+        ValueError
+            Parameter ``hands`` does not fit the task.
+        """
         parameters: RandomSearchParameters = self.parameters
         with session.solving():
             best, evaluations = draw_trials(session, parameters.hands, parameters)

@@ -1,18 +1,22 @@
-"""A planner that looks a fixed number of goals ahead.
+"""A planner that looks a fixed number of goals ahead (model predictive control).
 
-From where the robot stands it seeks the shortest movements through the next goals, ``horizon``
-beyond the one to be hit, over hand sequences. It makes the first of them, stands where that one
-ended, and plans again (model predictive control). With ``horizon`` 0 it goes to each goal the
-shortest way. A window that reaches the last goal is followed to its end, since planning again would
-find the rest of it. With a horizon of all goals it plans the whole task at once, so that its gap to
-the optimum is what the smaller search costs.
+Its window is the current goal and ``horizon`` goals after it. It searches, over hand sequences, for
+the shortest movements through the window, makes the first of them, and plans again from its end.
+
+- With ``horizon`` 0 it takes the shortest path to each goal.
+- A window that contains the last goal is followed to its end, because planning again would find the
+  rest of it.
+- With a horizon of all goals it plans the whole task at once. Its gap to the optimum is then the
+  cost of the smaller search.
 
 A window is planned as ``optimum/search`` plans a task (:mod:`.shortest_paths`): chains of posture
-graphs, IPOPT, whole ticks. Two things differ, for speed: fewer chains, with two hands from smaller
-graphs, and only the shortest ``starts`` are polished. Without whole ticks in every window each goal
-would lose half a tick, in the mean, whatever the horizon. With them a window does so at its last
-goal alone: once in all, but at every goal with a horizon of 0. ``path_length`` in the details has
-no such loss: it adds up the plans before the rounding, from where the robot stood.
+graphs, IPOPT, whole ticks. For speed there are fewer chains, smaller graphs with two hands, and
+IPOPT solves only from the shortest ``starts``.
+
+Movements are rounded to whole ticks in each window. Otherwise each goal would lose half a tick on
+average, at any horizon. With rounding only the last goal of a window loses it: once in the whole
+task, but at each goal with a horizon of 0. ``path_length`` in the details is without this loss: it
+is the sum of the plans before rounding.
 """
 
 from __future__ import annotations
@@ -42,22 +46,21 @@ class RecedingHorizonParameters(Parameters):
     """The horizon, and the effort of the search."""
 
     horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
-    """Number of goals in view beyond the one to be hit; at the end of a task fewer."""
+    """Number of goals after the current goal in a window; fewer at the end of a task."""
     nodes: Nodes = 200
-    """Most postures per goal of a posture graph, shared by the hands: with two, half as many each.
-    """
+    """Most postures for a goal of a posture graph. Two hands have half as many each."""
     graphs: Count = 3
-    """Independent graphs for each window; more are made while chains are too few."""
+    """Least number of independent graphs for each window. More are made until there are enough
+    chains."""
     chains: Count = 24
     """Least number of chains of each window, over all graphs and hand sequences."""
     starts: Count = 24
-    """Most starts of each window that are polished, the shortest: all chains, with two hands and
-    several goals each also with the idle arm moving in equal steps, are ranked by length."""
+    """Most starts of each window from which IPOPT solves: the shortest chains. With two hands and
+    more than one goal, each chain also counts with the idle arm moving in equal steps."""
 
 
 class RecedingHorizon(Method):
-    """Plan the shortest movements through the next goals, make the first of them, and plan
-    again."""
+    """Plan the shortest movements through the next goals, make the first, and plan again."""
 
     name = "receding-horizon"
     version = 2
@@ -74,9 +77,21 @@ class RecedingHorizon(Method):
     quick = QUICK
 
     def solve(self, session: Session) -> Result:
-        """Plan the movements to the goals in view, keep the first, and plan again from its end;
-        when the last goal is in view, keep all. Return the movements kept. Raises MethodError if no
-        path is found."""
+        """Plan window by window, and return the movements that were made.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            No path is found.
+        """
         task, parameters = session.reveal(*self.information), self.parameters
         rng = np.random.default_rng(0)  # the same graphs for all seeds
         windows: list[ShortestPlans] = []

@@ -1,9 +1,9 @@
 """The shortest path over hand sequences, in whole control ticks.
 
-Shared by the search for the optimum and the planner with a receding horizon: each start is
-polished by IPOPT, the shortest plan of each hand sequence is kept, and plans that may be best are
-rounded to whole ticks, with and without goals that are hit as their turn comes because the hand is
-already there.
+The search for the optimum and the planner with a receding horizon share this code. IPOPT solves
+from each start. The shortest plan of each hand sequence that may be best is then rounded to whole
+ticks. In some roundings a goal takes no movement, because the hand is already inside the goal when
+its turn comes.
 """
 
 from __future__ import annotations
@@ -26,9 +26,11 @@ class ShortestPlans(NamedTuple):
     """The plans found from many starts."""
 
     ranked: list[PathPlan]
-    """The shortest plan of each hand sequence for which a solve converged, the shortest first."""
-    solves: int  # one for each start
-    failed: int  # solves that did not converge
+    """Shortest plan of each hand sequence for which a solve converged; the shortest is first."""
+    solves: int
+    """Number of solves, one for each start."""
+    failed: int
+    """Number of solves that did not converge."""
 
 
 class PlanInTicks(NamedTuple):
@@ -50,11 +52,29 @@ def shortest_plans(
     *,
     still: bool,
 ) -> ShortestPlans:
-    """Solve the ``problem`` of the shortest path on a task from each of ``starts``, a hand sequence
-    and configurations ``(G, dof)``; return the shortest plan found for each hand sequence, and the
-    numbers of solves and failures. With ``still`` the arm whose hand is not chosen for a goal does
-    not move on the way to it. The session counts the effort. Raises MethodError if no solve finds a
-    path."""
+    """Solve for the shortest path of a task from a number of starts.
+
+    Parameters
+    ----------
+    session : Session
+        Session that counts the effort.
+    task : Task
+    problem : TrajectoryProblem
+        Problem of cost ``path-length``.
+    starts : iterable of tuple
+        Hand sequence and configurations, shape ``(G, dof)``, of each start.
+    still : bool
+        True if the arm whose hand is not chosen for a goal must not move on the way to the goal.
+
+    Returns
+    -------
+    ShortestPlans
+
+    Raises
+    ------
+    MethodError
+        No solve finds a path.
+    """
     best: dict[HandSequence, PathPlan] = {}
     solves = failed = 0
     for hands, start in starts:
@@ -66,9 +86,7 @@ def shortest_plans(
         if plan.converged and (hands not in best or plan.cost < best[hands].cost):
             best[hands] = plan
     if not best:
-        raise MethodError(
-            "infeasible", f"none of {solves} solves found a path that hits every goal"
-        )
+        raise MethodError("infeasible", f"none of {solves} solves found a path that hits all goals")
     ranked = sorted(best.values(), key=lambda plan: plan.cost)
     return ShortestPlans(ranked, solves, failed)
 
@@ -76,22 +94,43 @@ def shortest_plans(
 def fewest_ticks(
     session: Session, task: Task, problem: TrajectoryProblem, plans: ShortestPlans
 ) -> PlanInTicks:
-    """Round plans of a task to whole ticks, with and without goals that are hit without a movement,
-    and execute the roundings; return, of the roundings that hit every goal when executed, the one
-    with the fewest ticks, then the fewest corrections. Left out are roundings beyond the nearest 64
-    of a plan (:meth:`.Rounding.every`), and roundings that, before or after they are solved,
-    promise no fewer ticks than the best so far. The session counts the solver's effort and forward
-    kinematics, not iterations and Jacobians of corrections. Raises MethodError if no rounding is
-    solved and hits every goal."""
-    fewest: PlanInTicks | None = None
-    least: tuple[float, float] = math.inf, math.inf
+    """Round plans to whole ticks, and return the rounding with the fewest ticks.
+
+    Each rounding is executed, and must hit every goal. Between roundings with equal ticks the one
+    with the fewest corrections is returned. These roundings are not tried:
+
+    - roundings of a plan after its nearest 64 (:meth:`.Rounding.every`);
+    - roundings whose least number of ticks is not below that of the best rounding so far.
+
+    Parameters
+    ----------
+    session : Session
+        Session that counts the solver's effort and forward kinematics, but not the iterations and
+        Jacobians of corrections.
+    task : Task
+    problem : TrajectoryProblem
+        Problem of cost ``path-length``.
+    plans : ShortestPlans
+        Plans to round.
+
+    Returns
+    -------
+    PlanInTicks
+
+    Raises
+    ------
+    MethodError
+        No rounding is solved and hits every goal.
+    """
+    best: PlanInTicks | None = None
+    fewest: tuple[float, float] = math.inf, math.inf  # ticks and corrections of the best
 
     def worth(ticks: int) -> bool:
-        return ticks < least[0]
+        return ticks < fewest[0]
 
     for plan in plans.ranked:
         instance, rounding = plan.instance, Rounding(session, problem, plan.instance)
-        # A merger saves one tick a goal and never shortens the path.
+        # Without a movement to a goal one tick is saved, and the path is not shorter.
         if not worth(rounding.least(plan) - len(instance.hands)):
             continue
         for merged, shortest in rounding.plans(plan, task, worth):
@@ -104,10 +143,10 @@ def fewest_ticks(
                 execution = execute(task, planned, model=session.model)
                 session.spend(forward_kinematics=execution.evaluations)
                 spent = execution.ticks, execution.corrections
-                if execution.completed and spent < least:
-                    least, fewest = spent, PlanInTicks(planned, execution, shortest)
+                if execution.completed and spent < fewest:
+                    fewest, best = spent, PlanInTicks(planned, execution, shortest)
                 if not worth(rounding.least(shortest, merged)):
-                    break  # no other rounding takes fewer
-    if fewest is None:
-        raise MethodError("solver-failed", "IPOPT could not round a plan to whole ticks")
-    return fewest
+                    break  # no other rounding takes fewer ticks
+    if best is None:
+        raise MethodError("solver-failed", "IPOPT could not round any plan to whole ticks")
+    return best

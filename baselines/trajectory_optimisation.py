@@ -1,11 +1,17 @@
-"""Trajectory optimisation: informed search with the whole objective written down.
+"""Trajectory optimisation: informed search with the objective as a formula.
 
-One method per cost. Path length is the task's own reward as a formula; the others are
-the smoothness objectives that informed accounts of coarticulation use: the sum of squared joint
-displacements (Jordan 1986, 1992), minimum acceleration and minimum jerk of the joints, and minimum
-jerk of the hand (Flash & Hogan 1985), the last three over times that are free at a constant total.
-Hand sequences are planned from the cheapest chains of posture graphs; the plan that is cheapest
-*by the method's own cost* is returned.
+There is a method for each cost. Path length is the task's own reward. The other costs are the
+smoothness objectives of informed accounts of coarticulation:
+
+- the sum of squared joint displacements (Jordan 1986, 1992);
+- acceleration of the joints;
+- jerk of the joints;
+- jerk of the hand (Flash & Hogan 1985).
+
+For the last three the times of the movements are free, and their total is constant.
+
+Each method plans hand sequences from the cheapest chains of posture graphs, and returns the plan
+that is cheapest *by its own cost*.
 """
 
 from __future__ import annotations
@@ -40,50 +46,58 @@ from coartic.motion.movement import follow, segment_lengths
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
-SAMPLES = 200  # points of a smooth path between goals; four times as many changed no reward
+SAMPLES = 200  # points of a smooth path from goal to goal; with 800 no reward changed
 
 
 class TrajectoryParameters(Parameters):
     """Hand sequences that are planned, and the starts of each."""
 
     most_sequences: Count = BEAM_WIDTH
-    """Most hand sequences that are planned in a graph, 64 for all of two hands and six goals; of
-    more sequences those with which a beam search of this width over the goals ends."""
+    """Most hand sequences that are planned in a graph. With two hands 64 are all sequences for six
+    goals. If there are more, a beam search of this width over the goals chooses them."""
     nodes: Nodes = 150
-    """Most postures per goal and hand in a graph."""
+    """Most postures for a goal and hand in a graph."""
     graphs: Count = 3
-    """Independent graphs, at most two starts for a hand sequence from each. With one graph, the
-    best path was missed on 3 of 23 small random tasks."""
+    """Least number of independent graphs. Each has at most two starts for a hand sequence. With one
+    graph the best path was missed on 3 of 23 small random tasks."""
     chains: Count = 30
-    """Least number of chains of all hand sequences, from as many further graphs as are needed."""
+    """Least number of chains of all hand sequences. More graphs are made until there are enough."""
     noisy_starts: Annotated[int, Field(ge=0)] = 4
-    """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
+    """Number of further starts for each hand sequence: the first start with Gaussian noise of SD
+    0.1 to 1."""
 
 
 class SmoothParameters(TrajectoryParameters):
     """Hand sequences and starts, and whether plans stop at goals."""
 
     stop: Literal[0, 1] = 0
-    """1: the plan comes to a full stop at each goal, where velocities, for jerk accelerations too,
-    are 0."""
+    """1 if the plan stops at each goal: velocities are 0 there, and for jerk also accelerations. 0
+    if it need not stop."""
 
 
 class JerkParameters(SmoothParameters):
-    """Parameters, by default without noisy starts: these find cheaper plans for four of 34 hand
-    sequences of the paper's tasks, and change neither hands nor ticks."""
+    """Parameters for jerk, by default without noisy starts.
+
+    Noisy starts find cheaper plans for four of 34 hand sequences of the paper's tasks, but change
+    neither hands nor ticks of the solutions.
+    """
 
     noisy_starts: Annotated[int, Field(ge=0)] = 0
-    """Further starts per hand sequence, Gaussian noise of SD 0.1 to 1 on the first."""
+    """Number of further starts for each hand sequence: the first start with Gaussian noise of SD
+    0.1 to 1."""
 
 
 class HandJerkParameters(JerkParameters):
-    """Parameters, by default with one start for a hand sequence: a plan by jerk of the hand takes
-    four times as long, and on the paper's tasks a second start found no other plan."""
+    """Parameters for jerk of the hand, by default with one start for a hand sequence.
+
+    A plan takes four times as long as with jerk of the joints. On the paper's tasks a second start
+    did not find any other plan.
+    """
 
     graphs: Count = 1
-    """Independent graphs, one start for a hand sequence from each."""
+    """Least number of independent graphs. Each has one start for a hand sequence."""
     chains: Count = 1
-    """Least number of chains of all hand sequences, from as many further graphs as are needed."""
+    """Least number of chains of all hand sequences. More graphs are made until there are enough."""
 
 
 def cheapest_plan(
@@ -94,10 +108,24 @@ def cheapest_plan(
     *,
     stops: bool = False,
 ) -> PathPlan:
-    """Solve ``problem`` for an instance from each of ``starts``, configurations ``(G, dof)``;
-    return the cheapest converged plan, or, if none converged, the plan of the last start. With
-    ``stops`` velocities (for jerk also accelerations) are 0 at each goal. The session counts the
-    effort."""
+    """Solve a problem from a number of starts, and return the cheapest converged plan.
+
+    Parameters
+    ----------
+    session : Session
+        Session that counts the effort.
+    problem : TrajectoryProblem
+    instance : Instance
+    starts : list of ndarray, shape (G, dof)
+        Configurations from which the solver starts.
+    stops : bool
+        True to make velocities, and for jerk also accelerations, 0 at each goal.
+
+    Returns
+    -------
+    PathPlan
+        The cheapest converged plan. If no plan converged, it is the plan of the last start.
+    """
     plans = [problem.solve(instance, start, stops=stops) for start in starts]
     for plan in plans:
         session.spend(**plan.spent)
@@ -116,14 +144,29 @@ class TrajectoryOptimisation(Method):
     quick = QUICK | {"most_sequences": 1}
 
     def solve(self, session: Session) -> Result:
-        """Plan for each hand sequence of :meth:`starts`, and return the movements of the plan with
-        the least cost by the method's own cost, for path length after solving it again in whole
-        ticks or, failing that, inside the discs. Raises MethodError if the solver finds no plan."""
+        """Plan for each hand sequence, and return the movements of the cheapest plan.
+
+        The cheapest plan for path length is solved again in whole ticks. If that fails, it is
+        solved again with targets well inside the discs.
+
+        Parameters
+        ----------
+        session : Session
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            The solver finds no plan.
+        """
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
             problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
-        # A target so near to a goal's centre is sure to hit; rounded to whole control ticks, a plan
-        # goes through the rims.
+        # A target this near to a goal's centre is sure to hit. A plan for path length is rounded to
+        # whole control ticks instead, and goes through the rims.
         inside = task.radius - session.model.tolerances(task.radius)[0]
         radius = task.radius if self.cost == "path-length" else inside
         plans, failed = list[PathPlan](), dict[str, str]()
@@ -133,7 +176,7 @@ class TrajectoryOptimisation(Method):
                 instance = Instance.of(task, hands, still=False, radius=radius)
                 plan = cheapest_plan(session, problem, instance, starts)
                 if plan.converged and stops:
-                    # A plan that stops starts from the one that passes the goals as well.
+                    # The plan that passes the goals is another start for the plan that stops.
                     starts = [plan.configurations, *starts]
                     plan = cheapest_plan(session, problem, instance, starts, stops=True)
                 if plan.converged:
@@ -142,7 +185,7 @@ class TrajectoryOptimisation(Method):
                     failed[letters_of(hands)] = plan.reason
             if not plans:
                 raise MethodError(
-                    "solver-failed", f"IPOPT converged for none of the hand sequences: {failed}"
+                    "solver-failed", f"IPOPT converged for no hand sequence: {failed}"
                 )
             best = plan = min(plans, key=lambda plan: plan.cost)
             aimed, configurations, steps = plan.instance, plan.configurations, None
@@ -150,13 +193,13 @@ class TrajectoryOptimisation(Method):
                 rounded = Rounding(session, problem, aimed).nearest(plan)
                 if rounded is not None:
                     configurations, steps = rounded.configurations, rounded.steps
-                else:  # aimed inside the discs it is a plan all the same
+                else:  # a plan with targets inside the discs hits the goals, too
                     aimed = replace(aimed, radius=inside)
                     plan = problem.solve(aimed, plan.configurations)
                     configurations = plan.configurations
                     session.spend(**plan.spent)
                     if not plan.converged:
-                        reason = f"IPOPT, aimed inside the discs: {plan.reason}"
+                        reason = f"IPOPT failed with targets inside the discs: {plan.reason}"
                         raise MethodError("solver-failed", reason)
             if len(plan.rates):
                 solution = path_movements(session, task, aimed, spline(plan, SAMPLES))
@@ -171,10 +214,30 @@ class TrajectoryOptimisation(Method):
         return Result(solution, details)
 
     def starts(self, session: Session, task: Task) -> dict[HandSequence, list[Array]]:
-        """Return, by hand sequence planned, a list of starts, each ``(G, dof)``: the cheapest chain
-        (a posture for each goal) of each random graph that has one; with two hands, except for jerk
-        of the hand, each chain also with the idle arm moving in equal steps; and copies of the
-        first start with noise. Raises MethodError if a goal has no posture in a graph."""
+        """Return the starts of each hand sequence to plan.
+
+        The starts of a sequence are
+
+        - its cheapest chain in each random graph that has one;
+        - with two hands, except for jerk of the hand, each of these chains with the idle arm moving
+          in equal steps;
+        - copies of the first start with noise.
+
+        Parameters
+        ----------
+        session : Session
+        task : Task
+
+        Returns
+        -------
+        dict
+            List of starts, each of shape ``(G, dof)``, by hand sequence.
+
+        Raises
+        ------
+        MethodError
+            A goal has no posture in a graph.
+        """
         parameters: TrajectoryParameters = self.parameters
         rng = np.random.default_rng(0)  # the same starts for all seeds
         chains = cheapest_chains(
@@ -191,15 +254,15 @@ class TrajectoryOptimisation(Method):
         for hands, configurations in chains:
             starts.setdefault(hands, []).append(configurations)
         for starts_of_hands in starts.values():
-            first = starts_of_hands[0]
+            start = starts_of_hands[0]
             for _ in range(parameters.noisy_starts):
-                spread = 0.1 * 10.0 ** rng.random()
-                starts_of_hands.append(first + spread * rng.standard_normal(first.shape))
+                sd = 0.1 * 10.0 ** rng.random()
+                starts_of_hands.append(start + sd * rng.standard_normal(start.shape))
         return starts
 
 
 class PathLength(TrajectoryOptimisation):
-    """The reward itself: the shortest path in joint space."""
+    """Shortest path in joint space, which is the task's reward."""
 
     name = "trajectory-optimisation/path-length"
     title = "Trajectory optimisation, path length"
@@ -212,7 +275,7 @@ class PathLength(TrajectoryOptimisation):
 
 
 class SquaredDisplacement(TrajectoryOptimisation):
-    """Minimum squared joint displacement: the sum over the movements from goal to goal."""
+    """Minimum squared joint displacement, summed over the movements from goal to goal."""
 
     name = "trajectory-optimisation/squared-displacement"
     title = "Trajectory optimisation, minimum squared joint displacement"
@@ -253,7 +316,7 @@ class Jerk(Acceleration):
 
 
 class HandJerk(Jerk):
-    """Minimum jerk of the hand, after Flash & Hogan (1985), with a small weight on joint jerk."""
+    """Minimum jerk of the hand (Flash & Hogan 1985), with a small weight on joint jerk."""
 
     name = "trajectory-optimisation/hand-jerk"
     title = "Trajectory optimisation, minimum hand jerk"
@@ -271,24 +334,36 @@ METHODS: tuple[type[Method], ...] = (PathLength, SquaredDisplacement, Accelerati
 def path_movements(
     session: Session, task: Task, instance: Instance, path: list[Array]
 ) -> tuple[Movement, ...]:
-    """Return movements of kind path, one per goal, along ``path``: for each goal a piece, the
-    configurations ``(k, dof)`` after the present one.
+    """Divide a path into movements of kind ``path``, one for each goal.
 
-    A movement ends where the hand enters its goal, and a piece may go on from there: what is left
-    of it begins the next movement, in which joints that ``instance`` holds on the way to the next
-    goal stay where they are. After the last goal nothing follows. A movement that misses its goal
-    is returned like others. The session counts the evaluations.
+    A movement ends where the hand enters its goal. The rest of its piece of the path begins the
+    next movement, in which the joints that ``instance`` holds do not move. A movement that misses
+    its goal is returned like the others.
+
+    Parameters
+    ----------
+    session : Session
+        Session that counts the evaluations.
+    task : Task
+    instance : Instance
+        Hands and held joints.
+    path : list of ndarray, shape (k, dof)
+        A piece for each goal: configurations after the end of the piece before.
+
+    Returns
+    -------
+    tuple of Movement
     """
     paths: list[Movement] = []
-    here, rest = np.array(task.q0), np.empty((0, task.robot.dof))
+    q, rest = np.array(task.q0), np.empty((0, task.robot.dof))
     for goal, (hand, piece) in enumerate(zip(instance.hands, path, strict=True)):
-        ahead = np.where(instance.held[goal], here, np.vstack([rest, piece]))
+        waypoints = np.where(instance.held[goal], q, np.vstack([rest, piece]))
         followed = follow(
-            task.robot, here, ahead, hand, task.goals[goal], task.radius, model=session.model
+            task.robot, q, waypoints, hand, task.goals[goal], task.radius, model=session.model
         )
         session.spend(forward_kinematics=followed.evaluations)
-        paths.append(Movement(goal + 1, hand, "path", ahead[-1], waypoints=ahead))
-        ends = np.cumsum(segment_lengths(np.vstack([here, ahead])))
+        paths.append(Movement(goal + 1, hand, "path", waypoints[-1], waypoints=waypoints))
+        ends = np.cumsum(segment_lengths(np.vstack([q, waypoints])))
         steps_made = followed.ticks - 1
-        here, rest = followed.q, ahead[ends > steps_made * session.model.step]
+        q, rest = followed.q, waypoints[ends > steps_made * session.model.step]
     return tuple(paths)

@@ -1,29 +1,35 @@
-"""The trajectory problem: one configuration per goal, its hand inside the goal's disc.
+"""The trajectory problem: a configuration for each goal, with the hand inside the goal's disc.
 
-With the changes Δ_g of the configurations from goal to goal, q_g = q_0 + Δ_1 + ... + Δ_g, and the
-position p of the chosen hand h_g, the nonlinear programme is::
+The nonlinear programme is::
 
     min   f(Δ, ...)
     s.t.  |p_{h_g}(q_g) - c_g|² <= r²        the hand is in the disc of goal g
           Δ_gj = 0                           for joints j that are held on the way to goal g
 
-where f is one of the costs
+Here Δ_g is the change of the configuration on the way to goal g, q_g = q_0 + Δ_1 + ... + Δ_g is the
+configuration at goal g, h_g is the hand chosen for it, p_h is the position of hand h, c_g is the
+centre of the goal and r its radius. The cost f is one of::
 
-    path length        Σ_g l_g  with  |Δ_g|² <= l_g²
+    path length          Σ_g l_g  with  |Δ_g|² <= l_g²
     squared displacement Σ_g |Δ_g|²
-    acceleration       ∫ |d²q/dt²|² dt,  from rest to rest, the goals hit at times t_g
-    jerk               ∫ |d³q/dt³|² dt,  t_g - t_(g-1) > 0 free at a constant sum
-    hand jerk          ∫ |d³p/dt³|² + w |d³q/dt³|² dt,  of the hand that is on its way to a goal
+    acceleration         ∫ |d²q/dt²|² dt
+    jerk                 ∫ |d³q/dt³|² dt
+    hand jerk            ∫ |d³p/dt³|² + w |d³q/dt³|² dt
 
-The integrals over joints are written out in the rates at the goals (:func:`segment_cost`), which
-are variables as Δ is. Jerk of the hand is a sum over Gauss-Legendre nodes; it leaves motion in the
-null space of the hand undecided, which the small weight w = ``JOINT_WEIGHT`` settles.
+The l_g are bounds on the lengths of the segments, which are variables, and w is ``JOINT_WEIGHT``.
+The last three costs are integrals over a movement from rest to rest. The durations between goals
+are free, and their sum is constant.
 
-One programme per robot, hands, number of goals and cost is compiled. The start, the goals and the
-hand sequence are its parameters. A locked base or an arm that is held is a variable bound, so that
-one solver serves every hand sequence of a task. Solved by IPOPT (Wächter & Biegler 2006) with exact
-derivatives from CasADi (Andersson et al. 2019). IPOPT's linear solver is not thread-safe:
-parallelise over processes.
+The integrals over joints are formulas in the rates (velocities and accelerations) at the goals
+(:func:`segment_cost`). The rates are variables, too. Jerk of the hand, which is on its way to a
+goal, is a sum over Gauss-Legendre nodes. It does not determine motion in the null space of the
+hand; the small weight w does.
+
+A programme is compiled for each robot, set of hands, number of goals and cost. The start, the goals
+and the hand sequence are its parameters. A locked base coordinate or a held arm is a bound of
+variables. So one solver serves all hand sequences of a task. It is IPOPT (Wächter & Biegler 2006)
+with exact derivatives from CasADi (Andersson et al. 2019). IPOPT's linear solver is not
+thread-safe: parallelise over processes.
 """
 
 from __future__ import annotations
@@ -46,25 +52,25 @@ from coartic.robot import HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
 
 MODEL_BASED = KINEMATICS | {Information.KINEMATIC_MODEL}
-"""Information of a planner with a model of the kinematics, besides its cost."""
+"""Information that planners with a model of the kinematics use, in addition to their cost."""
 
 Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk", "hand-jerk"]
 JOINT_WEIGHT = 0.1
 """Weight of joint jerk relative to jerk of the hand, (length unit / rad)²."""
 
 _ONE_AT_A_TIME = RLock()
-"""Held while CasADi builds a programme and IPOPT solves it: two threads cannot do so at once."""
+"""Lock while CasADi builds a programme or IPOPT solves it: threads must not do so at once."""
 _RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
-# Least duration of a segment, where the mean is 1. It binds where a smooth plan would hit two
-# goals at once. With less, jerk fails to converge for many hand sequences of two-armed-2.
+# Least duration of a segment; the mean is 1. It binds where a smooth plan would hit two goals at
+# once. With a smaller value, jerk does not converge for many hand sequences of two-armed-2.
 _SHORTEST: dict[Cost, float] = {"acceleration": 0.01, "jerk": 0.05, "hand-jerk": 0.2}
 _RATES: dict[Cost, int] = {
     "acceleration": 1,
     "jerk": 2,
     "hand-jerk": 2,
 }  # derivatives that are variables
-# IPOPT's tolerance. A plan by jerk of the hand is then as near to the least cost, some 1e-6 of it,
-# as the better plan of two starts with 1e-9.
+# IPOPT's tolerance, where it is not 1e-9. With it, a plan by jerk of the hand is within about 1e-6
+# of the least cost, like the better plan of two starts with 1e-9.
 _TOLERANCE: dict[Cost, float] = {"hand-jerk": 5e-10}
 _SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _OPTIONS: dict[str, Any] = {
@@ -84,7 +90,7 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Instance:
-    """Start, goals, hand of each goal and joints that cannot move: the parameters of one solve."""
+    """Parameters of a solve: start, goals, hand of each goal, and joints that cannot move."""
 
     q0: Array
     """Starting configuration, shape ``(dof,)``, length unit and rad."""
@@ -93,23 +99,45 @@ class Instance:
     hands: tuple[Hand, ...]
     """Hand of each goal."""
     held: NDArray[np.bool_]
-    """Joints that cannot move on the way to each goal, bool, shape ``(G, dof)``."""
+    """True for joints that cannot move on the way to a goal, shape ``(G, dof)``."""
     radius: float
-    """The hand ends within this distance of each goal's centre, length unit."""
+    """Largest distance of a hand from its goal's centre, length unit."""
 
     @classmethod
     def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
-        """Return the instance of a task with ``hands``, one for each goal; each hand is to end
-        within ``radius``, length unit, of its goal's centre. With ``still`` the arm whose hand is
-        not chosen for a goal cannot move on the way to it."""
+        """Return the instance of a task with a hand sequence.
+
+        Parameters
+        ----------
+        task : Task
+        hands : tuple of str
+            Hand of each goal.
+        still : bool
+            True if the arm whose hand is not chosen for a goal cannot move on the way to it.
+        radius : float
+            Largest distance of a hand from its goal's centre, length unit.
+        """
         held = held_joints(task, hands, still=still)
         return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
 
 
 def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np.bool_]:
-    """Return True for the entries of a configuration that cannot move on the way to each goal,
-    shape ``(G, dof)``: locked base coordinates and arms of hands that the task does not use; with
-    ``still`` also the arm whose hand is not chosen for the goal."""
+    """Return which joints cannot move on the way to each goal.
+
+    These are locked base coordinates and the arms of hands that the task does not use.
+
+    Parameters
+    ----------
+    task : Task
+    hands : sequence of str
+        Hand of each goal.
+    still : bool
+        True to add, for each goal, the arm whose hand is not chosen.
+
+    Returns
+    -------
+    ndarray of bool, shape (G, dof)
+    """
     held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
     held[:, ["xy".index(axis) for axis in task.locked_base]] = True
     for goal, hand in enumerate(hands):
@@ -121,7 +149,7 @@ def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np
 
 @dataclass(frozen=True)
 class PathPlan:
-    """A plan, the outcome of a solve, converged or not."""
+    """Plan that a solve returns, whether or not it converged."""
 
     instance: Instance
     """The instance that was solved."""
@@ -130,27 +158,32 @@ class PathPlan:
     """IPOPT's return status."""
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
-    cost: float  # of the problem; minus the depth in the discs if the solve asked for depth
+    cost: float
+    """Cost of the plan; if the solve asked for depth, minus the depth in the discs."""
     durations: Array
     """Durations of the segments, shape ``(G,)``, with mean 1; all 1 for costs without rates."""
     rates: Array
-    """Velocities, for jerk also accelerations, at start and goals, shape
-    ``(derivatives, G + 1, dof)``; ``derivatives`` is 0 for path length and squared displacement."""
+    """Velocities, and for jerk also accelerations, at start and goals, shape
+    ``(derivatives, G + 1, dof)``. Without rates ``derivatives`` is 0."""
     spent: dict[str, int] = field(default_factory=dict)
-    """Counters of the solver, ready for ``Session.spend``."""
+    """Counters of the solver, as keywords for ``Session.spend``."""
 
     def lengths(self) -> Array:
-        """Return the straight joint-space distances from the start to goal 1 and from goal to goal,
-        shape ``(G,)``, length unit and rad together, also where the plan is curved."""
+        """Return the straight joint-space distances from start to goal 1 and from goal to goal.
+
+        Returns
+        -------
+        ndarray, shape (G,)
+            Distances in length unit and rad mixed, also if the plan is curved.
+        """
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]))
 
 
 class TrajectoryProblem:
-    """The compiled programme of one cost, for every task of a robot with these ``hands`` and this
-    number of ``goals``."""
+    """Compiled programme of a cost, for all tasks with one robot, hands and number of goals."""
 
     def __init__(self, robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost) -> None:
-        import casadi  # which few commands need
+        import casadi  # slow to import, and most commands do not need it
 
         self._dof, self._goals, self._cost = robot.dof, goals, cost
         self._order = _RATES.get(cost, 0)
@@ -160,9 +193,9 @@ class TrajectoryProblem:
         # Time derivatives of the configuration at start and goals.
         rates = [casadi.SX.sym(f"rates{d}", dof, goals + 1) for d in range(order)]
         durations = casadi.SX.sym("durations", goals)
-        depth = casadi.SX.sym("depth")  # inside the rim, for the goals that are deep
+        depth = casadi.SX.sym("depth")  # least distance of the hand from the rim at deep goals
         rim = casadi.SX.sym("rim")
-        deep = casadi.SX.sym("deep", goals)
+        deep = casadi.SX.sym("deep", goals)  # 1 for goals at which depth counts
         q0 = casadi.SX.sym("q0", dof)
         centres = casadi.SX.sym("centres", 2, goals)
         right = casadi.SX.sym("right", goals)  # 1 where the right hand is chosen
@@ -171,13 +204,13 @@ class TrajectoryProblem:
         limits, q = [], q0
         for g in range(goals):
             q = q + steps[:, g]
-            place = {hand: robot.symbolic_hand(q, hand) for hand in hands}
-            hand = place[hands[0]]
+            positions = {hand: robot.symbolic_hand(q, hand) for hand in hands}
+            position = positions[hands[0]]
             if len(hands) > 1:
-                hand = right[g] * place["right"] + (1 - right[g]) * place["left"]
-            limits.append(casadi.sumsqr(hand - centres[:, g]) - (rim - deep[g] * depth) ** 2)
+                position = right[g] * positions["right"] + (1 - right[g]) * positions["left"]
+            limits.append(casadi.sumsqr(position - centres[:, g]) - (rim - deep[g] * depth) ** 2)
         if cost == "path-length":
-            # min Σ t subject to |Δq|² <= t²: smooth where a norm is not.
+            # min Σ l subject to |Δ|² <= l², which is smooth where the norm of Δ is not.
             limits += [casadi.sumsqr(steps[:, g]) - lengths[g] ** 2 for g in range(goals)]
             objective = weights[0] * casadi.sum1(lengths) - weights[1] * depth
         else:
@@ -186,9 +219,9 @@ class TrajectoryProblem:
             objective = sum(costs, casadi.SX(0))
             if cost == "hand-jerk":
                 objective = JOINT_WEIGHT * objective
-                for each in hands:
-                    chosen = right if each == "right" else 1 - right
-                    jerks = _hand_jerks(robot, each, q0, steps, durations, rates)
+                for hand in hands:
+                    chosen = right if hand == "right" else 1 - right
+                    jerks = _hand_jerks(robot, hand, q0, steps, durations, rates)
                     objective += casadi.dot(chosen, jerks)
         self._lower = np.array([-np.inf] * len(limits) + [0.0] * bool(order))
         self._upper = np.zeros(len(self._lower))
@@ -221,53 +254,67 @@ class TrajectoryProblem:
         stops: bool = False,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """Return a locally cheapest plan for an instance (start, goals, hands), sought from one
-        configuration per goal, ``start`` ``(G, dof)``. A plan has converged if IPOPT says so and
-        every constraint holds (to 1e-8); a plan that has not converged is returned, too.
+        """Find a locally cheapest plan for an instance.
 
-        Only for path length: ``lengths`` ``(G,)`` are upper bounds of the joint-space lengths of
-        the segments, NaN for a free length; None frees all. With ``deep`` (goals, from 0) the path
-        is not made short; the least depth of the hands inside the discs of these goals is made as
-        large as ``lengths`` allow. Only for costs with rates (velocities, accelerations): ``stops``
-        holds the rates at all goals at 0.
+        Parameters
+        ----------
+        instance : Instance
+            Start, goals, hands and held joints.
+        start : ndarray, shape (G, dof)
+            Configuration at each goal from which the solver starts.
+        lengths : ndarray, shape (G,), optional
+            Largest joint-space lengths of the segments; NaN for a free length. Only for path
+            length. By default all are free.
+        stops : bool
+            True to make the rates at all goals 0. Only for costs with rates.
+        deep : sequence of int
+            Goals, from 0. If there are any, the solver does not shorten the path. Instead it moves
+            the hands as deep into the discs of these goals as ``lengths`` allow: it maximises the
+            least depth. Only for path length.
+
+        Returns
+        -------
+        PathPlan
+            Plan, which has converged if IPOPT says so and all constraints hold to within 1e-8. A
+            plan that has not converged is returned, too.
         """
         goals, at = self._goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         free = np.where(instance.held, 0.0, np.inf).ravel()
         distances = np.sqrt((steps**2).sum(axis=1))
-        # A start, a least and a most value of each variable.
-        first, least, most = bounds = np.zeros((3, at["rates"].stop))
+        # Start, lower bound and upper bound of each variable.
+        initial, lower, upper = bounds = np.zeros((3, at["rates"].stop))
         bounds[:, at["steps"]] = steps.ravel(), -free, free
         if self._cost == "path-length":
-            first[at["lengths"]], most[at["lengths"]] = distances, np.inf
+            initial[at["lengths"]], upper[at["lengths"]] = distances, np.inf
             if lengths is not None:
-                given = ~np.isnan(lengths)
-                bounds[:, at["lengths"]][:, given] = lengths[given]
+                fixed = ~np.isnan(lengths)
+                bounds[:, at["lengths"]][:, fixed] = lengths[fixed]
         bounds[:, at["durations"]] = 1.0
         if self._order:  # durations vary at a constant total
             times = np.maximum(distances, 1e-3)
             times = np.maximum(times * (goals / times.sum()), 0.1)
-            first[at["durations"]] = times * (goals / times.sum())
-            least[at["durations"]], most[at["durations"]] = _SHORTEST[self._cost], goals
-        # Rates are 0 at rest (start and end, with stops each goal) and for joints held on either
-        # side.
+            initial[at["durations"]] = times * (goals / times.sum())
+            lower[at["durations"]], upper[at["durations"]] = _SHORTEST[self._cost], goals
+        # Rates are 0 at the start and at the last goal, with ``stops`` at each goal, and for joints
+        # that are held before or after a goal.
         still = np.vstack([instance.held[:1] | True, instance.held])
         still[:-1] |= instance.held
         still[-1] = True
         rates = np.tile(np.where(still | stops, 0.0, np.inf).ravel(), self._order)
         rim = instance.radius - _RIM
-        least[at["rates"]], most[at["rates"]] = -rates, rates
-        most[at["depth"]] = rim if deep else 0.0
+        lower[at["rates"]], upper[at["rates"]] = -rates, rates
+        upper[at["depth"]] = rim if deep else 0.0
         chosen = np.zeros(goals)
         chosen[list(deep)] = 1.0
         right = [float(hand == "right") for hand in instance.hands]
         weights = [0.0, 1.0] if deep else [1.0, 0.0]
         with _ONE_AT_A_TIME:
             solution = self._solver(
-                x0=first,
-                lbx=least,
-                ubx=most,
+                x0=initial,
+                lbx=lower,
+                ubx=upper,
                 lbg=self._lower,
                 ubg=self._upper,
                 p=np.concatenate(
@@ -297,21 +344,34 @@ class TrajectoryProblem:
 
 
 def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
-    """Return the least cost of a segment between given end states, as a CasADi expression; of jerk
-    of the hand only the part of the joints, without its weight; not for path length.
+    """Return the least cost of a segment between two states of the joints.
 
-    ∫|q̈|² is least for a cubic, ∫|q⃛|² for a quintic (Flash & Hogan 1985); both integrals are
-    written out in the end states, so that nothing is discretised. ``step``: change of the joints,
-    ``(dof,)``; ``time``: duration above 0; ``rates``: pair of the velocities at both ends, and for
-    both kinds of jerk pair of the accelerations, ``(dof,)`` each. Squared displacement ignores time
-    and rates.
+    A cubic minimises ∫|q̈|² and a quintic minimises ∫|q⃛|² (Flash & Hogan 1985). Both integrals are
+    exact formulas in the end states. For jerk of the hand, the cost is that of the joints without
+    its weight. The function is not for path length.
+
+    Parameters
+    ----------
+    cost : str
+        The cost; squared displacement ignores ``time`` and ``rates``.
+    step : casadi.SX, shape (dof,)
+        Change of the joints.
+    time : casadi.SX
+        Duration, above 0.
+    rates : list of tuple
+        Velocities at both ends, and for both kinds of jerk also accelerations at both ends, each of
+        shape ``(dof,)``.
+
+    Returns
+    -------
+    casadi.SX
     """
     import casadi
 
     if cost == "squared-displacement":
         return casadi.sumsqr(step)
     v0, v1 = rates[0]
-    # End states relative to the straight line at constant speed, which costs nothing.
+    # Velocities relative to a straight movement at constant speed, whose cost is 0.
     a, b = v0 - step / time, v1 - step / time
     if cost == "acceleration":
         return 4 * (casadi.sumsqr(a) + casadi.dot(a, b) + casadi.sumsqr(b)) / time
@@ -327,20 +387,22 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
 def _hand_jerks(
     robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
 ) -> Any:
-    """Return the integral (Gauss-Legendre, 6 nodes) of the squared jerk of a hand over each of G
-    segments, a CasADi column, along quintics between the end states: start ``q0``, changes
-    ``steps``, ``(dof, G)``, ``durations``, ``(G,)``, and ``rates``, velocities and accelerations at
-    start and goals, ``(dof, G + 1)`` each."""
+    """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column.
+
+    The joints move along quintics from the start ``q0`` by the changes ``steps``, ``(dof, G)``, in
+    the ``durations``, ``(G,)``. ``rates`` are velocities and accelerations at start and goals,
+    ``(dof, G + 1)`` each. The integral is by Gauss-Legendre quadrature with 6 nodes.
+    """
     import casadi
 
-    powers, integrals, here = np.arange(6), [], q0
+    powers, integrals, q = np.arange(6), [], q0
     nodes, weights = np.polynomial.legendre.leggauss(6)  # on [-1, 1], of each segment
     for g in range(steps.shape[1]):
         step, time = steps[:, g], durations[g]
         (v0, v1), (a0, a1) = ((r[:, g], r[:, g + 1]) for r in rates)
         v0, v1, a0, a1 = v0 * time, v1 * time, a0 * time**2, a1 * time**2
         coefficients = [
-            here, v0, a0 / 2,
+            q, v0, a0 / 2,
             10 * step - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
             -15 * step + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
             6 * step - 3 * (v0 + v1) - 0.5 * (a0 - a1),
@@ -354,7 +416,7 @@ def _hand_jerks(
                 derivatives.append(sum(c * w for c, w in zip(coefficients, scale, strict=True)))
             total += weight * casadi.sumsqr(robot.symbolic_hand_jerk(derivatives, hand))
         integrals.append(total / time**5)
-        here = here + step
+        q = q + step
     return casadi.vertcat(*integrals)
 
 
@@ -362,17 +424,29 @@ def _hand_jerks(
 def trajectory_problem(
     robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
 ) -> TrajectoryProblem:
-    """Return the compiled problem for a robot, hands to choose from, a number of goals and a cost;
-    a process keeps the 32 problems used last."""
+    """Return the compiled problem; a process caches the 32 problems that it used last."""
     with _ONE_AT_A_TIME:
         return TrajectoryProblem(robot, hands, goals, cost)
 
 
 def spline(plan: PathPlan, samples: int) -> list[Array]:
-    """Return configurations along a plan with rates, a list of pieces ``(samples, dof)``, one per
-    goal, each at equal steps in time and ending at the goal; the start is left out. Between goals:
-    Hermite cubics (plans with velocities) or quintics (accelerations too)."""
-    from scipy.interpolate import BPoly  # slow, and a command that names methods needs none
+    """Sample the path of a plan with rates, at equal steps in time between goals.
+
+    The path consists of Hermite cubics for plans with velocities only, and of quintics for plans
+    with accelerations.
+
+    Parameters
+    ----------
+    plan : PathPlan
+    samples : int
+        Number of configurations for each goal.
+
+    Returns
+    -------
+    list of ndarray, shape (samples, dof)
+        A piece for each goal, which ends at the goal. The start is left out.
+    """
+    from scipy.interpolate import BPoly  # slow to import, and most commands do not need it
 
     corners = np.vstack([plan.instance.q0, plan.configurations])
     times = np.concatenate([[0.0], np.cumsum(plan.durations)])

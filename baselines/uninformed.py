@@ -1,8 +1,8 @@
-"""The learner's trials for methods that see of a trial its total reward and where it hit.
+"""The learner's trials, for methods that get only rewards and the postures at the goals.
 
-As in the learner, a trial moves towards one target configuration per goal, the
-corrective process **A** corrects the goals that are missed, and the configurations in which the
-goals were hit are known afterwards.
+As in the learner, a trial moves towards a target configuration for each goal. The corrective
+process **A** corrects the movements that miss. After the trial the method knows its total reward
+and the configurations in which it hit the goals.
 """
 
 from __future__ import annotations
@@ -27,25 +27,34 @@ class UninformedParameters(Parameters):
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Trials of a run."""
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
-    """SD of the (first) perturbations, length unit (base) or rad (joints)."""
+    """Standard deviation of the perturbations, in CMA-ES of the first ones; length unit (base) and
+    rad (joints)."""
 
 
 class Attempts:
-    """Make the physical trials of one run, and remember the best trial."""
+    """Make the physical trials of one run, and remember the best trial.
+
+    Parameters
+    ----------
+    session : Session
+        Session in which the trials are made and counted.
+    trials : int
+        Most trials.
+    """
 
     def __init__(self, session: Session, trials: int) -> None:
         self._session = session
         self.explored = np.tile(explored_joints(session), (session.goals_count, 1))
-        """True for joints that are explored at each goal, shape ``(G, dof)``."""
+        """True for the joints that are explored at each goal, shape ``(G, dof)``."""
         left = session.trials_left
         self.left = trials if left is None else min(trials, left)
-        """Number of trials left, at most ``trials``."""
+        """Number of trials left."""
         self.trials_made = 0
         """Number of trials made."""
         self.reward = -math.inf
         """Best reward so far; -inf before the first success."""
         self.hands = ""
-        """Hand sequence of the best trial, empty before the first success."""
+        """Hand sequence of the best trial; empty before the first success."""
         self.best_trial = -1
         """Number of the best trial, from 0; -1 before the first success."""
         self.targets: Array = np.empty(0)
@@ -53,37 +62,75 @@ class Attempts:
         self.reached: Array = np.empty(0)
         """Configurations in which the best trial hit the goals, shape ``(G, dof)``."""
 
-    def by_correction(self, *hands: str) -> Trials:
-        """Make one trial for each of the hand sequences given (at least one), such as ``"RRLR"``:
-        without targets, so that the corrective process alone goes to each goal. Remember the best
-        of these trials if it beats all earlier ones, and return the results of the trials made, in
-        order: fewer than sequences if the budget ends. Raises BudgetError if no trial of the
-        session is left."""
+    def run_corrective(self, *hands: str) -> Trials:
+        """Make a trial by the corrective process alone for each of some hand sequences.
+
+        Parameters
+        ----------
+        *hands : str
+            Hand sequences, such as ``"RRLR"``; at least one.
+
+        Returns
+        -------
+        Trials
+            Results of the trials, in order. If the budget ends, there are fewer than sequences.
+
+        Raises
+        ------
+        BudgetError
+            No trial of the session is left.
+        """
         shape = (len(hands), self._session.goals_count, self._session.dof)
-        return self.by_targets([*hands], np.full(shape, np.nan))
+        return self.run_targets([*hands], np.full(shape, np.nan))
 
     def around(self, hands: str, values: Array) -> Trials:
-        """Make N trials with one hand sequence, or as many as the budget of the session still has;
-        remember the best trial so far, and return the results of these trials, a row for each.
+        """Make trials with one hand sequence and targets for the explored joints.
 
-        ``values``, shape ``(N, n)``, length unit and rad, are target coordinates of the n explored
-        joints of all goals (True in ``explored``), goal by goal; other joints keep still. N is at
-        least 1. Raises BudgetError if no trial of the session is left.
+        Parameters
+        ----------
+        hands : str
+            Hand sequence, such as ``"RRLR"``.
+        values : ndarray, shape (N, n)
+            Targets of the n explored joints of all goals (True in ``explored``), goal by goal,
+            length unit and rad; N is at least 1. Other joints do not move.
+
+        Returns
+        -------
+        Trials
+            Results of the trials, in order. If the budget ends, there are fewer than N.
+
+        Raises
+        ------
+        BudgetError
+            No trial of the session is left.
         """
         targets = np.full((len(values), *self.explored.shape), np.nan)
         targets[:, self.explored] = values
-        return self.by_targets(hands, targets)
+        return self.run_targets(hands, targets)
 
-    def by_targets(
+    def run_targets(
         self, hands: str | list[str], targets: Array, until: Array | None = None
     ) -> Trials:
-        """Make N trials (at least one) with targets of shape ``(N, G, dof)``, length unit and rad,
-        NaN for joints that keep still, and one hand sequence, or a hand sequence for each trial;
-        remember the best trial so far, and return the results of the trials made, fewer if the
-        budget of the session ends.
+        """Make trials with targets, and remember the best trial so far.
 
-        ``until``, rewards of shape ``(N,)``: the first trial whose reward exceeds its entry is the
-        last trial made. Raises BudgetError if no trial of the session is left.
+        Parameters
+        ----------
+        hands : str or list of str
+            Hand sequence of all trials, or of each trial.
+        targets : ndarray, shape (N, G, dof)
+            Targets, length unit and rad; NaN for joints that do not move. N is at least 1.
+        until : ndarray, shape (N,), optional
+            Rewards. The first trial with a reward above its entry is the last trial made.
+
+        Returns
+        -------
+        Trials
+            Results of the trials made, in order. If the budget ends, there are fewer than N.
+
+        Raises
+        ------
+        BudgetError
+            No trial of the session is left.
         """
         trials = self._session.trials(hands, targets, until=until)
         rewards = trials.rewards
@@ -99,19 +146,21 @@ class Attempts:
 
     @property
     def solution(self) -> tuple[Movement, ...]:
-        """The movements of the best trial. Raises ValueError before the first success."""
+        """Movements of the best trial. Raises ValueError before the first success."""
         return movements_of(self.hands, self.targets)
 
     def result(self, **details: Any) -> Result:
-        """Return the movements of the best trial, and as details its number (from 0) and
-        ``details``. Raises MethodError if no trial hit every goal."""
+        """Return the movements of the best trial, with its number (from 0) and other details.
+
+        Raises MethodError if no trial has hit every goal.
+        """
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)
         if not self.hands:
             raise MethodError(
                 "infeasible",
-                f"the corrective process failed in all {self.trials_made} trials made; "
-                "no trial hit every goal",
+                f"no trial hit every goal: the corrective process failed in all "
+                f"{self.trials_made} trials",
                 details,
             )
         return Result(self.solution, {"best_trial": self.best_trial, **details})

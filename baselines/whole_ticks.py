@@ -1,9 +1,9 @@
 """From a shortest path to movements in whole control ticks.
 
-A movement lasts a whole number of steps of length m, so a plan whose segments are not multiples of
-m pays for the rest of each. Here the segments are rounded and the plan is solved again around them,
-and each movement aims *through* the goal's rim: its target lies beyond, on the same joint-space
-line, so that the movement ends by hitting the goal and not by arriving short of it.
+A movement lasts a whole number of steps of length m. So a plan loses up to a step at each segment
+whose length is not a multiple of m. This module rounds the segments, and solves for the path again
+with the rounded lengths. Each movement aims *through* the goal's rim: its target is beyond the goal
+on the same joint-space line, so that the movement ends when it hits the goal.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from coartic.method import Session
 from coartic.motion.movement import move
 from coartic.robot import Array
 
-MOST_ROUNDINGS = 64  # of a plan that are tried: all with up to seven goals
-_SLACK = 1e-6  # of a step: lengths are known to the solver's tolerance
-_BEYOND = tuple(1 << k for k in range(11))  # steps that a target lies beyond the configuration
+MOST_ROUNDINGS = 64  # roundings of a plan that are tried; up to seven goals have no more
+_SLACK = 1e-6  # part of a step: lengths have the solver's tolerance
+_BEYOND = tuple(1 << k for k in range(11))  # numbers of steps from the configuration to the target
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,7 @@ class TickPlan:
     """A plan in whole steps."""
 
     steps: tuple[int, ...]
-    """Movement steps to each goal; 0 where the hand is in the goal when the goal becomes
-    current."""
+    """Number of steps to each goal; 0 if the hand is in the goal when the goal becomes current."""
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
 
@@ -44,9 +43,10 @@ class TickPlan:
 
 
 class Rounding:
-    """Round plans of one problem and instance; the session counts the solver's effort.
+    """Round plans of one problem and instance to whole steps.
 
-    ``merged`` names goals (0-based) that are hit as their turn comes, without a movement.
+    Parameters ``merged`` of the methods are the numbers, from 0, of goals that take no movement,
+    because the hand is inside the goal when its turn comes. The session counts the solver's effort.
     """
 
     def __init__(self, session: Session, problem: TrajectoryProblem, instance: Instance) -> None:
@@ -54,17 +54,25 @@ class Rounding:
         self._step = session.model.step
 
     def nearest(self, plan: PathPlan) -> TickPlan | None:
-        """Return the plan solved again with each segment except the last in the nearest whole
-        number of steps, and the last, as short as it then can be, rounded up; None if a solve
-        fails. To first order all roundings of a shortest path (:meth:`every`) have equal ticks."""
+        """Round each segment to the nearest number of steps, and the last segment up.
+
+        The last segment is first made as short as the other segments allow. To first order all
+        roundings of a shortest path (:meth:`every`) take equally many ticks.
+
+        Returns
+        -------
+        TickPlan or None
+            None if a solve fails.
+        """
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
 
     def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
-        """Yield roundings of a plan to whole steps, the nearest first: each segment is rounded up
-        or down, the last one up. Goals ``merged`` (from 0) are hit without a movement. Of
-        the nearest 64 roundings, which are all for up to seven goals, roundings that cannot be
-        solved are left out.
+        """Yield the nearest roundings of a plan to whole steps, the nearest first.
+
+        Each segment is rounded up or down, and the last segment up. Only the nearest 64 roundings
+        are tried, which are all of them for up to seven goals. Roundings that cannot be solved are
+        left out.
         """
         exact = plan.lengths()[:-1] / self._step
         choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
@@ -78,23 +86,38 @@ class Rounding:
                 yield rounded
 
     def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
-        """Return the ticks of a plan if only its whole length is rounded up, with a movement to
-        each goal that is not in ``merged`` (from 0): roundings of a shortest plan hardly take
-        fewer."""
+        """Return the ticks of a plan if only its total length is rounded up.
+
+        Roundings of a shortest plan rarely take fewer ticks.
+        """
         length = float(plan.lengths().sum())
-        moved = len(self._instance.hands) - len(merged)
-        return math.ceil(length / self._step - _SLACK) + moved
+        movements = len(self._instance.hands) - len(merged)
+        return math.ceil(length / self._step - _SLACK) + movements
 
     def plans(
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
-        """Yield pairs: a tuple of goals (from 0) that are hit without a movement, and the shortest
-        plan found in which these goals are hit so; first the empty tuple with ``plan`` itself.
-        ``worth`` is asked whether a number of ticks is of interest; plans that cannot have such a
-        number, by :meth:`least`, are not sought."""
+        """Yield the shortest plan for each choice of goals that take no movement.
+
+        Parameters
+        ----------
+        plan : PathPlan
+            Shortest plan with a movement to each goal.
+        task : Task
+        worth : callable
+            Function that says whether a number of ticks is of interest. Choices that cannot have
+            such a number, by :meth:`least`, are not tried.
+
+        Yields
+        ------
+        tuple of int
+            Numbers of the goals, from 0; first the empty tuple.
+        PathPlan
+            Shortest plan found for this choice.
+        """
         hands, goals = self._instance.hands, len(self._instance.hands)
-        # The hand can be there before: at the start, since another hand hits the goal before, or
-        # since the discs of both goals overlap.
+        # A hand can be in its goal before the turn of the goal: at the start, if the other hand
+        # hits the goal before, or if the discs of both goals overlap.
         start = task.robot.forward_kinematics(task.q0, hands[0])
         able = [0] if math.dist(start, task.goals[0]) <= task.radius else []
         able += [
@@ -117,17 +140,29 @@ class Rounding:
                     waiting.append((more, merger))
 
     def divide(self, plan: PathPlan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
-        """Return a plan rounded to ``steps``, a number of steps to each goal except the last, and
-        the fewest steps found to the last goal; None if a solve fails. Goals ``merged`` (from 0)
-        are hit without a movement."""
+        """Round a plan to numbers of steps.
+
+        Parameters
+        ----------
+        plan : PathPlan
+        steps : list of int
+            Number of steps to each goal except the last. The last goal gets the fewest steps found.
+        merged : tuple of int
+            Goals, from 0, that take no movement.
+
+        Returns
+        -------
+        TickPlan or None
+            None if a solve fails.
+        """
         lengths = np.array([*steps, np.nan]) * self._step
         shortest = self.solve_around(plan.configurations, lengths, merged)
         if not shortest.converged:
             return None
         last = shortest.lengths()[-1] / self._step
         lengths[-1] = math.ceil(last - _SLACK) * self._step
-        # Hands as deep inside the discs as these lengths allow: safe against rounding, and
-        # above all those that are to be there before another hand hits.
+        # Move the hands as deep into the discs as these lengths allow, so that rounding errors do
+        # not matter. If goals are merged, only their hands are moved deep.
         deep = merged or range(len(lengths))
         centred = self.solve_around(shortest.configurations, lengths, merged, deep=deep)
         if not centred.converged:
@@ -144,13 +179,19 @@ class Rounding:
         *,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """Return the locally shortest plan from the configurations ``start``, shape ``(G, dof)``;
-        it may not have converged.
+        """Return a locally shortest plan, which may not have converged.
 
-        ``lengths``, shape ``(G,)``, bound the lengths of the movements in joint space; NaN where a
-        length is free. Goals in ``merged`` (from 0) are hit without a movement. With ``deep``
-        (goals, from 0) the hands are as deep inside the discs of these goals as the lengths allow,
-        and the path is not made short. The session counts the solver's effort.
+        Parameters
+        ----------
+        start : ndarray, shape (G, dof)
+            Configuration at each goal from which the solver starts.
+        lengths : ndarray, shape (G,)
+            Largest joint-space lengths of the movements; NaN for a free length.
+        merged : tuple of int
+            Goals, from 0, that take no movement.
+        deep : sequence of int
+            Goals, from 0, into whose discs the hands move as deep as ``lengths`` allow. If there
+            are any, the path is not made short.
         """
         instance = self._instance
         if merged:
@@ -170,14 +211,28 @@ def movements(
     configurations: Array,
     steps: tuple[int, ...] | None = None,
 ) -> tuple[Movement, ...]:
-    """Return a movement for each goal of an instance, to ``configurations``, shape ``(G, dof)``.
+    """Return a movement to each goal of an instance.
 
-    Joints that are held on the way to a goal stay where they are, even if an earlier movement ended
-    by a hit short of its target. With ``steps``, a number per goal, the target of a movement lies
-    beyond the configuration, on the same line, so that the movement hits after at most that many
-    steps; if no such target does, the target is the configuration. For 0 steps the movement is
-    corrective, and not to be made where the hand is in the goal already. The session counts the
-    effort.
+    Joints that are held on the way to a goal stay where the movement before has left them, even if
+    that movement ended before its target.
+
+    Parameters
+    ----------
+    session : Session
+        Session that counts the effort.
+    task : Task
+    instance : Instance
+    configurations : ndarray, shape (G, dof)
+        Configuration at each goal.
+    steps : tuple of int, optional
+        Most steps to each goal. The target of a movement is then beyond the configuration, on the
+        same line, so that the movement hits within these steps. If no such target is found, the
+        target is the configuration. With 0 steps the movement is corrective; it is not made if the
+        hand is already in the goal.
+
+    Returns
+    -------
+    tuple of Movement
     """
     planned: list[Movement] = []
     q, model = np.array(task.q0), session.model

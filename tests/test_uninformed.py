@@ -107,7 +107,7 @@ class HalfOfAPlain:
     def __init__(self):
         self.sizes = []
 
-    def by_correction(self, hands):
+    def run_corrective(self, hands):
         return SimpleNamespace(rewards=np.array([-300.0]), reached=np.zeros((1, 1, 3)))
 
     def around(self, hands, values):

@@ -121,7 +121,7 @@ class CMAESWithHandler(Method):
         """Make generations of trials while one is sure to fit."""
         parameters = self.parameters
         attempts = NoisyAttempts(session, parameters.trials, parameters.motor_noise)
-        first = attempts.by_correction(parameters.hands)
+        first = attempts.run_corrective(parameters.hands)
         start, ends = first.reached[0, attempts.explored], []
         worst = -float(first.rewards[0])
 
