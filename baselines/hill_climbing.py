@@ -2,10 +2,10 @@
 
 Each hand sequence has a centre. The first trial of a sequence is made by the corrective process
 **A** alone (but see ``begin``), and the configurations in which it hits the goals are the first
-centre. Each later trial perturbs all explored joints of the centre at once. A better trial moves the centre to the
-configurations in which it hit the goals, as in the learner. Moving the centre to the trial's
-targets instead would gain more: on the paper's tasks random search with 1,000 ``stages`` gains 0 to
-16 ticks more with targets.
+centre. Each later trial perturbs all explored joints of the centre at once. A better trial moves
+the centre to the configurations in which it hit the goals, as in the learner. Moving the centre to
+the trial's targets instead would gain more: on the paper's tasks random search with 1,000
+``stages`` gains 0 to 16 ticks more with targets.
 
 Hands are explored as in the learner: for each goal of the best sequence known, with probability ε,
 a random hand replaces the hand. The default standard deviation and ε are the learner's; they were

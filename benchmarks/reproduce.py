@@ -125,9 +125,12 @@ def compare_runs(a: Run, b: Run) -> list[str]:
         | {"details": {k: v for k, v in run.outcome.details.items() if k != UNREPEATED}}
         for run in (a, b)
     )
+    names = ["status", "reason", "details", *Meter.COUNTS]
+    if a.id == b.id:  # from which the motor noise is drawn
+        names.append("noisy_ticks")
     changes = [
         f"{name}: {brief_value(first[name])} against {brief_value(second[name])}"
-        for name in ("status", "reason", "details", "noisy_ticks", *Meter.COUNTS)
+        for name in names
         if first[name] != second[name]
     ]
     for part in PARTS:

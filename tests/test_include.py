@@ -182,7 +182,9 @@ def test_shipped_results(monkeypatch, tmp_path):
 def packed(parts, tmp_path, monkeypatch):
     """The right part of suite ``paper``, as if it were shipped."""
     (tmp_path / "packed").mkdir()
-    pack_shipped.pack(parts[1], tmp_path / "packed")
+    with open_store(parts[1]) as source:
+        runs = map(source.run, source.runs().run_id)
+        pack_shipped.pack(source, runs, tmp_path / "packed")
     monkeypatch.setattr(shipped, "SHIPPED_FOLDER", tmp_path / "packed")
     return parts[1]
 

@@ -331,7 +331,7 @@ def test_a_condition_keeps_its_limits(field, value):
     [
         ({"goals": ((3.0, 1.0),) * 5}, "for each of 5 goals"),
         ({"initial_hands": "L"}, "'L' do not fit task"),
-        ({"robot": Robot(left_links=(1.0,), right_links=(1.0,))}, r"needed is \(4,\)"),
+        ({"robot": Robot(left_links=(1.0,), right_links=(1.0,))}, r"it must be \(4,\)"),
         ({"radius": np.inf}, "radius is inf"),
     ],
 )
@@ -371,7 +371,7 @@ def test_any_condition_is_a_setting_of_a_method(tmp_path):
         ('direction = "stay"', "has no effect unless drift or pull is above 0"),
         ('credit = "subtask"', "set learned to 'replay'"),
         ('counted = "all"', "set credit to 'subtask'"),
-        ("drift = -1", "drift is -1; it should be a number from 0 to 10"),
+        ("drift = -1", "drift is -1; it must be a number from 0 to 10"),
     ],
 )
 def test_conditions_that_cannot_be_are_refused_in_a_sentence(fields, sentence, tmp_path):

@@ -192,10 +192,10 @@ SOLUTION = corrective_trial("ascending", "RRR").movements
         *(({"motor_noise": noise}, "motor_noise is") for noise in (-0.01, np.nan)),
         ({"repeats": 0}, "repeats is"),
         ({"seed": -1}, "seed is"),
-        ({"seed": [1, 2]}, "seed has 2 entries; it needs one for each of the 1 solutions"),
+        ({"seed": [1, 2]}, "seed has 2 entries; it must have one for each of the 1"),
         ({"task": "descending"}, r"took 319 ticks; on task 'descending'.* of another task\?"),
         ({"task": changed("ascending", hands=["left"], initial_hands="LLL")}, "has no right hand"),
-        ({"solutions": SOLUTION}, r"solutions\[0\]: .* needed is a list of movements"),
+        ({"solutions": SOLUTION}, r"solutions\[0\]: .* must be a list of movements"),
     ],
 )
 def test_wrong_arguments_are_refused(change, words):

@@ -154,7 +154,7 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
     reset = page.get_by_role("button", name="Reset")
     assert reset.is_disabled()
     slide(page, "Practice", 1)
-    assert "alike" in text(page, "finding")
+    assert "same posture" in text(page, "finding")
     reset.click()
     assert words in text(settled(page), "finding")
     assert reset.is_disabled()
@@ -197,7 +197,7 @@ def test_the_link_holds_the_whole_state(opened):
     page = settled(opened())
     assert "posture difference" in text(page, "finding")
     choose(page, "each movement")
-    assert "alike" in text(page, "finding")  # no coarticulation by such a reward
+    assert "same posture" in text(page, "finding")  # no coarticulation by such a reward
     page.get_by_label("Task").select_option("3")
     page.get_by_label("It explores").select_option("EC3")
     page.get_by_role("button", name="Goal 2").focus()

@@ -53,9 +53,9 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
         ),
         (planned(posture(1.0), posture(2.0), hand="left"), "has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
-        ([Movement(1, "right", "jump", np.zeros(10))], "unknown kind 'jump'"),
+        ([Movement(1, "right", "jump", np.zeros(10))], "kind of a movement is 'jump'"),
         ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),
-        ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "target is its last waypoint"),
+        ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "or its last waypoint"),
     ],
 )
 def test_solutions_that_break_the_rules(movements, words):

@@ -180,7 +180,7 @@ def test_kernels_end_whatever_they_get(bad, where):
 @pytest.mark.parametrize(
     ("name", "wrong", "words"),
     [
-        *(("hands", [0, hand], "needed are 0 .left. and 1 .right.") for hand in (2, -1, 0.5)),
+        *(("hands", [0, hand], "must be 0 .left. or 1 .right.") for hand in (2, -1, 0.5)),
         *(("q", q, "^q ") for q in ([BOTH.q0[:9]] * 2, [BOTH.q0 * np.nan] * 2)),
         *(("goals", goals, "^goals ") for goals in ([[1.0, 2.0]], [[1.0, np.inf]] * 2)),
         ("targets", np.zeros((2, 9)), "^targets "),

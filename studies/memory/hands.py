@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from coartic import load_task
 from coartic.analysis import load
 from coartic.analysis.statistics import bootstrap_test, holm, task_mean
 from coartic.baselines.random_search import RandomSearch
 from coartic.benchmarks.runner import run_suite
 from coartic.estimates import LEVEL
 from coartic.method import Session
-from coartic.tasks.catalogue import load_task
 
 HERE = Path(__file__).parent
 TRIALS, RESAMPLES = 10_000, 99_999

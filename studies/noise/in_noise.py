@@ -14,11 +14,11 @@ import cma
 import numpy as np
 from pydantic import Field
 
+from coartic import movements_of
 from coartic.baselines.cma_es import CMAES, BanditParameters, Strategy, spend_trials
 from coartic.baselines.uninformed import Attempts
 from coartic.method import Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
-from coartic.motion.solution import movements_of
 
 
 class NoiseParameters(BanditParameters):

@@ -24,10 +24,7 @@ import pandas as pd
 
 from coartic import Movement, correct, execute, execute_noisy
 from coartic.analysis import load
-from coartic.benchmarks.planning import plan, request_for
-from coartic.benchmarks.registry import registry
-from coartic.benchmarks.runner import perform
-from coartic.benchmarks.suites import load_suite
+from coartic.benchmarks.runner import run_suite
 
 HERE = Path(__file__).parent
 LEVELS = (0.0, 0.002, 0.005, 0.01, 0.02)
@@ -177,8 +174,7 @@ def run_blocks(name, description, folder, text, method_files=()):
     file = folder.with_suffix(".toml")
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(f"{head}runs = 3\ntrials = 10_000\ntime_limit_s = 3600\n{text}", "utf-8")
-    registered = registry(method_files)
-    print(perform(plan(load_suite(str(file)), request_for(), registered), folder), flush=True)
+    print(run_suite(file, folder, method_files=method_files), flush=True)
     return load(folder)
 
 
