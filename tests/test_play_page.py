@@ -172,7 +172,7 @@ def test_coarticulation_appears_with_practice(opened_task):
     reset = page.get_by_role("button", name="Reset")
     assert reset.is_disabled()
     slide(page, "Practice", 1)
-    assert "alike" in text(page, "finding")
+    assert "same posture" in text(page, "finding")
     reset.click()
     assert words in text(settled(page), "finding")
     assert reset.is_disabled()
@@ -286,7 +286,7 @@ def test_the_link_holds_the_whole_state(opened):
     page = settled(opened())
     assert "posture difference" in text(page, "finding")
     choose(page, "each movement")
-    assert "alike" in text(page, "finding")  # no coarticulation by such a reward
+    assert "same posture" in text(page, "finding")  # no coarticulation by such a reward
     page.get_by_label("Task").select_option("3")
     page.get_by_label("It explores").select_option("EC3")
     page.get_by_role("button", name="Goal 2").focus()
@@ -368,7 +368,7 @@ def test_on_a_phone_picture_slider_and_finding_come_first(visited, address):
     page = settled(visited(f"{address}#trials=1", 390, reduced_motion="reduce"))
     for width, height in ((390, 844), (844, 390)):
         page.set_viewport_size({"width": width, "height": height})
-        assert "alike" in text(page, "finding")
+        assert "same posture" in text(page, "finding")
         assert text(page, "progress") == "1 trial"
         for part in (".stage", "[data-is=trials]", "[data-is=finding]"):
             box = page.locator(part).bounding_box()
