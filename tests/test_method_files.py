@@ -41,7 +41,7 @@ def test_a_file_brings_a_method(coartic, tmp_path):
 def test_what_a_method_was_tuned_on_is_listed_and_changes_no_run(coartic, tmp_path):
     assert all(info.tuned_on for info in built_in().values())
     assert "Tuned on     the paper's tasks: twenty settings" in coartic("list", "cma-es/bandit")[1]
-    for text, said in (('tuned_on = "mine-0 to mine-9"', "mine-0 to mine-9"), ("", "not said")):
+    for text, said in (('tuned_on = "mine-0 to mine-9"', "mine-0 to mine-9"), ("", "not stated")):
         file = tmp_path / "nearest_hand.py"
         file.write_text(
             TEXT.replace("    stochastic = False\n", f"    stochastic = False\n    {text}\n")
@@ -60,10 +60,10 @@ AT_IMPORT = {
     HARMLESS: "",
     "class Odd(BaseException): pass\nraise Odd('odd')": "cannot be imported: Odd: odd",
     "sys.exit(0)": "cannot be imported: SystemExit: 0",
-    "os.kill(os.getpid(), 9)": "cannot be read by its process: SIGKILL ended it",
+    "os.kill(os.getpid(), 9)": "the process that reads it ended: SIGKILL ended it",
     "def f(): f()\nf()": "cannot be imported: RecursionError",
     f"{TEXT}\nclass Data(NearestHand): name, files = 'data', ['w.npy']": "w.npy: cannot be read: ",
-    f"{TEXT}\nclass Twice(NearestHand): pass": "'nearest-hand' is already taken",
+    f"{TEXT}\nclass Twice(NearestHand): pass": "'nearest-hand' exists already",
 }
 
 
