@@ -99,11 +99,11 @@ def with_width(half_width):
         (COST, np.zeros((18, 18)), r"use many\(x\) for rows, many\(x.T\) for columns"),
         *((COST, wrong, "it should be real numbers")
           for wrong in ("abc", COST.x0 + 1j, np.zeros(18, bool))),
-        (COST.many, [[1, 2], [3]], "in rows of one length"),
+        (COST.many, [[1, 2], [3]], "in rows of equal length"),
         (COST.many, np.where(np.arange(18) == 7, np.nan, np.zeros((2, 18))),
          "point 0: of goal 2 some entries are NaN"),
         (COST, np.where(GOALS == 1, np.inf, COST.x0), "infinite"),
-        *((call, wrong, "it should have no masked entries")
+        *((call, wrong, "it should not have masked entries")
           for call, wrong in ((COST, MASKED), (COST.evaluations_to, MASKED))),
         *((COST.evaluations_to, wrong, r"targets (are|is) .*(a cost, the ticks|real numbers)")
           for wrong in (-456, [500, -1.0], FAILED + 1, np.nan, "456")),
@@ -361,7 +361,7 @@ def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
     with pytest.raises(BudgetError):
         problem(problem.x0)
     few = "budget is 15; to choose among the hand sequences .* takes 16 trials: give more, or say"
-    for budget, words in ((0, "budget is 0; it must be a whole number from 1"), (15, few)):
+    for budget, words in ((0, "budget is 0; it must be an integer from 1"), (15, few)):
         with pytest.raises(ValueError, match=words):
             objective(FOUR, budget=budget)
     assert objective(FOUR, "RLRR", budget=5).trials_left == 4

@@ -171,7 +171,9 @@ def test_a_task_of_ones_own_needs_goals_alone(tmp_path):
 @pytest.mark.parametrize("name", ["arm.urdf", "run.MOT", "hits.xlsx"])
 @pytest.mark.parametrize("kind", [str, Path])
 def test_files_of_other_programs_are_refused_by_their_kind(name, kind):
-    words = f"{name}: coartic reads no {Path(name).suffix.lower()} file; a task is a TOML file"
+    words = (
+        f"{name}: coartic does not read {Path(name).suffix.lower()} files; a task is a TOML file"
+    )
     with pytest.raises(TaskError, match=words):
         load_task(kind(name))
 

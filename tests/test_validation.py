@@ -106,15 +106,15 @@ SUITES = [
     (SUITE + "grid = {noise_sd = [nan]}", "grid.noise_sd[0] is nan: "),
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5: "),
     (suite('["ascending"]', "3"), "blocks[0].tasks is 3: "),
-    (SUITE + "move = {goal = 4, by = [[0, 1]]}", "has no goal 4"),
+    (SUITE + "move = {goal = 4, by = [[0, 1]]}", "move asks for goal 4"),
 ]
 METHODS = [
     ("import nothing_like_this", "ModuleNotFoundError"),
-    ("x = 1", "defines no subclass of coartic.Method"),
+    ("x = 1", "a subclass of coartic.Method"),
     ("def (", "SyntaxError"),
     (method("def solve", "def solves"), "A has no solve"),
     (method('    name = "a"\n', ""), "name must be"),
-    (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
+    (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' exists already"),
     (method("frozenset()", '"goals"'), "information must be"),
 ]
 
@@ -153,7 +153,7 @@ def test_a_folder_is_not_a_file(read, tmp_path):
         ({"tasks": ["ascendin"]}, "did you mean 'ascending'?"),
         ({"tasks": ["absent.toml"]}, "absent.toml"),
         ({"tasks": Path("a.toml")}, "tasks is PosixPath('a.toml'): "),
-        ({"tasks": [3]}, "3 is no task"),
+        ({"tasks": [3]}, "task 3 must be"),
         ({"method_file": "a.py"}, "method_file is an unknown key; did you mean 'method_files'?"),
         ({"method_files": [int]}, "<class 'int'>"),
         ({"runs": 0}, "runs is 0"),
@@ -192,14 +192,14 @@ def test_the_nearest_name_is_said():
         (["check", "two-armed-1"], "coartic draw"),
         (["check", "mine.py"], "coartic check METHOD --method-file mine.py"),
         (["run", "paper", "--runs", "two"], "runs is 'two'"),
-        (["run"], "name a suite: ablations, "),
+        (["run"], "SUITE is missing: give ablations, "),
         (["run", FAMILY_FILE], "is a family: coartic run SUITE --tasks"),
         (["check", "quick"], "quick is a suite: coartic run quick"),
         (["draw", "--run", "1a2b"], "--run needs one results folder"),
-        (["report", "nowhere"], "there is no folder nowhere"),
+        (["report", "nowhere"], "folder nowhere does not exist"),
         (["play", "--out", "x.txt"], ".html"),
         (["new", "My Search"], "'My Search'"),
-        (["draw", "arm.urdf"], "arm.urdf: coartic reads no .urdf file"),
+        (["draw", "arm.urdf"], "arm.urdf: coartic does not read .urdf files"),
     ],
 )
 def test_a_command_that_cannot_be_is_one_sentence(command, words, tmp_path, monkeypatch, coartic):
