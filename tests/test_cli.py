@@ -165,7 +165,10 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     assert text.splitlines()[-1] == "1 run performed again: none with another result."
     assert re.search(rf"Run +{first}: Ascending, .*, run 0\nSeed +[0-9]+\nParam.*\nResult", text)
     assert "checked" not in text
-    assert "there is no run '0123456789'" in coartic("verify", out, "--run", "0123456789")[2]
+    assert (
+        "with an id that begins with '0123456789'"
+        in coartic("verify", out, "--run", "0123456789")[2]
+    )
     part = tmp_path / "part"  # of an array, and of all methods those for one arm
     own = ("--methods", "dual-process/*", "--runs", "2..3")
     assert coartic(*SMALL, *own, "--out", part)[0] == 0
@@ -180,13 +183,13 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     assert f"Run {second}, performed again: replay: " in text
     code, _, error = coartic("verify", out, "--run", "")
     assert code == 2
-    assert "is not a run id" in error
+    assert "beginning of a run id" in error
     cells = [cell_on(load_task("ascending"), replace(KNOWN["dual-process/EC1"], code="other"))]
     run_and_write(tmp_path / "other", cells, runs=1, trials=3)
     out = tmp_path / "other"
     code, _, error = coartic("verify", out, "--again", 1)
     assert code == 2
-    assert "has no run of a method that has the same version or code here" in error
+    assert "no run of" in error
 
 
 INTERRUPTED = """
@@ -267,10 +270,10 @@ def test_what_a_folder_holds_besides_is_said_before_the_first_run(coartic, tmp_p
 
     monkeypatch.setattr("coartic.cli.run.interruptible", interruptible)
     error = coartic(*SMALL, "--out", out, "--seed", 7)[2]
-    assert f"{out} holds 2 other runs" in error.partition("Runs: ")[0]
-    assert f"Saved in {out}: 2 runs; " in sentences[0]()
+    assert f"{out} also has 2 runs of earlier commands" in error.partition("Runs: ")[0]
+    assert f"Stored in {out}: 2 runs; " in sentences[0]()
     edit(out, "DELETE FROM results")
-    assert f"Saved in {out}: 0 runs; " in sentences[0]()
+    assert f"Stored in {out}: 0 runs; " in sentences[0]()
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -372,7 +375,7 @@ def test_draw(coartic, tmp_path, monkeypatch):
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 2.1]"), "utf-8")
     files = [tmp_path / "mine.toml", tmp_path / "other" / "mine.toml"]
-    assert "two tasks are called 'mine'" in coartic("draw", *files, "--out", tmp_path / "two")[2]
+    assert "two tasks have the name 'mine'" in coartic("draw", *files, "--out", tmp_path / "two")[2]
     assert coartic("draw", tmp_path / "mine.toml", "--out", tmp_path / "own.svg")[0] == 0
 
 
@@ -382,13 +385,13 @@ def test_a_place_that_is_taken_is_said_before_anything_is_drawn(coartic, tmp_pat
     for command, name in (("draw", "tasks.svg"), ("play", "page.html")):
         (tmp_path / name).touch()
         status, _, said = coartic(command, "ascending", "--out", tmp_path / name)
-        assert (status, "is there already; add --replace" in said) == (2, True)
+        assert (status, "exists: add --replace" in said) == (2, True)
 
 
 def test_a_folder_is_no_task_to_draw(coartic, tmp_path):
     status, _, said = coartic("draw", tmp_path)
     assert status == 2
-    assert f"coartic draw {tmp_path} --run ID films a run" in said
+    assert f"coartic draw {tmp_path} --run ID` films a run" in said
 
 
 def test_play(coartic, tmp_path, monkeypatch):
@@ -551,10 +554,10 @@ def test_a_full_device_behind_a_stream_ends_no_run(coartic, tmp_path, monkeypatc
             ended, _, error = coartic(*SMALL, "--out", out)
         assert ended == code
         assert (load(out).runs.status == "ok").all()
-    assert "Error: the standard output cannot be written: No space left" in error
+    assert "Error: standard output cannot be written: No space left" in error
 
 
 def test_two_reports_of_a_folder_are_written_one_after_the_other(tmp_path, traced):
-    with lock(tmp_path), pytest.raises(CoarticError, match="another `coartic report` is at work"):
+    with lock(tmp_path), pytest.raises(CoarticError, match="another `coartic report` uses"):
         build.write_report(traced, tmp_path)
     assert not (tmp_path / "report.html").exists()
