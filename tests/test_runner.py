@@ -246,9 +246,9 @@ def test_ten_thousand_movements_are_not_too_many():
     still = [Movement(1, "right", "path", waypoints=np.tile(task.q0, (count, 1)))
              for count in (39_999, 40_000)]  # fmt: skip
     assert too_long(task, still[:1]) is None
-    assert "400010 numbers; at most 400000" in str(too_long(task, still[1:]))
+    assert "400010 numbers in its paths; at most 400000" in str(too_long(task, still[1:]))
     far = Movement(1, "right", "planned", np.full(10, 1e308))
-    assert "its path has inf steps" in str(too_long(task, [far]))
+    assert "path of the solution has inf steps" in str(too_long(task, [far]))
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -264,7 +264,7 @@ def test_some_runs_of_every_cell_are_performed_again(results):
 
 def test_a_folder_of_another_suite_is_refused(results):
     plan = [replace(job, suite="quick") for job in planned()]
-    with pytest.raises(CoarticError, match="holds results of suite 'paper'"):
+    with pytest.raises(CoarticError, match="has results of suite 'paper'"):
         perform(plan, results.folder, executor=InProcess())
 
 

@@ -143,7 +143,7 @@ def test_running_times_that_cannot_be_shown(study, tmp_path):
             runtimes(study, targets=targets)
     with pytest.raises(CoarticError, match="no task has a best known reward"):
         runtimes(MadeUp(study, optima={}))
-    with pytest.raises(CoarticError, match="there is no folder"):
+    with pytest.raises(CoarticError, match="does not exist"):
         runtimes(tmp_path / "nowhere")
 
 

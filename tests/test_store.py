@@ -196,12 +196,12 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
 
 def test_one_writes_and_nobody_else_meanwhile(undisturbed):
     with writing(undisturbed.folder):
-        with pytest.raises(CoarticError, match=r"another `coartic run` is at work.*wait"):
+        with pytest.raises(CoarticError, match=r"another `coartic run` uses.*wait"):
             perform_here(undisturbed.folder)
         same_results(load(undisturbed.folder), undisturbed)  # readers do no harm
 
 
-@pytest.mark.filterwarnings("always:another program has .* open. waiting")
+@pytest.mark.filterwarnings("always:another program uses .* waiting")
 @pytest.mark.parametrize("begin", ["BEGIN", "BEGIN EXCLUSIVE"])
 def test_a_run_waits_for_a_reader_and_the_reader_reads(written, tmp_path, begin, monkeypatch):
     """Where its program keeps the file, in the middle of a transaction, until the run says that it
@@ -323,14 +323,14 @@ def of_5_0_0(path):
     ("spoil", "words"),
     [
         (sql(f"PRAGMA user_version = {FORMAT + 1}"), "later version.*update coartic"),
-        (of_5_0_0, "was written by coartic 5.0.0, .*`coartic run` with another --out makes"),
-        (foreign, "is not a file of coartic"),
+        (of_5_0_0, "was written by coartic 5.0.0, .*`coartic run` command with another --out"),
+        (foreign, "was not written by coartic"),
         (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
         (lambda path: path.write_bytes(path.read_bytes()[:9000]), "is damaged.*Move it away"),
         (lambda path: path.rename(path.with_name("notes.txt")), "(not|no) .*results"),
-        (pointer, "is damaged.*a pointer of Git LFS, for which `git lfs pull`"),
-        (dumped, "is damaged.*the file itself, no dump"),
-        (restored, "was restored from a dump.*copy the file itself"),
+        (pointer, "is damaged.*a pointer of Git LFS, run `git lfs pull`"),
+        (dumped, "is damaged.*A dump is not a copy"),
+        (restored, "was restored from a dump.*copy the original file"),
     ],
 )
 def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words):
@@ -442,7 +442,7 @@ def test_what_goes_wrong_while_a_store_is_open_is_no_damage_of_it(undisturbed):
 
 
 def test_a_store_that_is_cut_while_it_is_open_gets_a_sentence(tmp_path):
-    says = pytest.raises(CoarticError, match=r"cannot use .*runs\.sqlite: it is damaged")
+    says = pytest.raises(CoarticError, match=r"runs\.sqlite cannot be used: it is damaged")
     with says, writing(tmp_path / "cut") as store:
         (tmp_path / "cut" / "runs.sqlite").write_bytes(b"")
         store.present()
