@@ -1,8 +1,10 @@
-"""Pack shipped results: ``python docs/scripts/pack_shipped.py FOLDER`` packs a results folder whose
-runs have the same results as the shipped runs.
+"""Pack shipped results from results folders.
 
-The rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`): 5 MB in place of
-150 MB.
+    python docs/scripts/pack_shipped.py FOLDER
+
+Without ``--changed`` the script packs a folder only if its runs have the same results as the
+shipped runs. The rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`), so
+that the files have 5 MB instead of 150 MB.
 """
 
 from __future__ import annotations
@@ -24,10 +26,9 @@ from coartic.runs.store import RUNS_FILE, open_store, writing
 
 
 def changed_runs(folder: Path) -> Iterator[str]:
-    """Yield a sentence for each shipped run that a folder lacks or that has another result there,
-    whatever its version.
+    """Yield a sentence for each shipped run that a folder lacks or whose result differs there.
 
-    Raises CoarticError if the folder has another version of a method.
+    Raises CoarticError if a method of the folder has another version here.
     """
     with open_store(folder) as made:
         plan = made.plan()
@@ -35,8 +36,8 @@ def changed_runs(folder: Path) -> Iterator[str]:
             here = built_in()[method.name].code if method.name in built_in() else "missing"
             if here != method.code:
                 raise CoarticError(
-                    f"{folder} has {method.name} {method.code}, and here it is {here}: run the "
-                    "suite again"
+                    f"{folder} has version {method.code} of {method.name}, whose version here is "
+                    f"{here}: run the suite again"
                 )
         if (suite := plan[0].suite) not in shipped.shipped_hashes():
             return
@@ -67,21 +68,21 @@ def pack(folder: Path, out: Path) -> None:
 def main() -> int:
     """Pack the folders of the command line, unless a shipped result would change."""
     parser = argparse.ArgumentParser(prog="python docs/scripts/pack_shipped.py")
-    parser.add_argument("--changed", action="store_true", help="pack results that have changed")
+    parser.add_argument("--changed", action="store_true", help="also pack changed results")
     parser.add_argument("folders", nargs="+", type=folder_named, metavar="FOLDER")
-    given = parser.parse_args()
+    options = parser.parse_args()
     try:
-        changes = {folder: list(changed_runs(folder)) for folder in given.folders}
+        changes = {folder: list(changed_runs(folder)) for folder in options.folders}
     except CoarticError as error:
         parser.error(str(error))
     for folder, sentences in changes.items():
-        print(f"{folder}: {len(sentences) or 'no'} differences to what is shipped")
+        print(f"{folder}: {len(sentences) or 'no'} differences from the shipped results")
         for sentence in sentences[:20]:
             print(f"- {sentence}")
-    if any(changes.values()) and not given.changed:
-        print("Nothing is packed. If results change on purpose, add --changed.")
+    if any(changes.values()) and not options.changed:
+        print("Nothing was packed. If the results should change, add --changed.")
         return 1
-    for folder in given.folders:
+    for folder in options.folders:
         pack(folder, shipped.SHIPPED_FOLDER)
     return 0
 
