@@ -95,7 +95,9 @@ def test_what_no_folder_has_is_performed(parts, left, tmp_path):
     same_results(load(whole), run_and_write(tmp_path / "once", WHOLE, **OPTIONS))
     assert joined(parts[:1], tmp_path / "more", LEFT, runs=3).done == 1
     assert joined([tmp_path / "more", parts[0]], tmp_path / "most", LEFT).present == 3 + 1
-    with pytest.warns(UserWarning, match=rf"right has 2 runs of {EC1} on descending; this command asks for 3"):
+    with pytest.warns(
+        UserWarning, match=rf"right has 2 runs of {EC1} on descending; this command asks for 3"
+    ):
         joined(parts[1:], tmp_path / "few", LEFT, runs=3)
 
 
