@@ -1,4 +1,4 @@
-"""Plan, perform and record the runs of suites, on top of ``coartic`` and ``baselines``.
+"""Plan, perform and store the runs of suites.
 
 ``coartic.benchmarks.run_suite(suite, folder)`` runs a suite (:mod:`coartic.benchmarks.runner`).
 """

@@ -1,7 +1,7 @@
-"""Check a new method or task against the rules, for contributors.
+"""Check whether a new method or task keeps the rules.
 
-The runs of a method, each with a limit of CPU time, are made in a worker process, and one run again
-in another process.
+A worker process makes the runs of a method, each with a limit of CPU time. Another process repeats
+one of them.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ from coartic.runs.plan import Job, cell_of, in_words
 from coartic.runs.record import Run
 from coartic.tasks.task import check_task
 
-CHECK_TRIALS = 60  # enough to learn something, few enough to be quick
-_LIMIT_S = 120.0
+CHECK_TRIALS = 60  # trials of a run: enough to learn something, few enough to be quick
+_LIMIT_S = 120.0  # limit of CPU time of a run
 _BUDGET = 7  # trial budget of the runs that check ``limits``
-_UNDECLARED = ("does not declare", "own compiled", "outside its session")  # words of reasons
+_UNDECLARED = ("does not declare", "own compiled", "outside its session")  # words in reasons
 
 
 class CheckResult(NamedTuple):
-    """A check of a method or a task, and its result."""
+    """Result of a check of a method or a task."""
 
     name: str
     """Name of the check, such as ``determinism``."""
     passed: bool
-    """True if it found no problem."""
+    """True if the check found no problem."""
     finding: str
-    """What was checked, or the first problem."""
+    """The first problem, or a sentence on what was checked."""
 
 
 def check_method(
@@ -57,10 +57,15 @@ def check_method(
     ----------
     info : MethodInfo
     tasks : sequence of Task, optional
-        Tasks on which the method runs, except tasks to which it does not apply; by default the
-        shipped tasks.
+        Tasks to run the method on, by default the shipped tasks. Tasks to which it does not apply
+        are left out.
     verbose : bool
-        Show what the method prints, logs and crashes with, except in another process.
+        True to show what the method prints and logs, and the tracebacks of its errors. The run that
+        another process repeats is not shown.
+
+    Returns
+    -------
+    list of CheckResult
     """
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
@@ -68,8 +73,8 @@ def check_method(
     def applies(task: Task) -> bool:
         return info.why_not(task, parameters) is None
 
-    given = [*map(load_task, builtin_tasks())] if tasks is None else tasks
-    tasks, jobs, runs = list(filter(applies, given)), dict[tuple[str, str], Job](), _Runs()
+    candidates = [*map(load_task, builtin_tasks())] if tasks is None else tasks
+    tasks, jobs, runs = list(filter(applies, candidates)), dict[tuple[str, str], Job](), _Runs()
     for kind, seed, budget, chosen in (
         ("first", 1, None, tasks),
         ("again", 1, None, tasks),
@@ -85,8 +90,8 @@ def check_method(
     for (kind, name), run in zip(jobs, performed, strict=True):
         runs.setdefault(kind, {})[name] = run
     if tasks:
-        last = tasks[-1].name
-        runs["elsewhere"] = {last: next(perform_in_order([jobs["first", last]]))}
+        last_task = tasks[-1].name
+        runs["elsewhere"] = {last_task: next(perform_in_order([jobs["first", last_task]]))}
     results = []
     for name, (problems, finding) in CHECKS.items():
         problem = next(problems(info, runs), "")
@@ -95,7 +100,7 @@ def check_method(
 
 
 _Runs = dict[str, dict[str, Run]]
-"""Runs by kind, such as ``first``, and by name of the task."""
+"""Runs by kind, such as ``first``, and by the name of the task."""
 
 
 def _declaration(info: MethodInfo, _: _Runs) -> Iterator[str]:
@@ -109,19 +114,19 @@ def _parameters(info: MethodInfo, _: _Runs) -> Iterator[str]:
     if config["extra"] != "forbid":
         yield "an unknown parameter is accepted; forbid extra keys"
     if config["frozen"] is not True:
-        yield "they can be changed after validation; freeze them"
+        yield "parameters can be changed after validation; freeze them"
 
 
 def _solution(info: MethodInfo, runs: _Runs) -> Iterator[str]:
     if not runs:
-        yield "it applies to none of the tasks, so nothing can be checked"
+        yield "the method applies to none of the tasks, so nothing can be checked"
     for task, run in runs.get("first", {}).items():
         if run.outcome.reason:
             yield f"on {task}: {run.outcome.status}: {run.outcome.reason}"
 
 
 def _changes(runs: _Runs, kind: str, how: str) -> Iterator[str]:
-    """Yield what differs between the first run on each task and the run of another kind."""
+    """Yield the differences between the first run on each task and the run of another kind."""
     for task, run in runs.get(kind, {}).items():
         yield from (f"{how.format(task)}: {c}" for c in compare_runs(runs["first"][task], run))
 
@@ -130,7 +135,7 @@ def _determinism(info: MethodInfo, runs: _Runs) -> Iterator[str]:
     yield from _changes(runs, "again", "same seed on {}, same process")
     yield from _changes(runs, "elsewhere", "same seed on {}, another process")
     if not info.stochastic:
-        how = "declared not to be stochastic, but another seed on {}"
+        how = "stochastic is False, but another seed on {}"
         yield from _changes(runs, "other seed", how)
 
 
@@ -152,39 +157,39 @@ def _information(info: MethodInfo, runs: _Runs) -> Iterator[str]:
             yield f"on {task}: {run.outcome.reason}"
     metered = {item.value for item in METERED if item.value in info.information}
     if runs and (unused := sorted(metered - _used(runs))):
-        yield f"declared but never used: {', '.join(unused)}"
+        yield f"declared but not used: {', '.join(unused)}"
 
 
 def _failure(info: MethodInfo, runs: _Runs) -> Iterator[str]:
     for run in runs.get("hopeless", {}).values():
         if run.outcome.status not in ("infeasible", "solver-failed"):
-            found = f"{run.outcome.status} {run.outcome.reason}"
-            yield f"a task out of reach gives {found}, not infeasible with a reason"
+            status = f"{run.outcome.status} {run.outcome.reason}"
+            yield f"a task out of reach gives {status}; it must give infeasible with a reason"
 
 
 def _rewards(info: MethodInfo, runs: _Runs) -> str:
-    """Return what the solutions are worth, and which goals no target leads to."""
-    first = runs["first"]
-    text = ", ".join(f"{task} {run.solution.reward}" for task, run in first.items())
-    for task, run in first.items():
+    """Return a sentence on the rewards of the solutions, and on goals that have no target."""
+    runs_by_task = runs["first"]
+    text = ", ".join(f"{task} {run.solution.reward}" for task, run in runs_by_task.items())
+    for task, run in runs_by_task.items():
         if goals := goals_without_target(run.solution.movements):
             numbers = ", ".join(map(str, goals))
-            text += f"; on {task} no target leads to goals {numbers}: is this meant?"
+            text += f"; on {task} the solution has no target for goals {numbers}: is this meant?"
     return f"executed and scored on {text}"
 
 
 def _seeds(info: MethodInfo, runs: _Runs) -> str:
-    """Return how results depend on the seed."""
+    """Return a sentence on how results depend on the seed."""
     if info.stochastic and not any(_changes(runs, "other seed", "{}")):
-        return "the same result, also under another seed: declare stochastic = False"
-    return f"the same result under {'the same' if info.stochastic else 'any'} seed"
+        return "another seed gives the same result, too: declare stochastic = False"
+    return f"{'the same' if info.stochastic else 'any'} seed gives the same result"
 
 
 def _hopeless(info: MethodInfo, runs: _Runs) -> str:
-    """Return what a task out of reach gives."""
+    """Return a sentence on the run on a task out of reach."""
     for run in runs.get("hopeless", {}).values():
         return f"a task out of reach gives {run.outcome.status}: {run.outcome.reason}"
-    return "does not apply to a task out of reach"
+    return "the method does not apply to a task out of reach"
 
 
 CHECKS: dict[
@@ -197,21 +202,21 @@ CHECKS: dict[
     "determinism": (_determinism, _seeds),
     "no hidden state": (
         lambda _, runs: _changes(runs, "after others", "after other runs, {} with the same seed"),
-        lambda *_: "other runs in between change nothing",
+        lambda *_: "other runs in between do not change the result",
     ),
-    "limits": (_limits, lambda *_: f"keeps to a budget of {_BUDGET} trials"),
+    "limits": (_limits, lambda *_: f"the method keeps a budget of {_BUDGET} trials"),
     "information": (
         _information,
         lambda _, runs: f"declared and used: {', '.join(sorted(_used(runs))) or 'nothing'}",
     ),
     "failure": (_failure, _hopeless),
 }
-"""Checks of a method by name: a function that yields problems, and one that says what was found."""
+"""Checks of a method by name. Each has a function that yields problems, and a function that returns
+a sentence on what was checked."""
 
 
 def _hopeless_task(like: Task) -> Task:
-    """Return a copy of a task with a locked base and one goal at (9000, 9000), length units: out of
-    reach of usual arms near the origin."""
+    """Return a copy of a task with a locked base and one goal far out of reach."""
     return like.model_copy(
         update={
             "name": "hopeless",
@@ -224,28 +229,43 @@ def _hopeless_task(like: Task) -> Task:
 
 
 def check_task_file(path: Path, registered: Registry) -> list[CheckResult]:
-    """Check a task file, and return the results in order: ``valid``, ``distinct goals``,
-    ``solvable``; for an invalid file ``valid`` only. ``registered`` has the known methods."""
+    """Check a task file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    registered : mapping
+        Known methods by id.
+
+    Returns
+    -------
+    list of CheckResult
+        Results of ``valid``, ``distinct goals`` and ``solvable``; for an invalid file only of
+        ``valid``.
+    """
     try:
         task = check_task(load_task(path))
     except TaskError as error:
         return [CheckResult("valid", False, str(error))]
     near = [
-        f"goals {number} and {number + 1} lie within one radius of each other"
-        for number, (goal, after) in enumerate(pairwise(task.goals), 1)
-        if dist(goal, after) <= task.radius
+        f"goals {number} and {number + 1} are within one radius of each other"
+        for number, (goal, next_goal) in enumerate(pairwise(task.goals), 1)
+        if dist(goal, next_goal) <= task.radius
     ]
     try:
         hands = initial_hands(task)
         trial = corrective_trial(task, hands)
-        solved = trial.reason or f"initial hands {hands} complete it with {trial.reward}"
+        finding = trial.reason or f"initial hands {hands} complete it with reward {trial.reward}"
         is_solved = trial.completed
     except (NotApplicableError, TaskError) as error:
-        solved, is_solved = str(error), False
+        finding, is_solved = str(error), False
     methods = [name for name, info in registered.items() if info.why_not(task) is None]
     count = f"{counted(len(task.goals), 'goal')}; {counted(len(methods), 'method')} can run on it"
     return [
         CheckResult("valid", True, f"{task.name}, {count}"),
-        CheckResult("distinct goals", not near, near[0] if near else "successive goals lie apart"),
-        CheckResult("solvable", is_solved, solved),
+        CheckResult(
+            "distinct goals", not near, near[0] if near else "successive goals do not overlap"
+        ),
+        CheckResult("solvable", is_solved, finding),
     ]

@@ -1,8 +1,13 @@
 """Include the runs of other folders: shipped results, or results of another machine or person.
 
-Folders go together if they have the same suite, seed and trial budget, the same task for each name,
-the same version or code of each method and the same parameters of each of its settings. Versions of
-coartic and of libraries, and machines, may differ. A folder may lack runs.
+Folders can be joined if they have
+
+- the same suite, seed and trial budget;
+- the same task for each name of a task;
+- the same version or code of each method;
+- the same parameters for each setting of a method.
+
+Versions of coartic and of libraries, and machines, may differ. A folder may lack runs.
 """
 
 from __future__ import annotations
@@ -31,22 +36,47 @@ def include_folders(
     out: Path,
     tasks: Collection[str] | None = None,
 ) -> list[Job]:
-    """Copy the runs of other folders' plans into ``out``; store there, and return, the joined plan.
+    """Copy the runs of other folders into a results folder, and join the plans.
 
-    ``plan`` has one job at least; folder ``shipped`` stands for the shipped results. The joined
-    plan has the cells of ``plan`` and, on ``tasks`` (None: on all), cells with a run 0 of the
-    folders. Missing runs are left to :func:`.perform`. A warning names a folder whose plan has, on
-    ``tasks``, runs that the joined plan lacks, or another stochastic cell with fewer runs in the
-    joined plan than ``plan`` asks for of its own.
+    The joined plan has the cells of ``plan``, and the cells of the folders that have a run 0. It
+    replaces the plan of ``out``. This function performs no missing runs; :func:`.perform` does.
 
-    Raises CoarticError if a folder cannot be read or is ``out``, if runs of ``plan`` do not begin
-    at 0, if the folders do not go together, and if two folders, or a folder and ``out``, have
-    different results of a run. Then nothing is copied.
+    Parameters
+    ----------
+    plan : sequence of Job
+        Jobs of this command, at least one. Their runs begin at 0.
+    folders : sequence of str or Path
+        Folders to include. ``"shipped"`` stands for the shipped results.
+    out : Path
+        Results folder to copy into.
+    tasks : collection of str, optional
+        Names of tasks. Only cells of the folders on these tasks are joined; by default all are.
+
+    Returns
+    -------
+    list of Job
+        The joined plan.
+
+    Raises
+    ------
+    CoarticError
+        One of these is the case. Then nothing is copied:
+
+        - a folder cannot be read, or is ``out``;
+        - runs of ``plan`` do not begin at 0;
+        - the folders cannot be joined;
+        - two of the folders and ``out`` have different results of a run.
+
+    Warns
+    -----
+    UserWarning
+        A folder lacks runs of its own plan, or has fewer runs of a cell than ``plan`` asks for of
+        its own cells.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
-            "a range of runs is a part of an array: include the folders of all parts afterwards, "
-            "with the number of all runs"
+            "runs do not begin at 0: they are a part of an array. Include the folders of all parts "
+            "later, with the number of all runs"
         )
     with ExitStack() as stack:
         sources: dict[str, Store] = {}
@@ -59,7 +89,7 @@ def include_folders(
                 raise CoarticError(f"{name} cannot include itself: choose another --out")
             if not os.path.lexists(folder):
                 raise CoarticError(
-                    f"no folder {name!r}; {SHIPPED!r} stands for the shipped results"
+                    f"folder {name!r} does not exist; {SHIPPED!r} stands for the shipped results"
                 )
             sources[name] = stack.enter_context(open_store(folder))
         for source in sources.values():
@@ -76,36 +106,39 @@ def include_folders(
 def _join(
     plan: Sequence[Job], sources: Mapping[str, Store], tasks: Collection[str] | None
 ) -> list[Job]:
-    """Return the plan with the cells of the sources (stores by name), with ``tasks`` only their
-    cells on these tasks. A cell has the runs that the plan asks for, and the runs that follow in
-    the sources without a gap; without any it is left out. Raises CoarticError for a contradiction
-    (:func:`_check_together`)."""
-    whole = {name: source.plan() for name, source in sources.items()}
+    """Return the plan with the cells of the sources (stores by name), on ``tasks`` if there are
+    any.
+
+    A cell has the runs that the plan asks for, and the runs that follow in the sources without a
+    gap. A cell without runs is left out. Raises CoarticError if the sources cannot be joined.
+    """
+    all_jobs = {name: source.plan() for name, source in sources.items()}
     plans = {
         name: [job for job in jobs if tasks is None or job.cell.task.name in tasks]
-        for name, jobs in whole.items()
+        for name, jobs in all_jobs.items()
     }
-    held = {
-        (whole[name][position].cell.digest, number)
+    stored = {
+        (all_jobs[name][position].cell.digest, number)
         for name, source in sources.items()
         for position, number, *_ in source.present()
     }
     asked = {job.cell.digest: len(job.numbers) for job in plan}
-    # Runs of a source are not performed here: their method may have other code here.
+    # Cells of ``plan`` with all runs in the sources will not be performed here. So their methods
+    # may have other code here.
     missing = [
-        job for job in plan if not held.issuperset((job.cell.digest, n) for n in job.numbers)
+        job for job in plan if not stored.issuperset((job.cell.digest, n) for n in job.numbers)
     ]
     parts = {**plans, "this command": missing}
-    _check_together(plan[0], parts)
+    _check_joinable(plan[0], parts)
     methods = {job.cell.method.name: job.cell.method for part in parts.values() for job in part}
-    for job in plan:  # failures are performed again where the code is here
+    for job in plan:  # failed runs are performed again if the code is available here
         if methods[job.cell.method.name].code == job.cell.method.code:
             methods[job.cell.method.name] = job.cell.method
     jobs: dict[str, Job] = {}
     for job in itertools.chain(plan, *plans.values()):
         digest = job.cell.digest
         runs = asked.get(digest, 0)
-        while (digest, runs) in held:
+        while (digest, runs) in stored:
             runs += 1
         if runs:
             cell = replace(job.cell, method=methods[job.cell.method.name])
@@ -117,80 +150,91 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of a source whose plan has runs that the joined plan lacks. Warn, too, of a source with
-    a cell (method and task) of a stochastic method that ``asked`` lacks, with all its runs joined,
-    if it has fewer runs than the largest number in ``asked``. ``asked``: numbers
-    of runs asked for, by digest of the cell; ``plans``: plans by name of the source; ``jobs``:
-    joined plan, by digest."""
-    most = max(asked.values())
+    """Warn of each source that lacks runs of its plan, or has few runs of a further cell.
+
+    A stochastic cell that ``asked`` lacks has few runs if it has fewer than the largest number in
+    ``asked``. ``asked`` has numbers of runs by digest of the cell, ``plans`` has plans by name of
+    the source, and ``jobs`` is the joined plan by digest.
+    """
+    most_runs = max(asked.values())
     for name, part in plans.items():
         lacking, few = list[Job](), list[Job]()
         for job in part:
             digest, method = job.cell.digest, job.cell.method
-            there = len(jobs[digest].numbers) if digest in jobs else 0
-            if there < len(job.numbers):
+            runs = len(jobs[digest].numbers) if digest in jobs else 0
+            if runs < len(job.numbers):
                 lacking.append(job)
-            elif digest not in asked and method.stochastic and there < most:
+            elif digest not in asked and method.stochastic and runs < most_runs:
                 few.append(job)
         if lacking:
-            words = f"{name} is not finished: it lacks runs of {_named(lacking)}"
             warnings.warn(
-                f"{words}, and gives those before the first that is missing", stacklevel=4
+                f"{name} is not finished: it lacks runs of {_named(lacking)}. Runs after the first "
+                "missing one are not included",
+                stacklevel=4,
             )
         if few:
-            runs = counted(len(jobs[few[0].cell.digest].numbers), "run")
-            words = f"{name} has {runs} of {_named(few)}; {most} are asked for here"
-            warnings.warn(words, stacklevel=4)
+            count = counted(len(jobs[few[0].cell.digest].numbers), "run")
+            warnings.warn(
+                f"{name} has {count} of {_named(few)}; this command asks for {most_runs}",
+                stacklevel=4,
+            )
 
 
 def _named(jobs: Sequence[Job]) -> str:
-    """Return words that name the cell of the first job, and count the other jobs, such as
-    ``cma-es/bandit on ascending and of 2 others``."""
+    """Return the name of the cell of the first job, and the number of other jobs."""
     others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
     return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
 
 
-def _check_together(first: Job, parts: Mapping[str, Sequence[Job]]) -> None:
-    """Raise CoarticError if the first jobs of two parts differ in suite, seed or trial budget, or
-    two jobs in the definition of a task of one name, in the version or code of a method, or in a
-    parameter of one label on one task. ``parts`` holds jobs by their origin, such as a folder;
-    ``first`` stands for a part without jobs."""
-    first_said: dict[str, tuple[str, object]] = {}
+def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
+    """Raise CoarticError if the parts of a plan contradict each other.
 
-    def agree(where: str, what: str, value: object, hint: str = "") -> None:
-        origin, there = first_said.setdefault(what, (where, value))
-        if there != value:
-            raise CoarticError(f"{what} is {there} in {origin} and {value} in {where}{hint}")
+    ``parts`` has jobs by their origin, such as a folder. Suite, seed and trial budget of a part are
+    those of its first job, or of ``default`` if it has no jobs. Module :mod:`.include` has the list
+    of what must be equal.
+    """
+    first_values: dict[str, tuple[str, object]] = {}
 
-    for where, part in parts.items():
-        job = part[0] if part else first
-        agree(where, "the suite", repr(job.suite))
-        agree(where, "the seed", job.seed)
-        agree(where, "the trial budget", job.cell.trial_budget or "unlimited")
-    for where, cell in ((where, job.cell) for where, part in parts.items() for job in part):
+    def agree(part_name: str, what: str, value: object, hint: str = "") -> None:
+        origin, first_value = first_values.setdefault(what, (part_name, value))
+        if first_value != value:
+            raise CoarticError(
+                f"{what} is {first_value} in {origin} and {value} in {part_name}{hint}"
+            )
+
+    for part_name, part in parts.items():
+        job = part[0] if part else default
+        agree(part_name, "the suite", repr(job.suite))
+        agree(part_name, "the seed", job.seed)
+        agree(part_name, "the trial budget", job.cell.trial_budget or "unlimited")
+    for part_name, cell in (
+        (part_name, job.cell) for part_name, part in parts.items() for job in part
+    ):
         name, method = cell.task.name, cell.method
-        agree(where, f"task {name!r}", f"definition {hash_of(cell.definition)[:8]}")
+        agree(part_name, f"task {name!r}", f"definition {hash_of(cell.definition)[:8]}")
         kind = "version" if method.is_ours else "code"
         hint = ": leave it out of one of them" + ", or give it another name" * (not method.is_ours)
-        agree(where, f"method {method.name!r}", f"{kind} {method.code}", hint)
+        agree(part_name, f"method {method.name!r}", f"{kind} {method.code}", hint)
         cell_named = f"{cell.label} on {name}"
-        agree(where, f"the list of parameters of {cell_named}", sorted(cell.parameters))
+        agree(part_name, f"the list of parameters of {cell_named}", sorted(cell.parameters))
         for key, value in cell.parameters.items():
-            agree(where, f"{key} of {cell_named}", value)
+            agree(part_name, f"{key} of {cell_named}", value)
 
 
 def _check_same_results(stores: Mapping[str, Store]) -> None:
-    """Raise CoarticError if two stores, by the names of their folders, have different results of a
-    run. Rewards that one of them does not keep do not count."""
-    first_said = dict[str, tuple[str, str]]()
+    """Raise CoarticError if two stores, by name of the folder, have different results of a run.
+
+    Rewards that one of them did not store are not compared.
+    """
+    first_results = dict[str, tuple[str, str]]()
     for name, store in stores.items():
         for run_id, result in store.results().items():
-            first, there = first_said.setdefault(run_id, (name, result))
-            if there == result:
+            first_name, first_result = first_results.setdefault(run_id, (name, result))
+            if first_result == result:
                 continue
             run = store.run(run_id)
-            if changes := compare_runs(stores[first].run(run_id), run):
+            if changes := compare_runs(stores[first_name].run(run_id), run):
                 raise CoarticError(
                     f"run {run.number} of {run.cell.method.name} on {run.cell.task.name} differs "
-                    f"in {first} and {name} ({run_id}): {changes[0]}"
+                    f"between {first_name} and {name} ({run_id}): {changes[0]}"
                 )

@@ -1,7 +1,8 @@
-"""Read method files, each in a process of its own, and find what their results come from.
+"""Read method files, each in a process of its own, and identify their code.
 
-Changes that a file makes to its process on import (another working folder, patches, an exit) do not
-affect the process that runs suites, and modules of one name from two folders do not mix.
+Changes that a file makes to its process on import, such as another working folder, a patch or an
+exit, do not affect the process that runs suites. Modules of the same name from two folders are not
+mixed up.
 """
 
 from __future__ import annotations
@@ -42,13 +43,15 @@ _ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to impo
 
 
 def read_file(path: Path) -> list[MethodInfo]:
-    """Return the declarations of the methods of a file, which a new process imports; the process
-    then answers questions about them (:data:`READERS`). Raises CoarticError for an unusable
-    file."""
+    """Return the declarations of the methods of a file.
+
+    A new process imports the file. Later it answers questions about the methods (:data:`READERS`).
+    Raises CoarticError for a file that cannot be used.
+    """
     shown = plain(str(path), LONGEST_LINE)
     read_bytes(path)
     if path.suffix != ".py":
-        raise CoarticError(f"{shown}: the name of a method file ends in .py")
+        raise CoarticError(f"{shown}: the name of a method file must end in .py")
     reader = ProcessPool(1, initializer=begin_worker, context=CONTEXT)
     infos: list[MethodInfo] = _ask(reader, shown, _declarations, path, shown)
     READERS[str(path)] = partial(_ask, reader, shown, _answer, path)
@@ -56,8 +59,10 @@ def read_file(path: Path) -> list[MethodInfo]:
 
 
 def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
-    """Return the result of a function in the process that reads the file ``shown``. Raises
-    CoarticError if there is none."""
+    """Return the result of a function in the process that reads a file, ``shown`` in messages.
+
+    Raises CoarticError if the process gives no result.
+    """
     try:
         return reader.schedule(function, args=arguments, timeout=_ANSWER_S).result()
     except CoarticError as error:
@@ -65,21 +70,21 @@ def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
     except ProcessExpired as error:
         code = error.exitcode
         how = f"{signal_name(-code)} ended it" if code < 0 else f"it ended with exit code {code}"
-        raise CoarticError(f"{shown}: cannot be read by its process: {how}") from None
+        raise CoarticError(f"{shown}: the process that reads it ended: {how}") from None
     except TimeoutError:
-        raise CoarticError(f"{shown}: gives no answer within {_ANSWER_S:g} s") from None
+        raise CoarticError(f"{shown}: its process did not answer within {_ANSWER_S:g} s") from None
     except (BrokenExecutor, OSError) as error:
-        why = error_line(error.__cause__ or error)
+        reason = error_line(error.__cause__ or error)
         raise CoarticError(
-            f"{shown}: no process for it begins ({why}). Repeat the command"
+            f"{shown}: a process to read it cannot start ({reason}). Repeat the command"
         ) from None
 
 
-# What follows runs in the process of a file.
+# The functions below run in the process of a file.
 
 
 def _answer(path: Path, method: str, question: str, *arguments: Any) -> Any:
-    """Return the answer of a method of a file to a question of :func:`.answer`."""
+    """Return the answer of a method of a file to a question (:func:`.answer`)."""
     try:
         return answer(load_method(str(path), method), question, *arguments)
     except CoarticError:
@@ -89,22 +94,27 @@ def _answer(path: Path, method: str, question: str, *arguments: Any) -> Any:
 
 
 def check_code(info: MethodInfo) -> None:
-    """Import the file of a method. Raises CoarticError if results of the method would come from
-    other code than ``info`` says, because a file was changed."""
+    """Import the file of a method, and check that its code has not changed.
+
+    Raises CoarticError if the file, or a file that it loads, was changed after ``info`` was made.
+    """
     path = Path(info.where)
     module, loaded = load_file(path, info.code)
-    codes = {each.name: _code_of(each, path, _own_files(loaded)) for each in methods_in(module)}
+    files = _user_files(loaded)
+    codes = {method.name: _code_of(method, path, files) for method in methods_in(module)}
     if codes.get(info.name) != info.code:
         raise CoarticError(
-            f"{info.where}, or a file that it loads, is not as it was when the suite was started: "
+            f"{info.where}, or a file that it loads, has changed since the suite was started: "
             "repeat the command, on a cluster with the same files everywhere"
         )
 
 
 def _declarations(path: Path, shown: str) -> list[MethodInfo]:
-    """Import a file, ``shown`` in messages, and return the declarations of its methods, with their
-    code and the packages that the file imports. Raises CoarticError for no method, and for
-    declarations of a wrong form."""
+    """Import a file, ``shown`` in messages, and return the declarations of its methods.
+
+    They have the code of the methods, and the packages that the file imports. Raises CoarticError
+    if the file has no methods, or a declaration has a wrong form.
+    """
     try:
         module, loaded = load_file(path)
     except BaseException as error:
@@ -115,21 +125,24 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
             f"{method.__name__} has no {', '.join(sorted(method.__abstractmethods__))}"
             for method in methods_in(module, abstract=True)
         ]
-        why = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
+        missing = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
         raise CoarticError(
-            f"{shown}: defines no subclass of coartic.Method or coartic.Optimiser{why}"
+            f"{shown}: the file must define a subclass of coartic.Method or coartic.Optimiser"
+            f"{missing}"
         )
-    files = _own_files(loaded)
+    files = _user_files(loaded)
     packages, infos = _packages_of({path, *files}), list[MethodInfo]()
     for method in methods:
         where = f"{shown}: {method.__name__}"
         for attribute in ("name", "title", "citation", "tuned_on"):
             text = getattr(method, attribute, None)
             if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
-                raise CoarticError(f"{where}: {attribute} must be a text of one line, not {text!r}")
+                raise CoarticError(
+                    f"{where}: {attribute} must be a string of one line, not {text!r}"
+                )
         information = getattr(method, "information", None)
         if not isinstance(information, frozenset | set) or not all(
-            isinstance(each, Information) for each in information
+            isinstance(item, Information) for item in information
         ):
             raise CoarticError(
                 f"{where}: information must be a set of Information, not {information!r}"
@@ -140,9 +153,17 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
 
 
 def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
-    """Return a hash, 12 hexadecimal digits, of what the results of a method from a file come from:
-    versions of model and method, the file, the data files that the method declares, and the user's
-    ``files`` that its import loads. Raises CoarticError for a file that cannot be read."""
+    """Return a hash, 12 hex digits, of the code of a method from a file.
+
+    The hash covers
+
+    - the versions of the model and the method;
+    - the file;
+    - the data files that the method declares;
+    - the user's ``files`` that its import loads.
+
+    Raises CoarticError for a file that cannot be read.
+    """
     declared = [path.parent / name for name in method.files]
     parts = [f"{MODEL_VERSION}.{method.version}".encode()]
     for file in (path, *declared, *files):
@@ -150,16 +171,18 @@ def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
             parts.append(read_bytes(file))
         except CoarticError as error:
             raise CoarticError(f"{path}: its file {error}") from None
-    hashes = sorted(hashlib.sha256(part).digest() for part in parts)  # wherever the files are
+    hashes = sorted(hashlib.sha256(part).digest() for part in parts)  # independent of paths
     return hashlib.sha256(b"".join(hashes)).hexdigest()[:12]
 
 
-def _own_files(names: Iterable[str]) -> set[Path]:
-    """Return the user's files among the loaded modules of these names: existing files outside of
-    this project, the standard library and installed packages."""
+def _user_files(names: Iterable[str]) -> set[Path]:
+    """Return the user's files among the loaded modules of these names.
+
+    They are files outside of this project, the standard library and installed packages.
+    """
     folders = [sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")]
     folders += [*site.getsitepackages(), site.getusersitepackages()]
-    found = {
+    modules = {
         Path(path).resolve()
         for name in names
         if name.partition(".")[0] != "coartic"
@@ -167,7 +190,7 @@ def _own_files(names: Iterable[str]) -> set[Path]:
     }
     return {
         path
-        for path in found
+        for path in modules
         if path.is_file()
         and not {"site-packages", "dist-packages"} & {*path.parts}
         and not any(path.is_relative_to(Path(folder).resolve()) for folder in folders)
@@ -187,6 +210,6 @@ def _packages_of(files: Iterable[Path]) -> dict[str, str]:
     tops = {name.partition(".")[0] for name in names} - {"coartic"} - sys.stdlib_module_names
     if not tops:
         return {}
-    known = metadata.packages_distributions()
-    found = sorted({package for top in tops for package in known.get(top, ())})
-    return {package: metadata.version(package) for package in found}
+    installed = metadata.packages_distributions()
+    packages = sorted({package for top in tops for package in installed.get(top, ())})
+    return {package: metadata.version(package) for package in packages}

@@ -1,4 +1,4 @@
-"""Plan a suite: from a suite and a request to jobs, with the parameters of every run."""
+"""Plan the jobs of a suite, with the parameters of each run."""
 
 from __future__ import annotations
 
@@ -47,15 +47,14 @@ from coartic.tasks.task import address_of, check_task
 
 
 def _task_or_name(value: Any) -> Task | str:
-    """Return a task, or its name or path as a text. Raises an error for any other value."""
+    """Validate a task: a Task, or a name or path, which is returned as a string."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
-    raise sentence_error(f"{value!r} is no task; it should be a name, a path or a task")
+    raise sentence_error(f"task {value!r} must be a name, a path or a Task")
 
 
 def _runs_asked(value: Any) -> int | range | None:
-    """Return an allowed number of runs, an allowed range of runs (step 1) or None. Raises an error
-    for any other value."""
+    """Validate a number of runs, a range of runs with step 1, or None."""
     is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:
@@ -69,18 +68,19 @@ def _runs_asked(value: Any) -> int | range | None:
 
 
 class Request(FileData):
-    """The part of a suite to run, with its numbers of runs and trials, its seed and its limits."""
+    """Options of a command that runs a suite, or a part of it."""
 
     tasks: tuple[Annotated[Any, PlainValidator(_task_or_name)], ...] = ()
     """Names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, task files, and tasks
-    (Task); by default all tasks of the suite. An instance or a task of your own that the suite does
-    not have is run with every method of ``methods``, or of the suite, that applies to it."""
+    (Task); by default all tasks of the suite. Instances and tasks of your own that the suite does
+    not have are run with all methods that apply to them, of ``methods`` or else of the suite."""
     methods: tuple[str, ...] = ()
     """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite.
-    A method that the suite does not have is run on every task of the suite that it applies to."""
+    Methods that the suite does not have are run on all tasks of the suite that they apply to."""
     method_files: tuple[Path, ...] = ()
     """Files with your own methods. If neither ``methods`` nor the suite names a method of a file,
-    also by a wildcard, all methods of the file run, together with the other methods."""
+    all methods of the file run in addition to the other methods. A wildcard that matches a method
+    names it."""
     family_files: tuple[Path, ...] = ()
     """Files with your own families."""
     runs: Annotated[Any, PlainValidator(_runs_asked)] = None
@@ -94,12 +94,14 @@ class Request(FileData):
     time_limit_s: Seconds | None = None
     """Most CPU time of a job, s; by default the limit of the suite."""
     trial_budget: TrialCount | None = None
-    """Most physical trials of a run, whatever its method."""
+    """Most physical trials of a run, for all methods."""
 
 
 def request_for(**options: Any) -> Request:
-    """Return a checked request; ``options`` are fields of :class:`Request`, by name, all optional.
-    Raises CoarticError for unknown options and wrong values."""
+    """Make a request from fields of :class:`Request`, all of which are optional.
+
+    Raises CoarticError for an unknown field or a wrong value.
+    """
     try:
         return Request.model_validate(plain_values(options))
     except ValidationError as error:
@@ -112,22 +114,26 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     Parameters
     ----------
     suite : str, Path or Suite
-        A suite, a shipped suite by name, or a suite file (``.toml``).
-    options
-        The fields of :class:`Request`, such as ``tasks``, ``methods``, ``runs`` and ``trials``.
+        A suite, the name of a shipped suite, or a suite file (``.toml``).
+    **options
+        Fields of :class:`Request`, such as ``tasks``, ``methods``, ``runs`` and ``trials``.
 
     Returns
     -------
     list of Job
-        A job for each cell (a method with parameters on a task) that has runs, with their numbers.
+        A job for each cell (a method with parameters on a task) that has runs.
 
     Raises
     ------
     CoarticError
-        A name is unknown or taken, a number or a parameter is refused, ``trials``, ``runs``
-        (except 1) or a family file has no effect, a task or method that is named has no runs of any
-        number, a cell has two numbers of runs, or a method does not apply to a task of its block
-        (without a wildcard; otherwise, and for added tasks and methods, it is left out).
+        One of these is the case:
+
+        - a name is unknown, or belongs to something else already;
+        - a number or a parameter is wrong;
+        - ``trials``, ``runs`` (except 1) or a family file has no effect;
+        - a task or method that is named has no runs;
+        - a cell has two different numbers of runs;
+        - a method does not apply to a task of a block that names both without a wildcard.
     """
     request = request_for(**options)
     if not isinstance(suite, Suite):
@@ -136,8 +142,7 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
 
 
 def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
-    """Return the jobs that a request asks for, one for each cell that has runs; ``registered`` has
-    all known methods. Raises CoarticError as :func:`plan_suite` does."""
+    """Return the jobs of :func:`plan_suite` for a checked request and all known methods."""
     asked = {name: methods_named(name, registered) for name in request.methods}
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     names, own, task_named = _asked_tasks(suite, request)
@@ -145,42 +150,41 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     jobs = [*_suite_jobs(suite, registered, own, task_named, job)]
     ids = dict.fromkeys(itertools.chain(*asked.values()))
     if not request.methods:
-        ids = dict.fromkeys(each.cell.method.name for each in jobs) | ids
+        ids = dict.fromkeys(planned.cell.method.name for planned in jobs) | ids
     methods = [registered[name] for name in ids]
-    there = tasks_by_name([*(each.cell.task for each in jobs), *own.values()])
-    of_suite = {each.cell.method.name for each in jobs}
-    planned = {(each.cell.task.name, each.cell.label) for each in jobs}
+    tasks = tasks_by_name([*(planned.cell.task for planned in jobs), *own.values()])
+    of_suite = {planned.cell.method.name for planned in jobs}
+    cells = {(planned.cell.task.name, planned.cell.label) for planned in jobs}
     jobs += [
         job(task, method)
-        for task, method in itertools.product(there.values(), methods)
+        for task, method in itertools.product(tasks.values(), methods)
         if (task.name in own or method.name not in of_suite)
-        and (task.name, method.name) not in planned
+        and (task.name, method.name) not in cells
         and method.why_not(task) is None
     ]
-    if wrong := [name for name in names if name not in there]:
+    if wrong := [name for name in names if name not in tasks]:
         hint = " Instances are a range, such as long/v1/i000..i009."
-        words = (f"{unknown('task', name, there)}{hint * ('/' in name)}" for name in wrong)
+        words = (f"{unknown('task', name, tasks)}{hint * ('/' in name)}" for name in wrong)
         raise CoarticError("\n".join(words))
-    jobs = [each for each in jobs if not names or each.cell.task.name in names]
-    chosen = [each for each in jobs if each.cell.method.name in ids]
-    busy = {each.cell.task.name for each in chosen}
-    if idle := [there[name] for name in names if name not in busy]:
+    jobs = [planned for planned in jobs if not names or planned.cell.task.name in names]
+    chosen = [planned for planned in jobs if planned.cell.method.name in ids]
+    busy = {planned.cell.task.name for planned in chosen}
+    if idle := [tasks[name] for name in names if name not in busy]:
         raise CoarticError(_why_nothing_runs(suite, idle, methods, jobs))
-    running = {each.cell.method.name for each in chosen}
+    running = {planned.cell.method.name for planned in chosen}
     for wanted in asked.values() or [[*ids]]:
         if running.isdisjoint(wanted):
             idle_methods = [registered[name] for name in wanted]
             raise CoarticError(_why_nothing_runs(suite, [], idle_methods, jobs))
     _check_effects(request, chosen)
-    jobs = _distinct_jobs([each for each in chosen if each.numbers])
+    jobs = _distinct_jobs([planned for planned in chosen if planned.numbers])
     if own or suite in suites().values():
         return jobs
-    return [replace(each, question=(suite.title, suite.description)) for each in jobs]
+    return [replace(planned, question=(suite.title, suite.description)) for planned in jobs]
 
 
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
-    """Return the ids of all methods in the user's files, without files with a method that the suite
-    or the request names."""
+    """Return the ids of the methods in the user's files of which no method is named."""
     files = {
         registered[method].where
         for names in (request.methods, *(block.methods for block in suite.blocks))
@@ -195,36 +199,51 @@ def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> li
 
 
 def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
-    """Raise CoarticError if ``trials``, ``runs`` (except 1) or a family file of a request has no
-    effect on its jobs."""
+    """Raise CoarticError if ``trials``, ``runs`` (except 1) or a family file has no effect."""
     methods = {job.cell.method.name: job.cell.method for job in jobs}
-    if request.trials and not any("trials" in each.defaults for each in methods.values()):
-        raise CoarticError(f"trials has no effect: no parameter of {', '.join(methods)} is trials")
+    if request.trials and not any("trials" in method.defaults for method in methods.values()):
+        raise CoarticError(
+            f"trials has no effect: no method has this parameter ({', '.join(methods)})"
+        )
     if request.runs not in (None, 1, range(1)) and not any(
-        each.stochastic for each in methods.values()
+        method.stochastic for method in methods.values()
     ):
         raise CoarticError(
-            f"runs has no effect: no run of {', '.join(methods)} depends on a seed, so one is made"
+            f"runs has no effect: no method depends on a seed ({', '.join(methods)}), so each has "
+            "one run"
         )
     for path in request.family_files:
         family = read_family(path).name
         if not any(job.cell.task.name.startswith(f"{family}/") for job in jobs):
             raise CoarticError(
-                f"{path} has no effect: no instance of {family} is among the tasks. Name some, "
-                f"such as {family}/i000..i009"
+                f"{path} has no effect: the tasks contain no instance of {family}. Name some, such "
+                f"as {family}/i000..i009"
             )
 
 
 def _asked_tasks(
     suite: Suite, request: Request
 ) -> tuple[dict[str, None], dict[str, Task], TaskNamed]:
-    """Return the names of the tasks that a request asks for, as keys; by name, the user's tasks and
-    the instances among them that the suite lacks; and a function that returns a task by its name.
-    Raises CoarticError for a task whose name belongs to another task."""
+    """Resolve the tasks that a request asks for.
+
+    Returns
+    -------
+    dict
+        Names of the tasks, as keys.
+    dict
+        Tasks among them that the suite lacks (the user's tasks, and instances), by name.
+    callable
+        Function that returns a task by its name.
+
+    Raises
+    ------
+    CoarticError
+        A task has the name of another task.
+    """
     for path in request.family_files:
         check_kind(str(path), "family")
-    of_tasks = [each.rpartition("/")[0] for each in request.tasks if isinstance(each, str)]
-    paths = (*request.family_files, *(Path(each) for each in of_tasks if is_file(each)))
+    parents = [task.rpartition("/")[0] for task in request.tasks if isinstance(task, str)]
+    paths = (*request.family_files, *(Path(parent) for parent in parents if is_file(parent)))
     families = own_families([*dict.fromkeys(paths)])
     names, own = dict[str, None](), dict[str, Task]()
 
@@ -236,26 +255,26 @@ def _asked_tasks(
             return instance_of(families[address.family], address)
         return load_task(name)
 
-    for each in request.tasks:
-        if isinstance(each, str) and not each.endswith(".toml"):
-            place, _, numbers = each.rpartition("/")
-            named = f"{load_family(place).name}/{numbers}" if is_file(place) else each
-            names |= dict.fromkeys(named_by(named))
+    for asked in request.tasks:
+        if isinstance(asked, str) and not asked.endswith(".toml"):
+            parent, _, numbers = asked.rpartition("/")
+            name = f"{load_family(parent).name}/{numbers}" if is_file(parent) else asked
+            names |= dict.fromkeys(named_by(name))
             continue
-        task = load_task(each) if isinstance(each, str) else check_task(each)
+        task = load_task(asked) if isinstance(asked, str) else check_task(asked)
         is_known = task.name in builtin_tasks() or task.family in (*families, *shipped_families())
         if (task_named(task.name) if is_known else own.setdefault(task.name, task)) != task:
-            whose = "a shipped task" if is_known else "another task"
+            owner = "a shipped task" if is_known else "another task"
             raise CoarticError(
-                f"{each}: name {task.name!r} is already taken by {whose}: give it another name"
+                f"{asked}: the name {task.name!r} belongs to {owner}: give this task another name"
             )
         names[task.name] = None
-    of_suite = {name for block in suite.blocks for each in block.tasks for name in named_by(each)}
+    of_suite = {name for block in suite.blocks for entry in block.tasks for name in named_by(entry)}
     if own:
-        there = [t for block in suite.blocks for t in tasks_of(suite, block, (), task_named)]
-        own = {name: task for name, task in own.items() if task not in there}
-    brought = (name for name in names if name not in of_suite and address_of(name))
-    own |= {name: task_named(name) for name in brought}
+        suite_tasks = [t for block in suite.blocks for t in tasks_of(suite, block, (), task_named)]
+        own = {name: task for name, task in own.items() if task not in suite_tasks}
+    instances = (name for name in names if name not in of_suite and address_of(name))
+    own |= {name: task_named(name) for name in instances}
     return names, own, task_named
 
 
@@ -266,9 +285,11 @@ def _suite_jobs(
     task_named: TaskNamed,
     job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs of a suite, made by ``job`` (:func:`_job_of`). Raises CoarticError for an
-    unknown method, for a method that does not apply to a task of a block without wildcards, and for
-    parameters that a method does not take."""
+    """Yield the jobs of a suite, which ``job`` makes (:func:`_job_of`).
+
+    Raises CoarticError for an unknown method or parameter, and for a method that does not apply to
+    a task of a block without wildcards.
+    """
     for block in suite.blocks:
         ids = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
         is_open = WILDCARD in "".join((*block.methods, *block.tasks))  # skip what does not apply
@@ -281,8 +302,8 @@ def _suite_jobs(
                         yield job(task, method, parameters, block.runs)
                     elif not is_open:
                         raise CoarticError(
-                            f"suite {suite.name!r}: {reason}; put tasks and methods that fit "
-                            "together into a block of their own"
+                            f"suite {suite.name!r}: {reason}; name in a block only methods that "
+                            "apply to all of its tasks"
                         )
 
 
@@ -294,9 +315,13 @@ def _job_of(
     parameters: Mapping[str, Any] | None = None,
     runs: int | None = None,
 ) -> Job:
-    """Return the job of a method with parameters on a task. Runs and trials come from the request,
-    or else from the block (``runs``, ``parameters``), the suite or, trials, the method. A method
-    that is not stochastic has run 0 alone, and no run if ``request.runs`` does not begin at 0."""
+    """Return the job of a method with parameters on a task.
+
+    The number of runs comes from the request, the block (``runs``) or the suite, whichever has it
+    first. The number of trials comes from the request, the block (``parameters``), the suite or the
+    method. A method that is not stochastic has only run 0, and no run if the runs of the request do
+    not begin at 0.
+    """
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
         parameters.pop("trials", None)
@@ -312,25 +337,27 @@ def _job_of(
 def _why_nothing_runs(
     suite: Suite, idle: Sequence[Task], methods: Iterable[MethodInfo], jobs: Sequence[Job]
 ) -> str:
-    """Return a sentence that says why methods have nothing to run: on the first task of ``idle``,
-    tasks that a request names and for which these methods have no job, or else on the tasks of
-    ``jobs``."""
+    """Return a sentence on why methods have no runs on the first task of ``idle``, or on any task.
+
+    ``idle`` has the tasks that a request names and for which the methods have no job.
+    """
     tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
     reasons = dict.fromkeys(method.why_not(task) for task in tasks for method in methods)
-    there_is = ", ".join(dict.fromkeys(job.cell.label for job in jobs)) or "nothing there"
-    why = "; ".join(filter(None, reasons)) or f"suite {suite.name!r} has {there_is}"
-    what = f"task {idle[0].name!r}" if idle else "what was asked for"
-    return f"no method to run on {what}: {why}."
+    labels = ", ".join(dict.fromkeys(job.cell.label for job in jobs)) or "no methods for it"
+    reason = "; ".join(filter(None, reasons)) or f"suite {suite.name!r} has {labels}"
+    where = f"task {idle[0].name!r}" if idle else "any of the tasks"
+    return f"no method runs on {where}: {reason}."
 
 
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
     """Return the first job of each cell. Raises CoarticError for two numbers of runs of a cell."""
     distinct = dict[str, Job]()
     for job in jobs:
-        if (first := distinct.setdefault(job.cell.digest, job)).numbers != job.numbers:
+        first_job = distinct.setdefault(job.cell.digest, job)
+        if first_job.numbers != job.numbers:
             raise CoarticError(
-                f"{job.cell.task.name} x {job.cell.label}: the suite asks for "
-                f"{counted(len(first.numbers), 'run')} of it, and then for {len(job.numbers)}; "
-                "give one number"
+                f"{job.cell.label} on {job.cell.task.name}: the suite asks for "
+                f"{counted(len(first_job.numbers), 'run')}, and in a later block for "
+                f"{len(job.numbers)}; ask for one number of runs"
             )
     return list(distinct.values())

@@ -1,10 +1,10 @@
 """Perform jobs in worker processes on this machine, with a limit of CPU time for each job.
 
-Built-in methods share processes; each method of a file has processes of its own, so that what it
-breaks there affects no other method. Package ``pebble`` starts and restarts processes and ends jobs
-that are late. The system counts the CPU time of a process in all its threads, and ends the process
-when a job has used up its limit. Processes that a worker has started end with the worker, unless
-they have left its group.
+Built-in methods share processes. Each method of a file has processes of its own, so that it cannot
+break other methods. Package ``pebble`` starts and restarts processes, and ends jobs that are late.
+The system counts the CPU time of all threads of a process, and ends the process when a job has used
+up its limit. When a worker ends, the processes that it has started end, too, unless they have left
+its process group.
 """
 
 from __future__ import annotations
@@ -45,15 +45,27 @@ from coartic.runs.plan import Job
 from coartic.runs.record import Outcome
 
 _LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit
-_LEAST_MEMORY = 2**30  # bytes of a process, four times the need of the built-in methods
-_LAST_LINES = 3  # last lines of a dead process's errors in a reason
-_REPEATED = (-signal.SIGKILL, 255)  # exit codes of a killed process and of one without its server
+_LEAST_MEMORY = 2**30  # bytes for a process: four times as much as built-in methods need
+_LAST_LINES = 3  # number of last lines of an ended process's errors in a reason
+_REPEATED = (-signal.SIGKILL, 255)  # exit codes of a process that was killed or lost its server
 
 
 @contextlib.contextmanager
 def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes with the environment variables of workers, with which x86-64
-    processors with AVX2 round alike, for programs that run methods or proofs themselves.
+    """Open a pool of processes that round alike, for programs that run methods or proofs
+    themselves.
+
+    The processes have the environment variables of workers, with which x86-64 processors with AVX2
+    round alike.
+
+    Parameters
+    ----------
+    processes : int
+        Number of processes.
+
+    Yields
+    ------
+    concurrent.futures.ProcessPoolExecutor
 
     Examples
     --------
@@ -65,12 +77,25 @@ def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
 
 
 class Local:
-    """Executor that performs jobs in processes on this machine, at most ``jobs`` at once (-1: one
-    a core).
+    """Executor that performs jobs in processes on this machine.
 
-    A job is ended after its limit of CPU time (a day without a limit), and in any case after three
-    times that in wall time plus ``timeout_s``. ``verbose`` shows what methods print, log (from INFO
-    on) and crash with. Raises ValueError for numbers out of bounds.
+    A job ends when it has used its limit of CPU time, or a day of CPU time if it has no limit. It
+    also ends after ``timeout_s`` plus three times this limit in wall time.
+
+    Parameters
+    ----------
+    jobs : int
+        Most jobs at once; -1 for one on each core.
+    timeout_s : float
+        Additional wall time of a job, s.
+    verbose : bool
+        True to show what methods print, their log messages from level INFO, and the tracebacks of
+        their errors.
+
+    Raises
+    ------
+    ValueError
+        A number is out of range.
     """
 
     @checked_arguments
@@ -85,10 +110,26 @@ class Local:
     ) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with the outcomes of its runs, as jobs finish.
 
-        With ``in_order`` one process performs all jobs of a method, in their order, while it lives.
-        A job whose process was killed, or that was late, is repeated once; a job that ends its
-        process otherwise, or a second time, has outcomes ``crashed`` or ``timeout``. Raises
-        CoarticError if processes cannot begin.
+        A job whose process was killed, or that exceeded its wall time, is repeated once. If it
+        fails in the same way again, or ends its process in another way, its outcomes are
+        ``crashed`` or ``timeout``.
+
+        Parameters
+        ----------
+        jobs : sequence of Job
+        in_order : bool
+            True to perform all jobs of a method in order in one process. If the process ends, a new
+            one performs the remaining jobs.
+
+        Yields
+        ------
+        Job
+        list of Outcome
+
+        Raises
+        ------
+        CoarticError
+            Processes cannot start.
         """
         groups = dict[Any, _Group]()
         for number, job in enumerate(jobs):
@@ -111,16 +152,16 @@ class Local:
         except (BrokenExecutor, OSError) as error:
             why = error_line(error.__cause__ or error)
             raise CoarticError(
-                f"worker processes cannot begin or work ({why}). Finished runs are kept: repeat "
+                f"worker processes cannot start or work ({why}). Finished runs are stored: repeat "
                 "the command"
             ) from None
 
     def _perform(self, groups: Sequence[_Group]) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield the jobs of groups with their outcomes, and close groups that have no more jobs."""
+        """Yield the jobs of groups with their outcomes, and close each group after its last job."""
         running, repeated = dict[Future[Any], tuple[_Group, int, Job]](), set[int]()
         while running or any(group.waiting for group in groups):
             for group in groups:
-                # One more job waits for the next free process of a group that is at work.
+                # A group whose processes are all busy gets one more job for the next free process.
                 while group.waiting and (
                     group.running == group.processes
                     or (
@@ -152,16 +193,17 @@ class Local:
                     group.close()
 
     def wall_limit_s(self, job: Job) -> float:
-        """Return the limit of wall time for a job, s: three times its limit of CPU time (a day
-        without a limit), plus ``timeout_s``."""
+        """Return the limit of wall time for a job, s."""
         return 3 * (job.time_limit_s or _LONGEST_S) + self.timeout_s
 
     def _failure(self, job: Job, error: BaseException, printed: str) -> list[Outcome]:
-        """Return the outcomes, ``timeout`` or ``crashed`` with a reason, of a job without an
-        answer, from the ``error`` in its place and the last lines that its process ``printed``."""
+        """Return the outcomes of a job that gave an error instead of an answer.
+
+        ``printed`` has the last lines that its process printed as errors.
+        """
         if isinstance(error, TimeoutError):
             wall_s = self.wall_limit_s(job)
-            reason = f"wall time limit of {wall_s:g} s exceeded twice: it waited"
+            reason = f"wall time limit of {wall_s:g} s exceeded twice: the job waited"
             return fail(job, "timeout", reason, wall_s=wall_s)
         if not isinstance(error, ProcessExpired):
             return fail(job, "crashed", error_line(error))
@@ -170,23 +212,23 @@ class Local:
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         code = error.exitcode
         how = f"killed by {signal_name(-code)}" if code < 0 else f"exit code {code}"
-        last = printed or "it left no message"
+        last = printed or "it printed no error"
         return fail(job, "crashed", f"the worker process ended ({how}): {last}")
 
 
 @dataclass(eq=False)
 class _Group:
-    """Jobs that share processes: of one method of a file, or of all built-in methods."""
+    """Jobs that share processes: those of a method from a file, or of all built-in methods."""
 
     local: Local
     waiting: deque[tuple[int, Job]] = field(default_factory=deque)
-    """Jobs that no process has, with their numbers."""
+    """Numbers and jobs that were not yet given to a process."""
     processes: int = 1
     """Most processes of the group."""
     running: int = 0
-    """Number of jobs that were given to processes and are not answered."""
+    """Number of jobs that were given to processes and have no answer yet."""
     folder: Path = Path()
-    """Folder of temporary files: of each job ``NUMBER-PID``, with what it prints as errors."""
+    """Folder of temporary files. Each job has a file ``NUMBER-PID`` with the errors it prints."""
     _pool: Any = None
 
     @property
@@ -195,13 +237,16 @@ class _Group:
         return min(self.running, self.processes)
 
     def give(self, number: int, job: Job) -> Future[Any]:
-        """Give a job to the processes, which the first job starts; return its future answer."""
+        """Give a job to the processes, and return the future of its answer.
+
+        The first job starts the processes.
+        """
         if self._pool is None:
             begin = self.folder, self.local.workers, self.local.verbose
             self._pool = ProcessPool(
                 self.processes, initializer=_begin, initargs=begin, context=CONTEXT
             )
-            # This process executes solutions: it compiles kernels meanwhile.
+            # This process executes solutions. It compiles its kernels while the worker starts.
             future = self._schedule(number, job)
             with contextlib.suppress(Exception):  # the worker reports the same error
                 warm_up(job.cell.task, "trials")
@@ -216,8 +261,10 @@ class _Group:
         return future
 
     def end_process(self, number: int) -> str:
-        """End what is left of the group of the process that had a job, and return the last lines
-        that the job printed as errors, as one line."""
+        """Kill the process group of a job whose process has ended.
+
+        Return the last lines that the job printed as errors, as one line.
+        """
         printed = ""
         for path in self.folder.glob(f"{number}-*"):
             pid = int(path.name.partition("-")[2])
@@ -231,7 +278,7 @@ class _Group:
         return printed
 
     def close(self) -> None:
-        """End the processes, with what they have started."""
+        """End the processes of the group, and the processes that they have started."""
         if self._pool is not None:
             self._pool.stop()
             self._pool.join()
@@ -239,7 +286,7 @@ class _Group:
 
 
 def _show_errors() -> None:
-    from coartic.benchmarks.preload import show_errors  # which belongs to processes of workers
+    from coartic.benchmarks.preload import show_errors  # only for processes of workers
 
     show_errors()
 
@@ -251,9 +298,11 @@ def _begin_plainly() -> None:
 
 
 def _begin(folder: Path, workers: int, verbose: bool) -> None:
-    """Set up a process that performs jobs, one of ``workers`` that share 80 % of the machine's
-    memory (at least 1 GiB each): it works in a new folder in ``folder``, and prints nothing unless
-    ``verbose``."""
+    """Set up a process that performs jobs.
+
+    It works in a new folder in ``folder``, and prints only if ``verbose``. Each of the ``workers``
+    may use an equal share of 80 % of the machine's memory, but at least 1 GiB.
+    """
     os.environ.pop("PYTHONSAFEPATH", None)  # see WorkerProcess
     begin_worker(folder, streams=1 if verbose else 3)
     if verbose:
@@ -266,15 +315,17 @@ def _begin(folder: Path, workers: int, verbose: bool) -> None:
     with contextlib.suppress(ValueError):  # a limit from outside is lower
         resource.setrlimit(resource.RLIMIT_DATA, (share, share))
     with contextlib.suppress(OSError):  # the disk is full
-        place = tempfile.mkdtemp(dir=folder)
-        tempfile.tempdir = os.environ["TMPDIR"] = place
-        os.chdir(place)
+        work_folder = tempfile.mkdtemp(dir=folder)
+        tempfile.tempdir = os.environ["TMPDIR"] = work_folder
+        os.chdir(work_folder)
 
 
 def _answer_to(folder: Path, number: int, job: Job, verbose: bool) -> bytes:
-    """Perform a job under its limit of CPU time, and return the outcomes as JSON; an outcome
-    ``crashed`` for each run if JSON cannot hold them. Errors that it prints go into a file of
-    ``folder``, unless ``verbose``; a file whose job is answered is removed."""
+    """Perform a job under its limit of CPU time, and return the outcomes as JSON.
+
+    If JSON cannot represent them, each run has an outcome ``crashed``. Unless ``verbose``, errors
+    that the job prints go into a file in ``folder``, which is removed when the job has an answer.
+    """
     printed = folder / f"{number}-{os.getpid()}"
     with contextlib.suppress(OSError), printed.open("wb") as file:  # the disk may be full
         if not verbose:
@@ -292,4 +343,4 @@ def _answer_to(folder: Path, number: int, job: Job, verbose: bool) -> bytes:
     try:
         return answer_of(outcomes)
     except Exception as error:
-        return answer_of(fail(job, "crashed", f"its outcome cannot be kept: {error_line(error)}"))
+        return answer_of(fail(job, "crashed", f"its outcome cannot be stored: {error_line(error)}"))

@@ -1,6 +1,8 @@
-"""What the server from which worker processes are forked does once: it imports the compiler, and
-keeps its standard error stream apart. A worker that begins while its parent ends prints no
-traceback; :func:`show_errors` gives a worker the stream back."""
+"""Code that runs once, in the server from which worker processes are forked.
+
+It imports the compiler. It also disconnects the standard error stream, so that a worker that starts
+while its parent ends does not print a traceback. :func:`show_errors` connects the stream again.
+"""
 
 import os
 

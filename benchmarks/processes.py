@@ -1,4 +1,4 @@
-"""Processes for methods: they round alike on all processors, and import what is installed."""
+"""Processes for methods, which round alike on all processors and import only installed code."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from typing import Any
 from coartic.internal.interruption import blocked_signals
 from coartic.internal.threads import environment, worker_variables
 
-# Processes are forked from a server that has imported their modules, if the path of its socket is
-# short: the system takes 103 characters, and Python adds some.
+# Processes are forked from a server that has imported their modules. The path of its socket must be
+# short: the system allows 103 characters, and Python adds some to the folder. Otherwise processes
+# are started anew.
 _BASE: Any = multiprocessing.get_context(
     "forkserver" if len(tempfile.gettempdir()) <= 70 else "spawn"
 )
@@ -25,10 +26,10 @@ _starting = threading.Lock()
 
 
 class WorkerProcess(_BASE.Process):  # type: ignore[misc]
-    """A process that starts with the environment variables of a worker.
+    """Process that starts with the environment variables of a worker.
 
-    NumPy reads them when it is imported. The process imports neither the main program again nor
-    modules from the working folder, whoever wrote them.
+    NumPy reads these variables when it is imported. The process does not import the main program
+    again, nor any module from the working folder.
     """
 
     @staticmethod
@@ -44,8 +45,11 @@ class WorkerProcess(_BASE.Process):  # type: ignore[misc]
 
 
 class _WorkerContext(type(_BASE)):  # type: ignore[misc]
-    """Context of workers. The first lock starts a process of Python that keeps track of locks; it
-    imports nothing from the working folder either."""
+    """Context of worker processes.
+
+    The first lock starts Python's resource tracker, a process that must not import modules from the
+    working folder either.
+    """
 
     Process = WorkerProcess
 
@@ -68,8 +72,7 @@ CONTEXT: Any = _WorkerContext()
 
 
 def signal_name(number: int) -> str:
-    """Return the name of a signal, such as ``SIGKILL``, or, for a signal without a name here, its
-    number, as in ``signal 40``."""
+    """Return the name of a signal, such as ``SIGKILL``, or ``signal 40`` if it has no name."""
     try:
         return signal.Signals(number).name
     except ValueError:

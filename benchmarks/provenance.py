@@ -1,4 +1,4 @@
-"""Describe the surroundings of a result: versions, machine, commit and command."""
+"""Describe the environment of a result: versions, machine, commit and command."""
 
 from __future__ import annotations
 
@@ -30,10 +30,20 @@ _LIBRARIES = ("casadi", "daqp", "llvmlite", "numba", "numpy", "pandas", "pydanti
 
 @cache
 def current_environment() -> dict[str, Any]:
-    """Return what results of this process can depend on, by name: versions (``coartic``,
-    ``python``, ``packages``, ``model_code``, ``commit``), ``platform``, ``processor``,
-    ``arithmetic``, ``cores`` and ``threads``, the environment variables of workers. It is always
-    the same dictionary, not to be changed."""
+    """Return the environment on which results of this process can depend.
+
+    It is the same dictionary in each call: do not change it.
+
+    Returns
+    -------
+    dict
+        - ``coartic``, ``python``, ``packages``: versions;
+        - ``model_code``: hash of the code of the model;
+        - ``commit``: commit of the checkout;
+        - ``platform``, ``processor``, ``cores``: the machine;
+        - ``arithmetic``: fingerprint of rounding (:func:`arithmetic`);
+        - ``threads``: environment variables of workers.
+    """
     processor = platform.processor()
     with contextlib.suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
@@ -54,29 +64,40 @@ def current_environment() -> dict[str, Any]:
 
 
 def now() -> str:
-    """Return date and time, UTC, to the second, as ISO 8601 text."""
+    """Return date and time, UTC, to the second, in ISO 8601 format."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def made_with() -> dict[str, Any]:
-    """Return :func:`current_environment` with ``command``, this process's program and arguments, a
-    list of words (``a notebook`` in a notebook), and the ``date``, UTC."""
+    """Return the environment of this process with its command and the date.
+
+    Returns
+    -------
+    dict
+        Entries of :func:`current_environment`; ``command``, a list of the program and its arguments
+        (``["a notebook"]`` in a notebook); and ``date``, UTC.
+    """
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
     return current_environment() | {"command": command, "date": now()}
 
 
 def _commit_of_checkout() -> dict[str, Any] | None:
-    """Return the commit of the checkout that the code runs from, as ``id``, and as ``dirty``
-    whether it was changed since (files that Git does not track do not count); None for an installed
-    package or if Git fails."""
+    """Return the commit of the checkout that the code runs from.
+
+    Returns
+    -------
+    dict or None
+        ``id`` of the commit, and ``dirty``, True if tracked files have changed since. None for an
+        installed package, or if Git fails.
+    """
     # A GIT_DIR of the caller, such as a hook, must not replace this checkout.
     clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
 
     def git(*arguments: str) -> str:
         command = ["git", "-C", str(PACKAGE.parent), *arguments]
-        said = subprocess.check_output(command, stderr=subprocess.DEVNULL, timeout=20, env=clean)
-        return os.fsdecode(said).strip()
+        output = subprocess.check_output(command, stderr=subprocess.DEVNULL, timeout=20, env=clean)
+        return os.fsdecode(output).strip()
 
     try:
         if Path(git("rev-parse", "--show-toplevel")).resolve() != PACKAGE.parent.resolve():
@@ -88,22 +109,25 @@ def _commit_of_checkout() -> dict[str, Any] | None:
 
 
 def arithmetic() -> str:
-    """Return a fingerprint of how workers round, ``NumPy HASH, libm HASH``: hashes of the bits of
-    some results, computed in a process with the variables of a worker. Where a hash is the same,
-    that library rounds these results alike."""
+    """Return a fingerprint of how workers round, as ``NumPy HASH, libm HASH``.
+
+    The hashes are of the bits of some results of each library, computed in a process with the
+    environment variables of a worker. On machines with the same hash the library rounds these
+    results alike.
+    """
     with process_pool(1) as pool:
         return pool.submit(_arithmetic).result()
 
 
 def _arithmetic() -> str:
-    """Return the text of :func:`arithmetic` for this process: a hash of numbers computed by NumPy,
-    and a hash of numbers computed by the C library."""
+    """Return the fingerprint of :func:`arithmetic` for this process."""
     matrix = np.random.default_rng(0).standard_normal((16, 16))
     by_numpy = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix)), np.abs(matrix) ** 0.3
     numbers = np.abs(matrix).ravel().tolist()
-    by_libm = [[*map(each, numbers)] for each in (math.exp, math.log, lambda x: math.pow(x, 0.3))]
+    functions = math.exp, math.log, lambda x: math.pow(x, 0.3)
+    by_libm = [[*map(function, numbers)] for function in functions]
     hashes = [
-        hashlib.sha256(b"".join(np.asarray(each).tobytes() for each in computed)).hexdigest()[:8]
-        for computed in (by_numpy, by_libm)
+        hashlib.sha256(b"".join(np.asarray(part).tobytes() for part in parts)).hexdigest()[:8]
+        for parts in (by_numpy, by_libm)
     ]
     return "NumPy {}, libm {}".format(*hashes)

@@ -20,25 +20,25 @@ from coartic.model import MODEL_VERSION
 from coartic.runs.method_info import BUILT_IN, MethodInfo, method_info
 
 _RESERVED = (METHOD_PREFIX, "optimum/")
-"""Beginnings of ids that have a meaning in every table; they are reserved for built-in methods."""
+"""Beginnings of ids that are reserved for built-in methods, because tables give them a meaning."""
 METHOD_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
 NAMES = ("CMA-ES", "learner", "optimum")
-"""Names of built-in methods that an id of another method must not repeat."""
+"""Names of built-in methods that the id of another method must not repeat."""
 
 
 Registry = Mapping[str, MethodInfo]
 
 
 def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
-    """Return the declaration of every known method by id: of the built-in methods, then of the
-    methods in ``method_files``.
+    """Return the declarations of all known methods by id.
 
-    Raises CoarticError for a file that cannot be loaded or holds no method, and for an id that is
-    malformed, reserved or taken (:func:`check_id`).
+    Built-in methods come first, then the methods of ``method_files``. Raises CoarticError for a
+    file that cannot be loaded or has no method, and for an id that is not allowed
+    (:func:`check_id`).
     """
     infos = dict(built_in())
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
-        from coartic.benchmarks.method_files import read_file  # which few commands need
+        from coartic.benchmarks.method_files import read_file  # most commands do not need it
 
         for info in read_file(path):
             check_id(info.name, info.origin, infos)
@@ -48,8 +48,10 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
 
 @cache
 def built_in() -> Mapping[str, MethodInfo]:
-    """Return the declarations of the built-in methods by id: always the same mapping, not to be
-    changed."""
+    """Return the declarations of the built-in methods by id.
+
+    It is the same mapping in each call: do not change it.
+    """
     return {
         method.name: method_info(method, BUILT_IN, name, f"{MODEL_VERSION}.{method.version}")
         for name in MODULES
@@ -58,33 +60,63 @@ def built_in() -> Mapping[str, MethodInfo]:
 
 
 def check_id(name: str, origin: str, registered: Registry) -> None:
-    """Raise CoarticError for the id ``name`` of a method from ``origin`` that is malformed or has
-    more than 80 characters, begins with a reserved word (:data:`_RESERVED`; capitals matter), or
-    is, capitals aside, an id in ``registered``, a condition of the learner or one of
-    :data:`NAMES`."""
+    """Check the id of a method that is not built in.
+
+    Parameters
+    ----------
+    name : str
+        The id.
+    origin : str
+        File of the method, for the message.
+    registered : mapping
+        Known methods by id.
+
+    Raises
+    ------
+    CoarticError
+        The id
+
+        - has other characters than letters, digits and ``._+/-``, or more than 80;
+        - begins with ``dual-process/`` or ``optimum/``;
+        - is, ignoring case, a known id, a condition of the learner or one of :data:`NAMES`.
+    """
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(
-            f"{origin}: the name {name!r} must begin with a letter or digit and have only letters, "
-            "digits, '.', '_', '+', '/' and '-', at most 80, such as 'my-search'"
+            f"{origin}: method id {name!r} must begin with a letter or digit and have at most 80 "
+            "characters, only letters, digits, '.', '_', '+', '/' and '-', such as 'my-search'"
         )
-    why = ""
+    problem = ""
     if name.startswith(_RESERVED):
-        ours = " or ".join(map(repr, _RESERVED))
-        why = f"is reserved: ids that begin with {ours} are this project's"
+        reserved = " or ".join(map(repr, _RESERVED))
+        problem = f"is reserved: an id must not begin with {reserved}"
     elif name in registered:
-        why = f"is already taken ({registered[name].origin})"
+        problem = f"exists already ({registered[name].origin}): choose another"
     elif name.casefold() in map(str.casefold, (*registered, *EVERY_CONDITION, *NAMES)):
-        why = "is a name of a method here: choose another"
-    if why:
-        raise CoarticError(f"{origin}: method id {name!r} {why}")
+        problem = "is the name of a built-in method: choose another"
+    if problem:
+        raise CoarticError(f"{origin}: method id {name!r} {problem}")
 
 
 def methods_named(name: str, registered: Registry) -> list[str]:
-    """Return the ids of the methods that a name stands for, in the order of ``registered``: of one
-    method for an id or a condition of the learner, such as ``EC1``, of all methods whose ids match
-    for a wildcard, such as ``optimum/*``; capitals matter.
+    """Return the ids of the methods that a name stands for.
 
-    Raises CoarticError if no id matches.
+    Parameters
+    ----------
+    name : str
+        An id, a condition of the learner such as ``EC1``, or a wildcard such as ``optimum/*``. Case
+        matters.
+    registered : mapping
+        Known methods by id.
+
+    Returns
+    -------
+    list of str
+        Ids in the order of ``registered``.
+
+    Raises
+    ------
+    CoarticError
+        No id matches.
     """
     name = f"{METHOD_PREFIX}{name}" if name in EVERY_CONDITION else name
     named = [method for method in registered if fnmatchcase(method, name)]

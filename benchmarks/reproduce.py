@@ -24,30 +24,33 @@ from coartic.runs.store import open_store
 def find_run(prefix: str, folder: Path) -> Run:
     """Return the run of a results folder whose id begins with ``prefix``.
 
-    Raises CoarticError if there is no such run, or more than one, for an empty prefix, and for a
-    folder that cannot be read.
+    Raises CoarticError if the prefix is empty, if no run or more than one run matches, or if the
+    folder cannot be read.
     """
     if not prefix or not set(prefix) <= set("0123456789abcdef-."):
         raise CoarticError(
-            f"{prefix!r} is not a run id. Give the beginning of one, such as 3f2a9c: "
-            "column run_ids of a report's tables names the runs of each row."
+            f"{prefix!r} is not the beginning of a run id, such as 3f2a9c. Column run_ids of a "
+            "report's tables has the ids of the runs of each row."
         )
     with open_store(folder) as store:
         ids = sorted(store.ids(prefix))
         if not ids:
-            raise CoarticError(f"there is no run {prefix!r} in {folder}")
+            raise CoarticError(f"{folder} has no run with an id that begins with {prefix!r}")
         if len(ids) > 1:
-            some = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
-            raise CoarticError(f"{prefix!r} is the beginning of {len(ids)} runs: {some}")
+            listed = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
+            raise CoarticError(f"{len(ids)} run ids begin with {prefix!r}: {listed}")
         return store.run(ids[0])
 
 
 def trajectory_of(run: Run) -> Trajectory:
-    """Return the movements of a run's solution, executed and sampled at each tick. Raises
-    CoarticError if the run has no solution, or its solution cannot be executed or is too long."""
+    """Execute the solution of a run, and return its movements sampled at each tick.
+
+    Raises CoarticError if the run has no solution, or if its solution cannot be executed or is too
+    long.
+    """
     if "solution" not in run.scores:
-        why = f"{run.outcome.status}, {run.outcome.reason}"
-        raise CoarticError(f"run {run.id} has no solution to show: {why}")
+        reason = f"{run.outcome.status}, {run.outcome.reason}"
+        raise CoarticError(f"run {run.id} has no solution to show: {reason}")
     task, movements = run.cell.task, run.solution.movements
     try:
         if error := too_long(task, movements):
@@ -60,21 +63,51 @@ def trajectory_of(run: Run) -> Trajectory:
 def perform_in_order(
     jobs: Sequence[Job], workers: int = 1, *, verbose: bool = False
 ) -> Iterator[Run]:
-    """Perform jobs, and yield the scored runs, which are not stored, as they finish. A new process
-    performs all jobs of a method in order, while it lives; at most ``workers`` processes (-1: one
-    a core) run at once. ``verbose`` shows what methods print and log."""
+    """Perform the jobs of each method in order in one process, and yield the scored runs.
+
+    Runs are yielded as they finish, and are not stored. If a process ends, a new one performs the
+    remaining jobs of its method.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+    workers : int
+        Most processes at once; -1 for one on each core.
+    verbose : bool
+        True to show what methods print and log.
+
+    Yields
+    ------
+    Run
+    """
     with closing(Local(workers, verbose=verbose).perform(jobs, in_order=True)) as answers:
         for job, outcomes in answers:
             yield from score(job, outcomes)
 
 
 def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tuple[Run, Run]]:
-    """Perform stored runs again, by the methods that are here, and yield pairs of a stored run and
-    the new run, which is not stored, as they finish. ``registered`` must have the methods.
+    """Perform stored runs again with the methods of this installation.
 
-    Raises CoarticError if a method no longer takes the parameters of a run.
+    Parameters
+    ----------
+    runs : sequence of Run
+        Stored runs.
+    registered : mapping
+        Known methods by id; the methods of all runs must be among them.
+
+    Yields
+    ------
+    Run
+        A stored run.
+    Run
+        The new run, which is not stored.
+
+    Raises
+    ------
+    CoarticError
+        A method no longer accepts the parameters of a run.
     """
-    of_job = dict[int, Run]()
+    stored_runs = dict[int, Run]()
     jobs = list[Job]()
     for run in runs:
         method = registered[run.cell.method.name]
@@ -83,21 +116,39 @@ def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tu
         except CoarticError as error:
             version = plain(str((run.outcome.environment or {}).get("coartic")), 20)
             raise CoarticError(
-                f"run {run.id} cannot be performed here: {error}. Version {version} of coartic "
-                "made it."
+                f"run {run.id} cannot be performed here: {error}. It was made by coartic {version}."
             ) from None
         jobs.append(replace(run.job, cell=replace(run.cell, method=method)))
-        of_job[id(jobs[-1])] = run
+        stored_runs[id(jobs[-1])] = run
     with closing(Local().perform(jobs)) as answers:
         for job, outcomes in answers:
-            (again,) = score(job, outcomes)
-            yield of_job[id(job)], again
+            (new_run,) = score(job, outcomes)
+            yield stored_runs[id(job)], new_run
 
 
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
-    """Return at most ``count`` (1 or more) runs of a folder's plan, at equal steps, of methods that
-    have in ``registered`` the same version or code as in the run. Raises CoarticError if there is
-    no such run."""
+    """Select runs of a folder that can be performed here, evenly over its plan.
+
+    A run can be performed if its method has the same version or code in ``registered``.
+
+    Parameters
+    ----------
+    folder : Path
+        Results folder.
+    count : int
+        Most runs, at least 1.
+    registered : mapping
+        Known methods by id.
+
+    Returns
+    -------
+    list of Run
+
+    Raises
+    ------
+    CoarticError
+        No run can be performed here.
+    """
     with open_store(folder) as store:
         plan = store.plan()
         ids = [
@@ -108,19 +159,28 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
         ]
         if not ids:
             raise CoarticError(
-                f"{folder} has no run of a method that has the same version or code here"
+                f"no run of {folder} can be performed again: its methods have other versions or "
+                "other code here"
             )
         step = max(1, len(ids) // count)
         return [store.run(run_id) for run_id in ids[::step][:count]]
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:
-    """Return the differences between the results of two runs, in words, an empty list for equal
-    results: status, reason, details, counts, ticks with motor noise, movements and rewards. Rewards
-    that a run does not keep do not count."""
+    """Compare the results of two runs.
+
+    Compared are status, reason, details, counts, movements and rewards, and for two runs with one
+    id the ticks with motor noise. If one of the runs did not store all of its rewards, only the
+    stored ones are compared.
+
+    Returns
+    -------
+    list of str
+        A phrase for each difference; empty for equal results.
+    """
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
-    first, second = (
+    row_a, row_b = (
         run.to_row()
         | {"details": {k: v for k, v in run.outcome.details.items() if k != UNREPEATED}}
         for run in (a, b)
@@ -129,14 +189,16 @@ def compare_runs(a: Run, b: Run) -> list[str]:
     if a.id == b.id:  # from which the motor noise is drawn
         names.append("noisy_ticks")
     changes = [
-        f"{name}: {brief_value(first[name])} against {brief_value(second[name])}"
+        f"{name}: {brief_value(row_a[name])} against {brief_value(row_b[name])}"
         for name in names
-        if first[name] != second[name]
+        if row_a[name] != row_b[name]
     ]
     for part in PARTS:
         if a.movement_data(part) != b.movement_data(part):
             scores = [run.scores.get(part) for run in (a, b)]
-            words = [f"{each.reward} with {each.hands}" if each else "nothing" for each in scores]
+            words = [
+                f"{score.reward} with {score.hands}" if score else "nothing" for score in scores
+            ]
             changes.append(f"{part}: {' against '.join(words)}")
     rewards = a.outcome.rewards, b.outcome.rewards
     if rewards[0] != rewards[1]:

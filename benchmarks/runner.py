@@ -1,7 +1,7 @@
 """Run a suite into a folder, as ``coartic run`` does.
 
-``run_suite("quick", "results/quick", runs=2, trials=200)`` plans a suite and performs what the
-folder lacks; ``coartic.analysis.load("results/quick")`` reads it.
+``run_suite("quick", "results/quick", runs=2, trials=200)`` plans a suite and performs the runs that
+the folder lacks. ``coartic.analysis.load("results/quick")`` reads the folder.
 """
 
 from __future__ import annotations
@@ -35,25 +35,26 @@ from coartic.runs.record import UNREPEATED, Run
 from coartic.runs.store import Store, writing
 
 _LEAST_BATCH = 8
-"""Most runs of a cell that are not divided among workers, if a method performs them together."""
+"""Least number of runs of a job, if its cell has so many and its method performs them side by
+side."""
 _MOST_TRIALS = 400_000
-"""Most trials of a job, if it has more runs than that: some seconds, which is what an interruption
-loses."""
+"""Most trials of a job with more than :data:`_LEAST_BATCH` runs. They take some seconds, which are
+lost in an interruption."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
 
 @dataclass
 class Progress:
-    """The progress of a plan in a folder."""
+    """Progress of a plan in a results folder, as numbers of runs."""
 
     folder: Path
     total: int
     """Runs of the plan."""
     present: int = 0
-    """Runs of the plan that the folder had before, except runs that are performed again."""
+    """Runs of the plan that the folder had before, without those that are performed again."""
     stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    """Runs that the folder has from another version or code of their method, by the method, that
-    version and the present one. They are kept, and no report shows them."""
+    """Runs in the folder by another version or code of their method. The keys are method, that
+    version and the present version. These runs stay in the folder, and reports do not show them."""
     done: int = 0
     """Runs performed by this call."""
     failed: int = 0
@@ -61,20 +62,19 @@ class Progress:
     crashed: int = 0
     """Runs of the plan that crashed."""
     marks: dict[str, list[str]] = field(default_factory=dict)
-    """Sentences on methods against which runs of the folder speak (:meth:`Store.marks`)."""
+    """Warnings about the runs of methods in the folder, by method (:meth:`Store.marks`)."""
     others: int = 0
-    """Runs of earlier commands in the folder that the plan does not ask for, without :attr:`stale`
-    runs."""
+    """Runs in the folder that the plan does not ask for, without :attr:`stale` runs."""
     wall_s: float = 0.0
     """Wall time of the call, s; 0 until it ends."""
     time_left: TimeLeft = field(default_factory=TimeLeft)
-    """Estimate of the time that the runs to perform take."""
+    """Estimate of the time until all runs are performed."""
     repeats: int = 0
-    """Runs still to perform that only show whether results of own methods repeat."""
+    """Repeated runs that are still to be performed. They check whether results of methods from
+    files repeat."""
 
     def count(self, status: str) -> None:
-        """Count a run of the plan by its status (:attr:`.Outcome.status`): any but ``ok`` in
-        :attr:`failed`, ``crashed`` in :attr:`crashed`, too."""
+        """Count a run of the plan in :attr:`failed` and :attr:`crashed` by its status."""
         self.failed += status != "ok"
         self.crashed += status == "crashed"
 
@@ -86,40 +86,43 @@ class Progress:
 
     @property
     def unused(self) -> Iterator[str]:
-        """Sentences on stored runs that are not used because another version of their method made
-        them: a sentence for each method and version."""
-        for (method, old, now), count in self.stale.items():
-            changed = f"by version {old}, and here it is {now}"
-            if not (VERSION.fullmatch(old) and VERSION.fullmatch(now)):
-                changed = "from before a change of its code, or of what this imports or reads"
-            yield f"Not used: {counted(count, 'run')} of {method} {changed}. They are kept."
+        """Sentences on :attr:`stale` runs, one for each method and version."""
+        for (method, old, new), count in self.stale.items():
+            origin = f"made by version {old}; its version here is {new}"
+            if not (VERSION.fullmatch(old) and VERSION.fullmatch(new)):
+                origin = "made before its file, or a file that it imports or reads, changed"
+            runs = counted(count, "run")
+            yield f"Not used: {runs} of {method}, {origin}. They stay in the folder."
 
     def __str__(self) -> str:
-        """Return a sentence: how many runs are there, after which time, how many failed, and the
-        folder."""
+        """Return a sentence on the numbers of runs, the time, the failures and the folder."""
         minutes, seconds = divmod(self.wall_s, 60)
         long = self.wall_s >= 100
         time_taken = f"{minutes:.0f} min {seconds:.0f} s" if long else f"{self.wall_s:.0f} s"
-        there = self.present + self.done
-        runs = counted(there, "run") if there == self.total else f"{there} of {self.total} runs"
+        count = self.present + self.done
+        runs = counted(count, "run") if count == self.total else f"{count} of {self.total} runs"
         runs += f" ({self.present} reused)" if self.present else ""
         failed = f"{self.failed} failed" if self.failed else "none failed"
         left_out = [
             f"{counted(count, 'run')} {what}"
             for count, what in (
                 (self.stale.total(), "by another version of their method"),
-                (self.others, "of earlier commands, which are kept"),
+                (self.others, "of earlier commands"),
             )
             if count > 0
         ]
-        without = f" (leaving out {' and '.join(left_out)})" if left_out else ""
+        without = f" (without {' and '.join(left_out)})" if left_out else ""
         return f"{runs} in {time_taken}, {failed}: {self.folder}{without}"
 
 
 Watcher = Callable[[Progress, Cell | None], None]
-"""Function that is called with the progress: before the first run with None, then with the cell of
-each run, also of repeats, and once before the repeats. After an exception in it, which gives a
-warning, it is not called again."""
+"""Function that is called with the progress and a cell:
+
+- before the first run, with None;
+- after each run and each repeated run, with the cell of the run;
+- before the first repeated run, with its cell.
+
+After an exception in it, a warning is given, and it is not called again."""
 
 
 def run_suite(
@@ -130,31 +133,32 @@ def run_suite(
     watch: Watcher | None = None,
     **options: Any,
 ) -> Progress:
-    """Run the runs of a suite that a folder lacks: :func:`plan_suite`, then :func:`perform`.
+    """Plan a suite (:func:`plan_suite`), and perform the runs that a folder lacks
+    (:func:`perform`).
 
     Parameters
     ----------
     suite : str, Path or Suite
-        A suite, a shipped suite by name, or a suite file (``.toml``).
+        A suite, the name of a shipped suite, or a suite file (``.toml``).
     folder : str or Path
-        Results folder, which is made if it is missing.
-    executor, watch
-        Place where methods run, and function called before the first run and after each
-        (:func:`perform`).
-    options
+        Results folder. A missing folder is made.
+    executor : Local or Dask, optional
+        Machine or cluster on which methods run (:func:`perform`).
+    watch : callable, optional
+        Function that is called before the first run and after each run (:data:`Watcher`).
+    **options
         Fields of :class:`~coartic.benchmarks.planning.Request`, such as ``tasks``, ``methods``,
-        ``runs`` per cell and ``trials`` per run.
+        ``runs`` of each cell and ``trials`` of each run.
 
     Returns
     -------
     Progress
-        Counts of runs; ``str`` of it is a sentence.
+        Numbers of runs. ``str`` of it is a sentence.
 
     Raises
     ------
     CoarticError
-        A name or a number is refused (:func:`plan_suite`), or the folder cannot be used
-        (:func:`perform`).
+        An option is wrong (:func:`plan_suite`), or the folder cannot be used (:func:`perform`).
 
     Examples
     --------
@@ -173,49 +177,51 @@ def perform(
 ) -> Progress:
     """Perform the runs of a plan that a results folder lacks.
 
-    The plan replaces the plan of the folder; other runs stay there, and no report shows them. Runs
-    that fail are stored and counted, and raise nothing; runs that crashed, or timed out under a
-    lower limit, are performed again by the next call. An interruption keeps finished runs. Of each
-    method of a file, the quickest ok run of this call is made again in another process; a warning,
-    and a mark in reports, say if the result differs.
+    - The plan replaces the plan of the folder. Other runs stay there, and reports do not show them.
+    - Runs that fail are stored and counted. They do not raise an error. The next call performs
+      crashed runs again, and runs that timed out under a lower limit.
+    - Finished runs are stored even if the call is interrupted.
+    - The quickest ok run of each method from a file is made again in another process. If the result
+      differs, this call warns, and reports mark the method.
 
     Parameters
     ----------
     plan : sequence of Job
         Jobs from :func:`plan_suite`, at least one.
     folder : str or Path
-        Results folder, which is made if it is missing.
+        Results folder. A missing folder is made.
     executor : Local or Dask, optional
-        Place where methods run: this machine (:class:`coartic.benchmarks.pool.Local`, by default
-        with a process for every core) or a Dask cluster
-        (:class:`coartic.benchmarks.cluster.Dask`).
+        Machine or cluster on which methods run: this machine
+        (:class:`coartic.benchmarks.pool.Local`, by default with a process for each core) or a Dask
+        cluster (:class:`coartic.benchmarks.cluster.Dask`).
     watch : callable, optional
         Function that is called before the first run and after each run (:data:`Watcher`).
 
     Returns
     -------
     Progress
-        Counts of runs; ``str`` of it is a sentence.
+        Numbers of runs. ``str`` of it is a sentence.
 
     Raises
     ------
     CoarticError
-        The plan has no jobs, the folder holds something else or cannot be written, another process
-        writes into it, or a method with missing runs has no code here.
+        One of these is the case:
+
+        - the plan has no jobs;
+        - the folder contains something else, or cannot be written;
+        - another process writes into the folder;
+        - a method with missing runs has no code here.
     """
-    folder, clock = folder_named(folder), time.perf_counter()
-    watches = [watch] if watch else []
+    folder, started = folder_named(folder), time.perf_counter()
+    watchers = [watch] if watch else []
 
     def tell(cell: Cell | None) -> None:
         try:
-            for each in watches:
-                each(progress, cell)
+            for watcher in watchers:
+                watcher(progress, cell)
         except Exception as error:
-            watches.clear()
+            watchers.clear()
             warnings.warn(f"watch is not called again: {error_line(error)}", stacklevel=3)
-
-    def seconds(run: Run) -> float:
-        return run.outcome.times.wall_s or math.inf
 
     executor = Local() if executor is None else executor
     if not isinstance(executor, Local | Dask):
@@ -228,72 +234,95 @@ def perform(
         progress.others = store.others() - progress.stale.total()
         progress.marks = store.marks()
         missing = _missing_jobs(plan, store, progress)
-        own = {job.cell.method.name: job for job in missing if not job.cell.method.is_ours}
-        repeats = [replace(job, numbers=job.numbers[:1]) for job in own.values()]
+        own_methods = {job.cell.method.name: job for job in missing if not job.cell.method.is_ours}
+        repeats = [replace(job, numbers=job.numbers[:1]) for job in own_methods.values()]
         progress.time_left = TimeLeft(executor.workers)
         progress.time_left.expect([*missing, *repeats])
         tell(None)
-        jobs, chosen = _divided(missing, executor.workers), dict[str, Run]()
+        jobs, quickest = _divided(missing, executor.workers), dict[str, Run]()
         while jobs:
-            alone: list[Job] = []
+            retried: list[Job] = []
             with closing(executor.perform(jobs)) as answers:  # ends workers after an error here
                 for job, outcomes in answers:
                     runs = score(job, outcomes)
-                    if len(runs) > 1:  # a failure may come from other runs of the job
-                        alone += [run.job for run in runs if run.outcome.status not in _SURE]
+                    if len(runs) > 1:  # other runs of the job may have caused a failure
+                        retried += [run.job for run in runs if run.outcome.status not in _SURE]
                         runs = [run for run in runs if run.outcome.status in _SURE]
                     store.write(runs)
                     for run in runs:
-                        if run.outcome.status == "ok" and not run.cell.method.is_ours:
-                            name = run.cell.method.name
-                            chosen[name] = min(chosen.get(name, run), run, key=seconds)
+                        _note_quickest(run, quickest)
                         progress.finish(run)
                         tell(run.cell)
-            jobs = alone
-        progress.time_left.expect([run.job for run in chosen.values()])
-        progress.repeats = len(chosen)
-        for run in list(chosen.values())[:1]:
-            tell(run.cell)
-        workers = min(executor.workers, Local().workers)
-        for again in perform_in_order([run.job for run in chosen.values()], workers):
-            name = again.cell.method.name
-            run = chosen[name]
-            if changes := compare_runs(run, again)[:1]:
-                details = run.outcome.details | {UNREPEATED: changes[0]}
-                store.write([replace(run, outcome=replace(run.outcome, details=details))])
-            progress.time_left.finish(again)
-            progress.repeats -= 1
-            tell(again.cell)
-        known, progress.marks = {*chain(*progress.marks.values())}, store.marks()
+            jobs = retried
+        _repeat_runs(quickest, store, progress, min(executor.workers, Local().workers), tell)
+        old_marks, progress.marks = {*chain(*progress.marks.values())}, store.marks()
         for mark in chain(*progress.marks.values()):
-            if mark not in known:
+            if mark not in old_marks:
                 warnings.warn(mark, stacklevel=2)
-        progress.wall_s = time.perf_counter() - clock
+        progress.wall_s = time.perf_counter() - started
         return progress
 
 
+def _note_quickest(run: Run, quickest: dict[str, Run]) -> None:
+    """Enter an ok run of a method from a file if it is the method's quickest run so far."""
+
+    def seconds(run: Run) -> float:
+        return run.outcome.times.wall_s or math.inf
+
+    if run.outcome.status == "ok" and not run.cell.method.is_ours:
+        name = run.cell.method.name
+        quickest[name] = min(quickest.get(name, run), run, key=seconds)
+
+
+def _repeat_runs(
+    quickest: dict[str, Run],
+    store: Store,
+    progress: Progress,
+    workers: int,
+    tell: Callable[[Cell | None], None],
+) -> None:
+    """Repeat a run of each method in another process; mark in the store the runs that differ."""
+    progress.time_left.expect([run.job for run in quickest.values()])
+    progress.repeats = len(quickest)
+    for run in list(quickest.values())[:1]:
+        tell(run.cell)
+    for repeated in perform_in_order([run.job for run in quickest.values()], workers):
+        run = quickest[repeated.cell.method.name]
+        if changes := compare_runs(run, repeated)[:1]:
+            details = run.outcome.details | {UNREPEATED: changes[0]}
+            store.write([replace(run, outcome=replace(run.outcome, details=details))])
+        progress.time_left.finish(repeated)
+        progress.repeats -= 1
+        tell(repeated.cell)
+
+
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the missing runs of the plan and, if the code of their method is here, runs that
-    crashed or timed out under a lower limit, a job for each cell; count the other runs in
-    ``progress``. Raises CoarticError if runs are missing whose method has no code here."""
-    there: set[tuple[int, int]] = set()
-    for position, number, status, had_s in store.present():
+    """Return the runs of a plan that are to be performed, as a job for each cell.
+
+    These are the runs that the store lacks. Runs that crashed, or timed out under a lower limit,
+    are performed again if the code of their method is here. All other runs are counted in
+    ``progress``. Raises CoarticError if the method of a missing run has no code here.
+    """
+    present: set[tuple[int, int]] = set()
+    for position, number, status, old_limit_s in store.present():
         job = plan[position]
         if number not in job.numbers:
             continue
-        longer = had_s is not None and (job.time_limit_s is None or job.time_limit_s > had_s)
-        failed = status == "crashed" or (status == "timeout" and longer)
+        has_longer_limit = old_limit_s is not None and (
+            job.time_limit_s is None or job.time_limit_s > old_limit_s
+        )
+        failed = status == "crashed" or (status == "timeout" and has_longer_limit)
         if not (job.cell.method.where and failed):
-            there.add((position, number))
+            present.add((position, number))
             progress.present += 1
             progress.count(status)
     missing = []
     for position, job in enumerate(plan):
-        numbers = tuple(number for number in job.numbers if (position, number) not in there)
+        numbers = tuple(number for number in job.numbers if (position, number) not in present)
         if numbers and not job.cell.method.where:
             raise CoarticError(
                 f"{store.folder} lacks runs of {job.cell.label} on {job.cell.task.name}, and the "
-                "code of this method is not here: plan them with its method file"
+                "code of this method is not available: pass its method file"
             )
         if numbers:
             missing.append(replace(job, numbers=numbers))
@@ -301,28 +330,31 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs for workers, and return the smaller jobs, each with some of the runs: first jobs
-    of methods without a number of trials, then the others, by trials, the most first."""
-    # A run among many takes a fraction of its time alone: jobs are as large as methods allow, in
-    # some seconds, and each worker has a part. Long jobs come first, so that none is alone at the
-    # end; one run of a planner, which has no number of trials, can take as long as thousands of
-    # trials: it is first.
+    """Divide jobs into smaller jobs for workers, in the order in which they should start.
+
+    - Runs that a method makes side by side take less time than the same runs one by one. So jobs
+      are as large as methods allow, but they take only some seconds, and each worker gets a share.
+    - Jobs with more trials start earlier, so that no long job runs alone at the end. Jobs of
+      methods without a number of trials, such as planners, start first, because one run can take as
+      long as thousands of trials.
+    """
 
     def divide(job: Job, size: int) -> Iterator[Job]:
-        for first in range(0, len(job.numbers), size):
-            yield replace(job, numbers=job.numbers[first : first + size])
+        for begin in range(0, len(job.numbers), size):
+            yield replace(job, numbers=job.numbers[begin : begin + size])
 
     share = max(math.ceil(size_of(jobs) / workers), _LEAST_BATCH)
     parts: list[Job] = []
     for job in jobs:
         method, parameters = job.cell.method, job.cell.parameters
-        most = method.configure(parameters).max_batch() if method.is_ours else 1
-        few = max(_MOST_TRIALS // (trials_in(parameters) or 1), _LEAST_BATCH)
-        parts += divide(job, min(most, share, few))
+        allowed = method.configure(parameters).max_batch() if method.is_ours else 1
+        quick = max(_MOST_TRIALS // (trials_in(parameters) or 1), _LEAST_BATCH)
+        parts += divide(job, min(allowed, share, quick))
     even = len(parts) - len(parts) % workers
-    ordered, last = parts[:even], parts[even:]
-    for job in last:
-        ordered += divide(job, max(math.ceil(len(job.numbers) * len(last) / workers), _LEAST_BATCH))
+    ordered, last_parts = parts[:even], parts[even:]
+    for job in last_parts:
+        size = max(math.ceil(len(job.numbers) * len(last_parts) / workers), _LEAST_BATCH)
+        ordered += divide(job, size)
 
     def trials(job: Job) -> float:
         return trials_in(job.cell.parameters) * len(job.numbers) or math.inf

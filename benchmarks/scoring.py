@@ -24,12 +24,25 @@ from coartic.tasks.task import Task, hands_of
 
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
-    """Return the scored runs of a job from their outcomes, in order. All ``parts`` of outcomes
-    (solution, initial, replay) are executed, except parts that are too long or break the task's
-    rules; only runs that are ok have scores."""
+    """Execute the movements of a job's outcomes, and return its scored runs.
+
+    Parts of an outcome (``solution``, ``initial``, ``replay``) that are too long or break the rules
+    of the task are not executed. Only runs with status ok have scores.
+
+    Parameters
+    ----------
+    job : Job
+    outcomes : sequence of Outcome
+        Outcome of each run of the job.
+
+    Returns
+    -------
+    list of Run
+    """
     task, method = job.cell.task, job.cell.method
     imports = {} if method.is_ours else {"imports": method.packages}
-    executions = iter(execute_all(task, [m for each in outcomes for m in each.parts.values()]))
+    solutions = [movements for outcome in outcomes for movements in outcome.parts.values()]
+    executions = iter(execute_all(task, solutions))
     runs = []
     for number, outcome in zip(job.numbers, outcomes, strict=True):
         parts = {part: next(executions) for part in outcome.parts}
@@ -42,7 +55,9 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
             parts={},
             environment=current_environment() | imports | (outcome.environment or {}),
         )
-        scores = {part: _score_of(task, part, each) for part, each in parts.items() if is_ok}
+        scores = {
+            part: _score_of(task, part, execution) for part, execution in parts.items() if is_ok
+        }
         runs.append(Run(replace(job, numbers=(number,)), final, scores, now()))
     return with_noise(runs)
 
@@ -72,8 +87,10 @@ def with_noise(runs: Sequence[Run]) -> list[Run]:
 
 
 def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
-    """Return the score of a part (``solution``, ``initial`` or ``replay``) that completed the task;
-    corrections and travel of the idle arm for a solution alone."""
+    """Return the score of a part of a run that completed the task.
+
+    Only the score of a solution has corrections and the travel of the idle arm.
+    """
     assert isinstance(execution, Execution)
     result = Score(execution.reward, execution.hands, execution.movements)
     if part != "solution":
@@ -83,9 +100,12 @@ def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
 
 
 def _final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
-    """Return status and reason of a run, from its first part that misses a goal (``infeasible``) or
-    cannot be executed (``solver-failed``); else ``solver-failed`` if an outcome that is ok has no
-    solution, else status and reason of the outcome."""
+    """Return status and reason of a run after the execution of its parts.
+
+    - ``solver-failed`` if a part cannot be executed, or if an outcome that is ok has no solution;
+    - ``infeasible`` if a part misses a goal;
+    - otherwise the status of the outcome.
+    """
     for execution in parts.values():
         if isinstance(execution, Exception):
             return "solver-failed", f"the solution cannot be executed: {execution}"

@@ -1,5 +1,4 @@
-"""Read suites: tasks, methods, parameters and numbers of runs, from files such as
-``benchmarks/suites/quick.toml``."""
+"""Read suite files: tasks, methods, parameters and numbers of runs."""
 
 from __future__ import annotations
 
@@ -28,20 +27,18 @@ SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
 _Plain = bool | int | float | str | tuple[float, ...]
 TaskNamed = Callable[[str], Task]
-"""A function that returns the task of a name or of a file."""
+"""Function that returns a task by its name or file."""
 
 
 def _plain_value(value: Any) -> _Plain:
-    """Return the value of a parameter: a bool, a text or a number that is finite as a float, as it
-    is; a list of such numbers or bools, not empty, as a tuple of floats. Raises PydanticCustomError
-    for any other value."""
+    """Validate the value of a parameter; return a list of numbers as a tuple of floats."""
     numbers = value if isinstance(value, list | tuple) else [value]
-    most = sys.float_info.max
-    if numbers and all(isinstance(each, int | float) and abs(each) <= most for each in numbers):
+    largest = sys.float_info.max
+    if numbers and all(isinstance(x, int | float) and abs(x) <= largest for x in numbers):
         return value if value is numbers[0] else tuple(map(float, numbers))
     if isinstance(value, str):
         return value
-    problem = "should be true, false, a finite number, a text or a list of finite numbers"
+    problem = "should be true, false, a finite number, a string or a list of finite numbers"
     raise PydanticCustomError("scalar", "{text}", {"text": problem})
 
 
@@ -55,7 +52,7 @@ _Number = Annotated[int, Field(ge=1, strict=True)]
 
 
 class Move(FileData):
-    """Displacements of one goal of a task, which make tasks of the task."""
+    """Displacements of a goal, each of which makes a new task."""
 
     goal: _Number
     """Number of the goal, from 1."""
@@ -68,41 +65,42 @@ class _Block(FileData):
 
     tasks: _Names
     """Names or files of tasks, or ranges of instances such as ``long/v1/i000..i039``; ``["*"]`` for
-    all shipped tasks and the user's."""
+    all shipped tasks and all tasks of the user."""
     methods: _Names
     """Ids of methods; ``["*"]`` for all methods that apply to the tasks."""
     move: Move | None = None
-    """Places of one goal; each place makes a task: table ``move``."""
+    """Table ``move``: displacements of a goal. The tasks with the moved goal replace the task."""
     free_base: Annotated[bool, Field(strict=True)] = False
-    """True to free the base in x and y on every task."""
+    """True to free the base in x and y on all tasks."""
     goals: tuple[_Number, ...] | None = None
-    """Numbers of goals that tasks of the block may have; by default any."""
+    """Allowed numbers of goals: tasks with other numbers are left out. By default all are
+    allowed."""
     runs: RunCount | None = None
     """Runs of each method on each task; by default the number of the suite."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
     """Parameters of the methods, by name."""
     grid: dict[str, Annotated[tuple[_Value, ...], _SOME]] = Field(default_factory=dict)
-    """Values of further parameters, in place of those in ``parameters``; every combination is
-    run."""
+    """Lists of values by name of a parameter. All combinations are run. They replace values of
+    ``parameters``."""
 
 
 class Suite(FileData):
-    """A suite, as its file states it."""
+    """Content of a suite file."""
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]
-    """Name of the suite; by default the name of the file without ``.toml``."""
+    """Name of the suite; by default the name of its file without ``.toml``."""
     title: Line
     """Title in lists and reports."""
     description: Line
     """Sentence in lists and reports."""
     runs: RunCount
-    """Runs of each stochastic method on each task; other methods are run once."""
+    """Runs of each stochastic method on each task. Other methods are run once."""
     trials: TrialCount | None = None
     """Trials of a run, for methods that have this parameter."""
     time_limit_s: Seconds | None = 600.0
-    """CPU time of a job, s: of one run, or of runs that are performed side by side."""
+    """Most CPU time of a job, s. A job is one run, or runs that are performed side by side."""
     blocks: Annotated[tuple[_Block, ...], _SOME]
-    """Blocks of tasks and methods: tables ``[[blocks]]``."""
+    """Tables ``[[blocks]]``: tasks and methods."""
 
 
 _TAKEN_BY = {
@@ -117,10 +115,27 @@ _TAKEN_BY = {
 
 
 def kind_of(name: str) -> str:
-    """Return the kind of the thing that is named: ``suite`` or ``shipped family`` for a shipped
-    name; ``method file`` for a name that ends in ``.py``; ``suite``, ``family`` or ``task`` for a
-    file ``.toml``, by its keys; ``results folder``, also for a folder that may not be opened; or an
-    empty text for anything else. Raises CoarticError for a ``.toml`` that cannot be read."""
+    """Return the kind of a thing that a user names.
+
+    Parameters
+    ----------
+    name : str
+        Name, file or folder.
+
+    Returns
+    -------
+    str
+        - ``suite`` or ``shipped family`` for the name of a shipped one;
+        - ``method file`` for a name that ends in ``.py``;
+        - ``suite``, ``family`` or ``task`` for a TOML file, by its keys;
+        - ``results folder`` for a folder with results, or a folder that cannot be opened;
+        - an empty string for anything else.
+
+    Raises
+    ------
+    CoarticError
+        A TOML file cannot be read.
+    """
     if name in suites():
         return "suite"
     if {name, f"{name}/v1"} & {*shipped_families()}:
@@ -136,8 +151,10 @@ def kind_of(name: str) -> str:
 
 
 def check_kind(name: str, *kinds: str) -> None:
-    """Check that the thing that is named has no kind (:func:`kind_of`), or one of these kinds, such
-    as ``suite``. Raises CoarticError, with the command that takes the thing, for another kind."""
+    """Raise CoarticError if a thing has a known kind (:func:`kind_of`) that is not in ``kinds``.
+
+    The message has the command that takes the thing.
+    """
     kind = kind_of(name)
     if kind and kind not in kinds:
         raise CoarticError(f"{name} is a {kind}: {_TAKEN_BY[kind].format(quote(name))}")
@@ -151,7 +168,7 @@ def suites() -> dict[str, Suite]:
 def load_suite(name: str) -> Suite:
     """Return a shipped suite by name, or read a suite file (``.toml``).
 
-    Raises CoarticError for an unknown name or an unusable file.
+    Raises CoarticError for an unknown name, or a file that is not a valid suite.
     """
     shipped = suites()
     if name not in shipped:
@@ -164,7 +181,7 @@ def load_suite(name: str) -> Suite:
 
 
 def _read_suite(path: Path) -> Suite:
-    """Return the suite of a file. Raises CoarticError for a file that is no suite."""
+    """Return the suite of a file. Raises CoarticError if the file is not a valid suite."""
     content = read_toml(path)
     try:
         return Suite.model_validate({"name": path.stem, **content})
@@ -176,12 +193,23 @@ def _read_suite(path: Path) -> Suite:
 def tasks_of(
     suite: Suite, block: _Block, own: Collection[str], task_named: TaskNamed
 ) -> Iterator[Task]:
-    """Yield the tasks of a block, in order: tasks with a number of goals that the block allows,
-    with a freed base or a moved goal where the block asks for it. ``own`` has the names of the
-    user's tasks, ``task_named`` returns a task by name. A block for all tasks (``*``) is for the
-    user's tasks as well."""
-    every = [*builtin_tasks(), *own]
-    names = (every if entry == WILDCARD else named_by(entry) for entry in block.tasks)
+    """Yield the tasks of a block, in order, with a freed base or a moved goal if it asks for them.
+
+    Parameters
+    ----------
+    suite : Suite
+    block : _Block
+    own : collection of str
+        Names of the user's tasks, which belong to a block for all tasks (``*``).
+    task_named : callable
+        Function that returns a task by its name.
+
+    Yields
+    ------
+    Task
+    """
+    all_tasks = [*builtin_tasks(), *own]
+    names = (all_tasks if entry == WILDCARD else named_by(entry) for entry in block.tasks)
     for name in dict.fromkeys(itertools.chain(*names)):
         task = task_named(name)
         if block.goals is None or len(task.goals) in block.goals:
@@ -189,9 +217,11 @@ def tasks_of(
 
 
 def _changed_tasks(task: Task, suite: Suite, block: _Block) -> list[Task]:
-    """Return the tasks that a block makes of a task: the task, with a free base if the block asks
-    for it, or in its place a task for each place of the moved goal. Raises CoarticError if the base
-    to be freed is free already, if there is no such goal, and for a place out of reach."""
+    """Return the tasks that a block makes of a task: with a free base, or with a moved goal.
+
+    Raises CoarticError if the base is free already, if the task does not have the goal, or if the
+    goal would be out of reach.
+    """
     source = f"suite {suite.name!r}"
 
     def changed(name: str, difference: str, **changes: Any) -> Task:
@@ -200,23 +230,31 @@ def _changed_tasks(task: Task, suite: Suite, block: _Block) -> list[Task]:
 
     if block.free_base:
         if not task.locked_base:
-            raise CoarticError(f"{source}: free_base: the base of task {task.name!r} is free")
-        why = {"status": "chosen", "source": f"not that of {task.name}, to see what its lock does"}
+            raise CoarticError(
+                f"{source}: free_base has no effect on task {task.name!r}, whose base is free"
+            )
+        provenance = {
+            "status": "chosen",
+            "source": f"not that of {task.name}, to see what its lock does",
+        }
         task = changed(
             "free-base",
             "a base that moves in both directions",
             title=f"{task.title}, base free",
             locked_base=[],
-            provenance=task.provenance | {"locked_base": why},
+            provenance=task.provenance | {"locked_base": provenance},
         )
     if block.move is None:
         return [task]
     number = block.move.goal
     if number > len(task.goals):
-        raise CoarticError(f"{source}: task {task.name!r} has no goal {number} to move")
+        raise CoarticError(
+            f"{source}: move asks for goal {number}, and task {task.name!r} has "
+            f"{len(task.goals)} goals"
+        )
     moved = []
     for x, y in block.move.by:
-        # In six digits, or in all digits if six would name another number.
+        # Six digits are enough for the name, unless they are those of another number.
         dx, dy = (f"{d:g}" if float(f"{d:g}") == d else repr(d) for d in (x, y))
         goals = [list(goal) for goal in task.goals]
         goals[number - 1] = [goals[number - 1][0] + x, goals[number - 1][1] + y]

@@ -1,4 +1,4 @@
-"""NAME: say in a line what it does. Check it: coartic check NAME --method-file FILE."""
+"""NAME: write here what your method does. Check it with: coartic check NAME --method-file FILE."""
 
 import numpy as np
 
@@ -6,27 +6,33 @@ from coartic import Objective, Optimiser
 
 
 class Mine(Optimiser):
-    """Random steps from the best point: what you start from, and already ahead of the paper's
-    learner on its tasks (a gap of 6.0 [5.9, 6.1] %, and 7.9 %)."""
+    """Random steps from the best point, as a start for your own method.
 
-    name = "NAME"  # its id in commands and tables
-    title = "Random steps from the best point"  # in lists and citations
-    citation = "I. Rechenberg (1973). Evolutionsstrategie."  # what others cite
+    On the paper's tasks its gap is 6.0 [5.9, 6.1] %, smaller than that of the paper's learner, 7.9
+    %.
+    """
+
+    name = "NAME"  # id in commands and tables
+    title = "Random steps from the best point"  # title in lists and citations
+    citation = "I. Rechenberg (1973). Evolutionsstrategie."  # work that others should cite
     tuned_on = "nothing"  # tasks on which you chose its constants, here the step of 0.03
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
-        """Minimise the cost of a trial until ``objective`` raises BudgetError because no trial is
-        left: do not catch it. The best point counts."""
-        # Draw from rng alone. A point has the joints of all goals; units: length, rad.
+        """Minimise the cost of a trial.
+
+        When no trial is left, ``objective`` raises BudgetError. Do not catch it: the best point so
+        far is the solution.
+        """
+        # Use only rng for random numbers. A point has the joints of all goals, length unit and rad.
         x = objective.x0  # the postures of the corrective process
         best = objective(x)  # ticks
         while True:
             points = x + 0.03 * rng.standard_normal((10, objective.dim))
-            costs = objective.many(points)  # side by side, as fast as one
+            costs = objective.many(points)  # faster than one by one
             if costs.min() < best:
                 x, best = points[costs.argmin()], costs.min()
 
 
-# It uses the corrective process and the reward of its trials. A method that needs more, such as
-# the goals or a Jacobian, declares this information and has a `solve`: see "Make a method of your
-# own" in the docs.
+# This method uses the corrective process and the rewards of its trials. A method that uses more
+# information, such as the goals or a Jacobian, declares the information and has a function `solve`:
+# see "Make a method of your own" in the documentation.

@@ -1,4 +1,4 @@
-"""Estimate how long the missing runs of a plan take, from runs that were made before."""
+"""Estimate how long the missing runs of a plan will take, from the times of other runs."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ from coartic.runs.record import Run
 from coartic.runs.shipped import open_shipped
 
 _Kind = tuple[str, str, int]
-"""Method, task and number of trials (0 without): runs that are alike in these take equally long."""
+"""Method, task and number of trials (0 without trials). Runs of a kind take about equally long."""
 _EARLY = 0.1
-"""Share of the work before which there is no estimate: processes only begin."""
+"""Share of the work before which there is no estimate, because processes are starting."""
 
 
 class TimeLeft:
-    """An estimate of the time until all expected runs are made; threads may ask for it.
+    """Estimate of the time until all expected runs are made. It can be used in threads.
 
-    A run is expected to take as long as the shipped runs of its method on its task (on another
-    task: of its method), times how much longer runs take here. For other methods, the mean time of
-    their runs here counts. ``workers`` runs are made at once, or more if the times of runs add up
-    to more than that.
+    The estimate assumes that
+
+    - a run of a shipped method takes as long as the shipped runs of the method on this task, or on
+      all tasks if this one is not shipped, times a factor of this machine;
+    - a run of another method takes as long as the mean of its runs here;
+    - ``workers`` runs are made at once, or more if the times of finished runs add up to more.
     """
 
     def __init__(self, workers: int = 1) -> None:
@@ -57,8 +59,11 @@ class TimeLeft:
 
     @property
     def seconds(self) -> float:
-        """Time left, s; NaN until a tenth of the work is done, and while a method waits of which no
-        run is known. If no run ends for long, the time left grows again."""
+        """Time left, s.
+
+        It is NaN until a tenth of the work is done, and while there are runs of a method whose time
+        is unknown. If no run finishes for a long time, it grows again.
+        """
         with self._lock:
             factors, done_s = self._factors(), sum(self._took_s.values())
             run_s = {
@@ -73,19 +78,21 @@ class TimeLeft:
             return 0.0
         if not done_s >= _EARLY * (done_s + left_s):  # True for NaN
             return math.nan
-        half_done_s = min((at_once - 1) * self._job_s, left_s) / 2  # by the other workers
+        half_done_s = min((at_once - 1) * self._job_s, left_s) / 2  # the other workers are halfway
         expected_s = max((left_s - half_done_s) / at_once, *run_s.values())
         return max(expected_s - since_s, since_s / 4)
 
     def _factors(self) -> dict[str, float]:
-        """Return, by method, how many times as long as :func:`_shipped_s` its runs take here: one
-        factor for all shipped methods, which is of the machine, and one for each other method."""
-        took_s, due_s = defaultdict[str, float](float), defaultdict[str, float](float)
+        """Return, by method, the time of its runs here as a multiple of :func:`_shipped_s`.
+
+        All shipped methods have the same factor, that of the machine.
+        """
+        took_s, shipped_s = defaultdict[str, float](float), defaultdict[str, float](float)
         for kind, count in self._made.items():
             group = "" if kind[0] in _shipped_means() else kind[0]
-            due_s[group] += _shipped_s(kind) * count
+            shipped_s[group] += _shipped_s(kind) * count
             took_s[group] += self._took_s[kind]
-        factors = {group: took_s[group] / due for group, due in due_s.items()}
+        factors = {group: took_s[group] / time_s for group, time_s in shipped_s.items()}
         machine = factors.pop("", math.nan)
         return dict.fromkeys(_shipped_means(), machine) | factors
 
@@ -96,8 +103,10 @@ def _kind_of(cell: Cell) -> _Kind:
 
 
 def _shipped_s(kind: _Kind) -> float:
-    """Return the mean time of a shipped run of this kind, s, for its number of trials; 1 in place
-    of the time if its method is not shipped."""
+    """Return the mean time of a shipped run of this kind, s, for its number of trials.
+
+    If the method is not shipped, the time of a run with the default number of trials counts as 1 s.
+    """
     method, task, trials = kind
     by_task = _shipped_means().get(method, {})
     mean = by_task.get(task) or sum(by_task.values()) / (len(by_task) or 1) or 1.0

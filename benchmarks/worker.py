@@ -1,7 +1,7 @@
-"""Let a method solve a task in a worker process, and state the outcome as plain data.
+"""Let a method solve a task in a worker process, and return the outcome as plain data.
 
-A method can run any code: the parent process, which imports no method file, checks the form of
-what the method states, and executes and scores the solution.
+A method can run any code. The parent process does not import method files: it checks the form of
+the outcome, and executes and scores the solution.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 _OUTCOMES = TypeAdapter(list[Outcome])
 _LONGEST_DETAILS = 10_000_000
 _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError, RecursionError
-"""Errors of malformed data."""
+"""Errors that malformed data raises."""
 
 
 def process_peak_mb() -> float:
@@ -55,20 +55,26 @@ def fail(
     wall_s: float | None = None,
     cpu_s: float | None = None,
 ) -> list[Outcome]:
-    """Return an outcome for each run of a job whose worker gave no usable answer. ``wall_s`` and
-    ``cpu_s``, times of the job, s, are shared evenly by its runs."""
+    """Return an outcome for each run of a job whose worker did not give a usable answer.
+
+    The runs share the times of the job, ``wall_s`` and ``cpu_s``, equally.
+    """
     runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
     return [Outcome(status, reason, times=times) for _ in job.numbers]
 
 
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
-    """Return outcomes as JSON (with NaN and infinity as Python writes them), a list of objects with
-    the fields of :class:`Outcome`. Raises TypeError, ValueError or RecursionError for data that
-    JSON cannot hold."""
+    """Return outcomes as JSON, a list of objects with the fields of :class:`Outcome`.
+
+    NaN and infinity are written as Python writes them. Raises TypeError, ValueError or
+    RecursionError for data that JSON cannot represent.
+    """
 
     def plain(outcome: Outcome) -> dict[str, Any]:
-        parts = {part: [*map(movement_data, made)] for part, made in outcome.parts.items()}
+        parts = {
+            part: [*map(movement_data, movements)] for part, movements in outcome.parts.items()
+        }
         meter, times = outcome.meter and vars(outcome.meter), vars(outcome.times)
         return vars(outcome) | {"meter": meter, "times": times, "parts": parts}
 
@@ -76,31 +82,35 @@ def answer_of(outcomes: Sequence[Outcome]) -> bytes:
 
 
 def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
-    """Return the outcomes of a job from its answer, the JSON of :func:`answer_of`; an outcome
-    ``crashed`` for each run if the answer is malformed."""
+    """Return the outcomes of a job from its answer, the JSON of :func:`answer_of`.
+
+    If the answer is malformed, each run has an outcome ``crashed``.
+    """
     try:
         content = json.loads(answer)
-        for each in content:
-            parts = each["parts"].items()
-            each["parts"] = {part: [*map(movement_from, made)] for part, made in parts}
+        for outcome in content:
+            parts = outcome["parts"].items()
+            outcome["parts"] = {part: [*map(movement_from, movements)] for part, movements in parts}
         outcomes = _OUTCOMES.validate_python(content)
         if len(outcomes) == len(job.numbers):
             return outcomes
-        why = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
+        reason = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
     except _MALFORMED as error:
-        why = error_line(error)
-    return fail(job, "crashed", f"its outcomes cannot be read: {why}")
+        reason = error_line(error)
+    return fail(job, "crashed", f"its outcomes cannot be read: {reason}")
 
 
 def perform_job(job: Job) -> list[Outcome]:
-    """Perform the runs of a job in this process, and return an outcome for each in their order. An
-    error of the method is an outcome, and not raised."""
+    """Perform the runs of a job in this process, and return the outcome of each run, in order.
+
+    An error of the method becomes an outcome, and is not raised.
+    """
     cell, name = job.cell, job.cell.method.name
     sessions = [
         Session(
             cell.task,
             job.run_seed(number),
-            # as declared: a method could change its class
+            # the declared information, because a method could change its class
             map(Information, cell.method.information),
             trial_budget=cell.trial_budget,
             trusted=cell.method.is_ours,
@@ -112,7 +122,7 @@ def perform_job(job: Job) -> list[Outcome]:
     _log.debug("%s on %s: seed %s, %s trials", name, cell.task.name, job.seed, budget)
     warm = name in _seen
     _seen.add(name)
-    wall, cpu, made = time.perf_counter(), time.process_time(), trials_outside()
+    wall, cpu, outside_trials = time.perf_counter(), time.process_time(), trials_outside()
     try:
         method = cell.method.configure(cell.parameters)
         results: Sequence[Any]
@@ -122,10 +132,12 @@ def perform_job(job: Job) -> list[Outcome]:
             results = [method.solve(sessions[0])]
         else:
             results = method.solve_together(sessions)
-        made = trials_outside() - made
-        if made and not cell.method.is_ours:
-            text = f"the method made {counted(made, 'trial')} outside its session, not counted"
-            raise UndeclaredError(f"{text}: by coartic.objective, learn, execute or an environment")
+        outside_trials = trials_outside() - outside_trials
+        if outside_trials and not cell.method.is_ours:
+            raise UndeclaredError(
+                f"the method made {counted(outside_trials, 'trial')} outside its session, which "
+                "are not counted: by coartic.objective, learn, execute or an environment"
+            )
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
@@ -140,8 +152,10 @@ _seen: set[str] = set()
 
 
 def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:
-    """Return the outcome of a run from what its method returned, or the error that the method
-    raised; ``session`` has counted its trials and rewards."""
+    """Return the outcome of a run from the result of its method, or from the error it raised.
+
+    ``session`` has counted the trials and rewards of the run.
+    """
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
         "meter": session.meter,
@@ -165,8 +179,10 @@ def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times)
 
 
 def _place_of(error: BaseException, method: MethodInfo) -> str:
-    """Return the last line of its method file that an error passed, as ``mine.py, line 12: ``;
-    empty if it passed none, and for a built-in method."""
+    """Return the last line of the method file in a traceback, as ``mine.py, line 12: ``.
+
+    It is empty if the traceback has no line of the file, and for built-in methods.
+    """
     if method.is_ours:
         return ""
     module = sys.modules.get(method.where)
@@ -177,11 +193,18 @@ def _place_of(error: BaseException, method: MethodInfo) -> str:
 
 
 def statement(result: Any, session: Session) -> dict[str, Any]:
-    """Return ``parts`` and ``details`` of an :class:`Outcome`, by name, from a method's result.
-    Raises SolutionError for a result that cannot be kept, and UndeclaredError for a solution with a
-    corrective movement without a target if the corrective process is not declared."""
+    """Return the fields ``parts`` and ``details`` of an outcome from the result of a method.
+
+    Raises
+    ------
+    SolutionError
+        The result is not a Result, or cannot be stored.
+    UndeclaredError
+        The solution has a corrective movement without a target, and the method does not declare the
+        corrective process.
+    """
     if not isinstance(result, Result):
-        raise SolutionError(f"the method returned {type(result).__name__}, not a Result")
+        raise SolutionError(f"the method returned {type(result).__name__}; it must return a Result")
     try:
         parts = {
             part: [movement_from(movement_data(movement)) for movement in getattr(result, part)]
@@ -191,14 +214,19 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
         session.check_solution(parts["solution"])
         details = _plain_details(result.details)
     except _MALFORMED as error:
-        raise SolutionError(f"the method's result cannot be kept: {error_line(error)}") from None
+        raise SolutionError(f"the method's result cannot be stored: {error_line(error)}") from None
     return {"parts": parts, "details": details}
 
 
 def _plain_details(details: Any) -> dict[str, Any]:
-    """Return a copy of the details of a result as plain data. Raises TypeError, ValueError or
-    RecursionError for details that JSON cannot hold, and for more than 10,000,000 characters."""
+    """Return a copy of the details of a result as plain data.
+
+    Raises TypeError, ValueError or RecursionError for details that JSON cannot represent, or with
+    more than 10,000,000 characters.
+    """
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
     if len(text) > _LONGEST_DETAILS:
-        raise ValueError(f"details of {len(text)} characters; at most {_LONGEST_DETAILS} are kept")
+        raise ValueError(
+            f"details have {len(text):,} characters; at most {_LONGEST_DETAILS:,} are allowed"
+        )
     return dict(json.loads(text.encode()))

@@ -1,9 +1,10 @@
-"""Tasks and families as environments of Gymnasium: a step reaches for a goal and costs its ticks.
+"""Tasks and families as environments of Gymnasium. A step reaches for a goal and costs its ticks.
 
-Importing this module registers the ids :data:`IDS`, such as ``coartic/Ascending-v2``, and
-``coartic/Task-v2`` for any other task or a family. ``gymnasium.make`` makes one environment,
-``gymnasium.make_vec`` several, and :func:`sb3` several for Stable-Baselines3. :func:`score`
-compares policies with planners. The module needs the extra ``coartic[gym]``.
+Importing this module registers the ids :data:`IDS`, such as ``coartic/Ascending-v2``.
+``coartic/Task-v2`` is for any other task or a family. ``gymnasium.make`` makes an environment,
+``gymnasium.make_vec`` makes a vector environment, and :func:`sb3` makes environments for
+Stable-Baselines3. :func:`score` compares policies with planners. The module needs the extra
+``coartic[gym]``.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ except ImportError:
     raise MissingExtraError("coartic.gym needs Gymnasium: pip install 'coartic[gym]'") from None
 
 REACH = 0.5
-"""Half the width of the box of targets, length unit (base) and rad (angles)."""
+"""Half width of the box of targets, length unit (base) and rad (angles)."""
 IDS: dict[str, dict[str, Any]] = {
     "coartic/Ascending-v2": {"task": "ascending"},
     "coartic/Descending-v2": {"task": "descending"},
@@ -62,56 +63,63 @@ _NEUTRAL = (
 
 
 class TaskEnv(gymnasium.Env):
-    """Environment in which one robot makes one trial after another.
+    """Environment in which a robot makes trials, one after another.
 
-    An episode is a trial, of at most as many steps as there are goals. The reward of a step is
-    minus its ticks, or -1,000,000 if the corrective process fails, which ends the trial. No trial
-    is truncated. Only the draw of an instance of a family is random.
+    An episode is a trial. A step reaches for the next goal, so a trial has at most as many steps as
+    there are goals. The reward of a step is the negative number of its ticks. If the corrective
+    process fails, the reward is -1,000,000 and the trial ends. Trials are never truncated. Nothing
+    is random except the draw of an instance of a family.
 
     Parameters
     ----------
     task : Task, str or Path
-        The task; or a family, ``"two-armed/v1"`` or the path of its file: each trial has an
-        instance of the family.
+        A task, or a family: its name, such as ``"two-armed/v1"``, or the path of its file. Each
+        trial of a family has an instance of it.
     split : {"development", "test", "fresh"}, optional
-        Instances of the family: to train on (``"development"``, the default), to report on
-        (``"test"``), or of a ``year`` (``"fresh"``).
+        Instances of the family: ``"development"`` to train on (the default), ``"test"`` to report
+        on, or ``"fresh"`` for those of a ``year``.
     count : int, optional
-        How many instances of the split, from its first; by default 1,000 of the development split,
-        10 of the test and fresh splits.
+        Number of instances of the split, from the first. The default is 1,000 for the development
+        split, and 10 for the others.
     year : int, optional
         Year of fresh instances, such as 2027.
     ahead : int
-        Number of goals in view beyond the next goal.
+        Number of goals in view after the next goal.
     model : MotionModel
         Constants of movement.
     render_mode : {"rgb_array"}, optional
-        With it :meth:`render` returns a picture.
+        Set it to make :meth:`render` return pictures.
 
     Raises
     ------
     ValueError, TypeError, TaskError
-        An option is wrong, or there is no such task or family.
+        An option is wrong, or the task or family is unknown.
 
     Notes
     -----
-    Joints are the coordinates of the base (length unit) and the angles of the arms (rad) that can
-    move, the arms in the order of the task's ``hands``. Each arm counts with the most links that an
-    arm of the task or family can have.
+    Joints are the base coordinates (length unit) and the angles of the arms (rad) that can move.
+    The arms are in the order of the task's ``hands``. In a family each arm has the largest number
+    of links that an arm of the family can have.
 
     An observation, float32 of shape ``(O,)``, has
 
     - for the next goal and each goal ahead, 1 if the goal exists, else 0;
-    - x and y of each of these goals from the base, length unit, 0 without a goal;
-    - the joints;
-    - in a family whose robots differ in links, for each joint 1 if the robot can move it, else 0.
+    - x and y of each of these goals relative to the base, length unit; 0 if the goal does not
+      exist;
+    - the values of the joints;
+    - in a family whose robots have different numbers of links, for each joint 1 if the robot can
+      move it, else 0.
 
-    An action, of shape ``(A,)``, has an entry for the hand, if the task has two, and an entry for
-    each joint. Entries are clipped to -1 to 1. For each hand the corrective process finds a posture
-    at the goal. An entry for the hand up to 0.5 chooses the hand whose posture is nearer in joint
-    space, an entry above 0.5 the other hand. The target of the movement is the posture of this
-    hand, or the present posture if the process fails, plus :data:`REACH` times the entries of the
-    joints. Entries of joints that a robot cannot move have no effect.
+    An action of shape ``(A,)`` has an entry for the hand, if the task has two hands, and an entry
+    for each joint. Entries are clipped to the range from -1 to 1.
+
+    - The corrective process finds a posture at the goal for each hand. An entry for the hand up to
+      0.5 chooses the hand whose posture is nearer in joint space. An entry above 0.5 chooses the
+      other hand.
+    - The target of the movement is the posture of the chosen hand, plus :data:`REACH` times the
+      entries of the joints. If the process fails, the present posture takes the place of that
+      posture.
+    - Entries of joints that a robot cannot move have no effect.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
@@ -131,19 +139,21 @@ class TaskEnv(gymnasium.Env):
         instances = {"split": split, "count": count, "year": year}
         self.options = {"task": task, "ahead": ahead, "model": check_model(model)} | instances
         self.model, self.render_mode = model, render_mode
-        self.tasks: list[Task | str]  # or names of instances
+        self.tasks: list[Task | str]  # tasks, or names of instances
         if _is_family(task):
             family = load_family(str(task))
             self.tasks = [*instance_names(str(task), split or "development", count, year)]
             locked = set.intersection(*({*LOCKED[base]} for base in family.base))
             (fewest, links), hands = family.links, family.hands
-        elif any(each is not None for each in instances.values()):
-            raise ValueError(f"split, count and year are for families, not {brief_value(task)}")
+        elif any(option is not None for option in instances.values()):
+            raise ValueError(
+                f"split, count and year are options of families, not of task {brief_value(task)}"
+            )
         else:
-            self.tasks = [only := as_task(task)]
-            locked, hands = {*only.locked_base}, only.hands
-            fewest = links = only.robot.max_links
-        self.names = [getattr(each, "name", each) for each in self.tasks]
+            self.tasks = [single := as_task(task)]
+            locked, hands = {*single.locked_base}, single.hands
+            fewest = links = single.robot.max_links
+        self.names = [getattr(task, "name", task) for task in self.tasks]
         self._joints = [f"base_{axis}" for axis in "xy" if axis not in locked]
         self._joints += [f"{hand}_{k + 1}" for hand in hands for k in range(links)]
         self._view, joints, self._has_flags = ahead + 1, len(self._joints), fewest < links
@@ -153,7 +163,8 @@ class TaskEnv(gymnasium.Env):
         self.action_space = Box(-1.0, 1.0, (len(hands) - 1 + joints,), np.float32)
         self.number, self.going = -1, False
         self.outcome = np.nan
-        """Total reward of the last trial that ended, ticks; NaN if it failed or took 1,000,000."""
+        """Total reward of the last trial that ended, ticks; NaN if it failed or took 1,000,000
+        ticks or more."""
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -163,8 +174,8 @@ class TaskEnv(gymnasium.Env):
         Parameters
         ----------
         seed : int, optional
-            Seed of the generator that draws instances. With None the generator goes on; at first
-            the system seeds it.
+            Seed of the generator that draws instances. By default the generator is not seeded
+            again.
         options : dict, optional
             ``{"task": k}`` begins a trial of instance k of a family, from 0. By default the
             instance is drawn.
@@ -172,21 +183,21 @@ class TaskEnv(gymnasium.Env):
         Returns
         -------
         ndarray, shape (O,)
-            The first observation.
+            First observation.
         dict
             ``task``, the name of the task, and ``is_success``, True if the trial has hit all goals.
 
         Raises
         ------
         ValueError
-            There is no such option or instance.
+            The option or the instance does not exist.
         """
         super().reset(seed=seed)
         drawn, options = self.np_random.integers(len(self.tasks)), {**(options or {})}
         number = options.pop("task", drawn)
         check_limits("options['task']", number, 0, len(self.tasks) - 1)
         if options:
-            raise ValueError(f"reset has no options {brief_value(options)}; it has 'task'")
+            raise ValueError(f"options {brief_value(options)} are unknown; reset has only 'task'")
         if number != self.number:
             self._load(int(number))
         self.q, self.goal, self.going, self._total = self.task.q0.copy(), 0, True, 0.0
@@ -201,29 +212,30 @@ class TaskEnv(gymnasium.Env):
         Parameters
         ----------
         action : array_like, shape (A,)
+            Entries for hand and joints, from -1 to 1.
 
         Returns
         -------
         ndarray, shape (O,)
-            The observation.
+            Observation.
         float
-            The reward, minus the ticks.
+            Reward: the negative number of ticks.
         bool
             True if the trial has ended.
         bool
-            False: no trial is truncated.
+            False, because trials are not truncated.
         dict
-            As :meth:`reset` returns it.
+            Entries as in :meth:`reset`.
 
         Raises
         ------
         ResetNeeded
-            The trial has ended, or none was begun.
+            The trial has ended, or no trial was begun.
         ValueError
-            The action has another shape or is not finite.
+            The action has another shape, or is not finite.
         """
         if not self.going:
-            raise ResetNeeded("no trial goes on: call reset first")
+            raise ResetNeeded("the trial has ended, or none was begun: call reset first")
         array, shape = real_array("action", action), self.action_space.shape
         entries = array.tolist()
         if array.shape != shape or not all(map(math.isfinite, entries)):
@@ -231,30 +243,38 @@ class TaskEnv(gymnasium.Env):
                 f"action is {brief_value(action)}; it must be finite, of shape {shape}"
             )
         count_trials(int(self.goal == 0))
-        now, dof = self.q, len(self.q)
-        ends = [each["corrected"][:dof] if each["corrections"] else None for each in self._found]
-        away = [math.inf if end is None else _square(end - now) for end in ends]
-        hand = int(len(away) > 1 and (away[1] < away[0]) != (entries[0] > 0.5))
-        target = (now if (end := ends[hand]) is None else end).tolist()
+        q, dof = self.q, len(self.q)
+        postures = [
+            account["corrected"][:dof] if account["corrections"] else None
+            for account in self._found
+        ]
+        distances = [math.inf if posture is None else _square(posture - q) for posture in postures]
+        hand = int(len(distances) > 1 and (distances[1] < distances[0]) != (entries[0] > 0.5))
+        target = (q if (posture := postures[hand]) is None else posture).tolist()
         for joint, entry in self._moves:
             target[joint] += REACH * min(max(entries[entry], -1.0), 1.0)
         targets = self._no_targets[:, : len(self._goals) - self.goal].copy()
         targets[0, 0, 0] = target
-        made, *after = self._reach(hand, targets)
-        self.q, hit = made["q"][:dof].copy(), made["hit"].item()
+        account, *next_account = self._reach(hand, targets)
+        self.q, hit = account["q"][:dof].copy(), account["hit"].item()
         self.goal += hit
         self.going = hit and self.goal < len(self._goals)
         if self.going:
-            self._found = after + self._reached_by(range(1, len(self._sides)))
-        reward = -float(made["ticks"].item() if hit else FAILED)
+            self._found = next_account + self._reached_by(range(1, len(self._sides)))
+        reward = -float(account["ticks"].item() if hit else FAILED)
         self._total += reward
         if not self.going:
             self.outcome = self._total if self._total > -FAILED else np.nan
         return self._seen(), reward, not self.going, False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture of the robot and its goals, RGB, ``(400, 600, 3)``, in which goals hit
-        so far are filled; None if the environment was made without ``render_mode``."""
+        """Draw the robot and its goals. Goals that were hit are filled.
+
+        Returns
+        -------
+        ndarray, shape (400, 600, 3), or None
+            RGB picture; None if the environment was made without ``render_mode``.
+        """
         if self.render_mode is None:
             return None
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -276,16 +296,16 @@ class TaskEnv(gymnasium.Env):
         self.tasks[number] = task = as_task(self.tasks[number])
         check_model(self.model, radius=task.radius)
         self.task, self.number, self._goals = task, number, task.goal_array
-        place = {name: k for k, name in enumerate(task.robot.joint_names)}
+        indices = {name: k for k, name in enumerate(task.robot.joint_names)}
         locked = [f"base_{axis}" for axis in task.locked_base]
-        self._places = [place.get(name, -1) for name in self._joints]
+        self._indices = [indices.get(name, -1) for name in self._joints]
         self._moves = [
-            (place[name], entry)
+            (indices[name], entry)
             for entry, name in enumerate(self._joints, len(task.hands) - 1)
-            if name in place and name not in locked
+            if name in indices and name not in locked
         ]
         moved = {joint for joint, _ in self._moves}
-        self._flags = [float(each in moved) for each in self._places] if self._has_flags else []
+        self._flags = [float(index in moved) for index in self._indices] if self._has_flags else []
         sides = [HANDS.index(hand) for hand in task.hands]
         self._sides = [np.array([[side, sides[0]]]) for side in sides]
         self._no_targets = np.full((1, 2, 1, task.robot.dof), np.nan)
@@ -296,35 +316,40 @@ class TaskEnv(gymnasium.Env):
         self._found_at_start = self._reached_by(range(len(sides)))
 
     def _reach(self, hand: int, targets: Array) -> NDArray[np.void]:
-        """Return the accounts of an arm that reaches, from where the robot stands, for the next
-        goal with hand ``hand`` of the task, and, as each call costs, for the goal after it with the
-        task's first hand. ``targets`` has shape ``(1, goals, 1, dof)``; where it is NaN the
-        corrective process acts alone."""
+        """Reach for the next goal with a hand, and for the goal after it with the first hand.
+
+        Return the accounts of both movements. They are made in one call, because each call is slow.
+        ``hand`` is the number of a hand of the task. ``targets`` has shape ``(1, goals, 1, dof)``;
+        without targets (NaN) only the corrective process moves the arm.
+        """
         goals = self._goals[None, self.goal : self.goal + targets.shape[1]]
         arms = Requests(self.q[None], self._sides[hand], targets, ALL_STOP, goals)
         return reach(self.task.robot, arms, self._parameters).goals[0, :, 0]
 
     def _reached_by(self, hands: range) -> list[Any]:
-        """List the accounts of hands that reach for the next goal by the corrective process."""
+        """Return the accounts of hands that reach for the next goal by the corrective process."""
         return [self._reach(hand, self._no_targets[:, :1])[0] for hand in hands]
 
     def _seen(self) -> NDArray[np.float32]:
-        q, near = self.q.tolist(), self._goals[self.goal :][: self._view].tolist()
-        beyond = self._view - len(near)
-        places = [each - base for goal in near for each, base in zip(goal, q, strict=False)]
-        joints = [q[k] if k >= 0 else 0.0 for k in self._places]
-        exist = [1.0] * len(near) + [0.0] * beyond
-        return np.array(exist + places + [0.0, 0.0] * beyond + joints + self._flags, np.float32)
+        q, goals = self.q.tolist(), self._goals[self.goal :][: self._view].tolist()
+        missing = self._view - len(goals)
+        positions = [
+            coordinate - base for goal in goals for coordinate, base in zip(goal, q, strict=False)
+        ]
+        joints = [q[k] if k >= 0 else 0.0 for k in self._indices]
+        exist = [1.0] * len(goals) + [0.0] * missing
+        return np.array(exist + positions + [0.0, 0.0] * missing + joints + self._flags, np.float32)
 
     def _info(self) -> dict[str, Any]:
         return {"task": self.names[self.number], "is_success": self.goal == len(self._goals)}
 
 
 class SharesOfTicks(gymnasium.RewardWrapper):
-    """Wrapper that divides rewards by the ticks of the corrective process alone.
+    """Wrapper that divides rewards by the ticks of the corrective process.
 
-    The divisor is the ticks, at least 1, that the process takes for the whole trial with the task's
-    initial hands, or 1,000,000 if it cannot complete the task. No step loses more than 2.
+    The divisor is the number of ticks that the process takes for the whole task with the initial
+    hands, at least 1. If the process cannot complete the task, it is 1,000,000. The result is at
+    least -2.
     """
 
     def __init__(self, env: gymnasium.Env) -> None:
@@ -335,18 +360,18 @@ class SharesOfTicks(gymnasium.RewardWrapper):
         """Return a reward in ticks as a share of the divisor."""
         env: Any = self.unwrapped
         if env.number not in self._ticks:
-            alone = initial_reward(env.task, env.model)
-            self._ticks[env.number] = float(FAILED if alone is None else max(-alone, 1))
+            corrective = initial_reward(env.task, env.model)
+            self._ticks[env.number] = float(FAILED if corrective is None else max(-corrective, 1))
         return max(float(reward) / self._ticks[env.number], -2.0)
 
 
 def sb3(env: str, num_envs: int = 64, **options: Any) -> Any:
-    """Make environments for Stable-Baselines3 by its ``make_vec_env``, with scaled rewards.
+    """Make environments for Stable-Baselines3, with scaled rewards.
 
     Parameters
     ----------
     env : str
-        An id, such as ``"coartic/TwoArmed1-v2"``.
+        Id, such as ``"coartic/TwoArmed1-v2"``.
     num_envs : int
         Number of robots.
     **options
@@ -355,8 +380,8 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> Any:
     Returns
     -------
     DummyVecEnv
-        The environments. Rewards are shares of ticks (:class:`SharesOfTicks`); ``episode`` in the
-        infos has the reward of a trial in ticks.
+        Environments, made by Stable-Baselines3's ``make_vec_env``. Rewards are shares of ticks
+        (:class:`SharesOfTicks`). Entry ``episode`` of the infos has the reward of a trial in ticks.
 
     Raises
     ------
@@ -384,21 +409,24 @@ def score(
     Parameters
     ----------
     env : str, Env, VectorEnv or VecEnv
-        An id, or an environment of this module. Of a family the instances of the test split are
-        scored, or of the ``split`` among the options. An environment in wrappers that change what
-        policies see or do is used as it is, with its own instances, and trials still count in
-        ticks. Wrappers that normalise do not learn meanwhile.
+        Id, or environment of this module. For a family the instances of the test split are scored,
+        unless the options have another ``split``. An environment in wrappers that change
+        observations or actions is used with its wrappers and its own instances. Its trials still
+        count in ticks, and wrappers that normalise do not learn from them.
     policy : callable, agent, Method or mapping, optional
-        Gives actions ``(N, A)`` for observations ``(N, O)``: a function, or an agent with the
-        ``predict`` of Stable-Baselines3, which is asked without noise. Or a method of the
-        benchmark, such as a planner, that solves each task. A mapping has several, by name.
+        One of
+
+        - a function that returns actions ``(N, A)`` for observations ``(N, O)``;
+        - an agent with the ``predict`` of Stable-Baselines3, whose actions are deterministic;
+        - a method of the benchmark, such as a planner, that solves each task;
+        - a mapping of any of these by name.
     episodes : int
-        Trials of random actions on each task.
+        Number of trials of random actions on each task.
     seed : int
         Seed of random actions, of methods and of an environment in wrappers.
     vec_normalize : str, Path or VecNormalize, optional
-        Normalises what policies see: the ``VecNormalize`` of an agent's training, or the file that
-        its ``save`` wrote (a pickle: open only files that you trust). The default is the
+        Normalisation of observations: the ``VecNormalize`` of an agent's training, or the file that
+        its ``save`` has written (a pickle: open only files that you trust). The default is the
         ``VecNormalize`` of ``env``, if that is its only wrapper, else that of the agent's own
         environment.
     **options
@@ -407,35 +435,35 @@ def score(
     Returns
     -------
     DataFrame
-        A row for each policy, for uniformly random actions, for the corrective process alone with
-        the task's initial hands, and for the best solution known. Columns:
+        A row for each policy, for uniformly random actions, for the corrective process with the
+        task's initial hands, and for the best known solution. Columns:
 
         - ``reward``: mean over tasks, ticks;
-        - ``gap``: distance to the best known reward as a share of it, mean over the tasks for which
-          it is known;
+        - ``gap``: difference from the best known reward as a share of it, mean over the tasks whose
+          best reward is known;
         - ``gap_low``, ``gap_high``: 95 % interval of the gap (BCa bootstrap) over tasks, or over
           the trials of a single task;
         - ``completed``: share of trials that hit all goals in less than 1,000,000 ticks.
 
-        Reward and gap of a policy that failed in a trial are NaN, as is what is not known.
+        Reward and gap are NaN for a policy that failed in a trial, and if they are unknown.
         ``attrs["units"]`` has the units.
 
     Raises
     ------
     TypeError
-        The environment is not of this module; an agent has other spaces than the environment, or
+        The environment is not of this module. Or an agent has other spaces than the environment, or
         was trained in wrappers that this environment does not have.
     ValueError
-        An option is wrong; a policy has the name of another row; observations would be normalised
-        twice.
+        An option is wrong, a policy has the name of another row, or observations would be
+        normalised twice.
     OSError
         The file of ``vec_normalize`` cannot be read.
 
     Warns
     -----
     UserWarning
-        An agent has no environment, as after loading, and nothing normalises what it sees: it is
-        not known whether it was trained in ``VecNormalize``.
+        An agent was loaded without an environment, and its observations are not normalised. It may
+        have been trained in ``VecNormalize``.
 
     Examples
     --------
@@ -451,53 +479,57 @@ def score(
             f"env is {brief_value(env)}; it must be an id, or an environment or vector environment "
             "of coartic in this process"
         )
-    normalisers = [each for each in wrappers if _normalises(each)]
+    normalisers = [wrapper for wrapper in wrappers if _normalises(wrapper)]
     if vec_normalize is None and wrappers == normalisers:
         vec_normalize = next(iter(normalisers), None)
     if wrappers == normalisers:
         wrappers = []
     if wrappers and options:
-        raise ValueError(f"{', '.join(options)}: env has wrappers, so make it with this option")
+        raise ValueError(
+            f"{', '.join(options)} cannot be set here, because env has wrappers: make env with it"
+        )
     if vec_normalize is not None and wrappers and normalisers:
-        raise ValueError("env normalises already, in a VecNormalize: leave vec_normalize out")
-    given = inner.options | options
-    if _is_family(given["task"]) and not wrappers:
-        given = inner.options | {"split": "test", "count": None, "year": None} | options
-    setting = type(inner)(**given)
+        raise ValueError("env has a VecNormalize already: leave vec_normalize out")
+    env_options = inner.options | options
+    if _is_family(env_options["task"]) and not wrappers:
+        env_options = inner.options | {"split": "test", "count": None, "year": None} | options
+    setting = type(inner)(**env_options)
     setting.tasks[:] = tasks = [*map(as_task, setting.tasks)]
     policies = policy if isinstance(policy, Mapping) else {"policy": policy}
-    if taken := {"random actions", "corrective process", "best known"} & {*policies}:
+    if reserved := {"random actions", "corrective process", "best known"} & {*policies}:
         raise ValueError(
-            f"policy has the name {min(taken)!r} of another row of the table: rename it"
+            f"policy {min(reserved)!r} has the name of another row of the table: rename it"
         )
     if isinstance(vec_normalize, str | Path):
         vec_normalize = pickle.loads(Path(vec_normalize).read_bytes())
     rewards: dict[str, Any] = {}
-    for name, each in policies.items():
-        if isinstance(each, Method):
-            rewards[name] = [[_reward_of(each, task, seed, setting.model)] for task in tasks]
-        elif each is not None and wrappers:
-            act = _actions_of(each, env, wrappers, vec_normalize)
+    for name, agent in policies.items():
+        if isinstance(agent, Method):
+            rewards[name] = [[_reward_of(agent, task, seed, setting.model)] for task in tasks]
+        elif agent is not None and wrappers:
+            act = _actions_of(agent, env, wrappers, vec_normalize)
             rewards[name] = [[_wrapped_trial(act, env, n, seed)] for n in range(len(tasks))]
-        elif each is not None:
-            act = _actions_of(each, setting, [], vec_normalize)
+        elif agent is not None:
+            act = _actions_of(agent, setting, [], vec_normalize)
             rewards[name] = _trials(act, setting)
     rng, shape = np.random.default_rng(seed), setting.action_space.shape
     rewards["random actions"] = _trials(
         lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), setting, episodes
     )
     rewards["corrective process"] = [[initial_reward(task, setting.model)] for task in tasks]
-    known = [best_shipped(task) if setting.model == PAPER else None for task in tasks]
-    rewards["best known"] = [[None if each is None else each.reward] for each in known]
-    return _table({name: np.array(each, np.float64) for name, each in rewards.items()})
+    optima = [best_shipped(task) if setting.model == PAPER else None for task in tasks]
+    rewards["best known"] = [[None if optimum is None else optimum.reward] for optimum in optima]
+    return _table({name: np.array(values, np.float64) for name, values in rewards.items()})
 
 
 def _square(difference: Array) -> float:
-    """Return the sum of squares of a vector, added one after the other: NumPy's sums round
-    differently, and mirrored postures have to be exactly as near."""
+    """Return the sum of squares of a vector, added one by one.
+
+    Sums of NumPy would round differently, and mirrored postures must have equal distances.
+    """
     square = 0.0
-    for each in difference.tolist():
-        square += each * each
+    for value in difference.tolist():
+        square += value * value
     return square
 
 
@@ -506,23 +538,26 @@ def _is_family(task: Any) -> bool:
 
 
 def _layers(env: Any) -> list[Any]:
-    """List an environment's layers, from the outermost wrapper to the environment inside; of
-    several environments side by side those of the first. Raises TypeError if they differ."""
-    found = [env]
+    """List the layers of an environment, from the outermost wrapper to the environment inside.
+
+    For a vector environment they are those of its first environment. Raises TypeError if its
+    environments have different options.
+    """
+    layers = [env]
     while (name := next((n for n in ("venv", "env", "envs") if hasattr(env, n)), None)) is not None:
         env = getattr(env, name)
         if name == "envs":
-            inner = [_layers(each)[-1] for each in env]
-            options = [getattr(each, "options", None) for each in inner]
-            if any(each != options[0] for each in options):
+            inner = [_layers(member)[-1] for member in env]
+            options = [getattr(member, "options", None) for member in inner]
+            if any(member_options != options[0] for member_options in options):
                 raise TypeError("env has environments with different options: score each of them")
             env = env[0]
-        found.append(env)
-    return found
+        layers.append(env)
+    return layers
 
 
 def _wrappers_of(env: Any) -> list[Any]:
-    return [each for each in _layers(env)[:-1] if type(each).__name__ not in _NEUTRAL]
+    return [layer for layer in _layers(env)[:-1] if type(layer).__name__ not in _NEUTRAL]
 
 
 def _normalises(env: Any) -> bool:
@@ -532,10 +567,24 @@ def _normalises(env: Any) -> bool:
 def _actions_of(
     policy: Any, env: Any, wrappers: list[Any], normal: Any
 ) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """Return a function that gives a policy's actions, ``(N, A)``, for observations ``(N, O)`` of
-    ``env``, which has these wrappers. ``normal`` is a ``VecNormalize``; if it is None and no
-    wrapper normalises, the agent's own is used. Raises TypeError for an agent that was trained with
-    other spaces or wrappers."""
+    """Return a function from observations ``(N, O)`` to the actions ``(N, A)`` of a policy.
+
+    Parameters
+    ----------
+    policy : callable or agent
+    env : object
+        Environment in which the policy acts.
+    wrappers : list
+        Wrappers of ``env`` that change observations or actions.
+    normal : VecNormalize or None
+        Normalisation of observations. If it is None and no wrapper normalises, the agent's own is
+        used.
+
+    Raises
+    ------
+    TypeError
+        The agent was trained with other spaces or wrappers.
+    """
     normalised = any(map(_normalises, wrappers))
     if normal is None and not normalised:
         normal = getattr(policy, "get_vec_normalize_env", lambda: None)()
@@ -543,49 +592,56 @@ def _actions_of(
     if not hasattr(policy, "predict"):
         return lambda seen: policy(see(seen))
     for name in ("observation_space", "action_space"):
-        there = getattr(env, f"single_{name}", None) or getattr(env, name)
-        if (theirs := getattr(policy, name, there)) != there:
+        env_space = getattr(env, f"single_{name}", None) or getattr(env, name)
+        if (agent_space := getattr(policy, name, env_space)) != env_space:
             raise TypeError(
-                f"the agent's {name} is {brief_value(theirs)}, and the environment's is "
-                f"{brief_value(there)}: score the agent in the environment of its training, in its "
-                "wrappers"
+                f"the agent's {name} is {brief_value(agent_space)}, and the environment's is "
+                f"{brief_value(env_space)}: score the agent in the environment of its training, "
+                "with its wrappers"
             )
-    own = getattr(policy, "get_env", lambda: env)()
-    if own is None and not (normal or normalised):
+    agent_env = getattr(policy, "get_env", lambda: env)()
+    if agent_env is None and not (normal or normalised):
         warnings.warn(
-            "the agent has no environment, as after loading: if it was trained in VecNormalize, "
-            "give score vec_normalize=FILE, which VecNormalize.save writes; if not, load it with "
-            "env=coartic.gym.sb3(ID)",
+            "the agent was loaded without an environment. If it was trained in VecNormalize, call "
+            "score with vec_normalize=FILE, the file that VecNormalize.save wrote; otherwise load "
+            "the agent with env=coartic.gym.sb3(ID)",
             stacklevel=3,
         )
-    for wrapper in [] if wrappers or own is None else _wrappers_of(own):
+    for wrapper in [] if wrappers or agent_env is None else _wrappers_of(agent_env):
         if not _normalises(wrapper):
             raise TypeError(
-                f"the agent's environment is wrapped in {type(wrapper).__name__}: score the agent "
-                "in an environment with this wrapper"
+                f"the agent's environment has the wrapper {type(wrapper).__name__}: score the "
+                "agent in an environment with this wrapper"
             )
     return lambda seen: policy.predict(see(seen), deterministic=True)[0]
 
 
 def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int = 1) -> Array:
-    """Let ``act``, which gives actions ``(n, A)`` for observations ``(n, O)``, make trials side by
-    side on each task of ``setting``. Return the total rewards, ticks, shape ``(tasks, trials)``;
-    NaN where a trial failed."""
+    """Make trials side by side on each task of an environment.
+
+    ``act`` returns actions ``(n, A)`` for observations ``(n, O)``. The result has the total
+    rewards, ticks, shape ``(tasks, trials)``; NaN for a trial that failed.
+    """
     robots = [copy(setting) for _ in range(trials * len(setting.tasks))]
-    seen = [each.reset(options={"task": n // trials})[0] for n, each in enumerate(robots)]
-    while going := [n for n, each in enumerate(robots) if each.going]:
+    seen = [robot.reset(options={"task": n // trials})[0] for n, robot in enumerate(robots)]
+    while going := [n for n, robot in enumerate(robots) if robot.going]:
         actions = np.asarray(act(np.array([seen[n] for n in going])))
         if len(actions) != len(going):
-            raise ValueError(f"actions have shape {actions.shape}, not a row for each observation")
+            raise ValueError(
+                f"actions have shape {actions.shape}; they must have a row for each of "
+                f"{len(going)} observations"
+            )
         for n, action in zip(going, actions, strict=True):
             seen[n] = robots[n].step(action)[0]
-    return np.reshape([each.outcome for each in robots], (-1, trials))
+    return np.reshape([robot.outcome for robot in robots], (-1, trials))
 
 
 def _wrapped_trial(act: Callable[[Any], ArrayLike], env: Any, number: int, seed: int) -> float:
-    """Let ``act`` make a trial on task ``number``, from 0, in an environment in wrappers, of
-    several side by side in the first. Return the total reward, ticks; NaN where the trial failed or
-    was cut short."""
+    """Make a trial on a task in an environment with wrappers, and return its total reward, ticks.
+
+    In a vector environment the first environment makes the trial. The result is NaN if the trial
+    failed or was truncated. ``number`` is that of the task, from 0.
+    """
     inner, is_one = _layers(env)[-1], isinstance(env, gymnasium.Env)
     options: dict[str, Any] = {"task": number}
     with _not_learning(env):
@@ -596,7 +652,9 @@ def _wrapped_trial(act: Callable[[Any], ArrayLike], env: Any, number: int, seed:
         else:
             seen, _ = env.reset(seed=seed, options=options)
         if inner.number != number:
-            raise TypeError("a wrapper of env does not pass on the options of reset")
+            raise TypeError(
+                "a wrapper of env does not pass the options of reset to the environment"
+            )
         inner.outcome, ended = np.nan, False
         while not ended:
             actions = np.asarray(act(np.asarray(seen)[None] if is_one else seen))
@@ -607,26 +665,24 @@ def _wrapped_trial(act: Callable[[Any], ArrayLike], env: Any, number: int, seed:
 
 @contextmanager
 def _not_learning(env: Any) -> Iterator[None]:
-    """Keep the means by which wrappers normalise, in the block of this context: set ``training``
-    and ``update_running_mean`` of an environment and its wrappers to False."""
+    """Prevent wrappers from updating the means with which they normalise, in a ``with`` block."""
     learning = [
-        (each, name, getattr(each, name))
-        for each in _layers(env)
+        (layer, name, getattr(layer, name))
+        for layer in _layers(env)
         for name in ("training", "update_running_mean")
-        if name in {*vars(each), *vars(type(each))}
+        if name in {*vars(layer), *vars(type(layer))}
     ]
     try:
-        for each, name, _ in learning:
-            setattr(each, name, False)
+        for layer, name, _ in learning:
+            setattr(layer, name, False)
         yield
     finally:
-        for each, name, value in learning:
-            setattr(each, name, value)
+        for layer, name, value in learning:
+            setattr(layer, name, value)
 
 
 def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
-    """Return the reward of the solution that a method finds for a task; None if the method does not
-    apply or finds no solution, or a goal is missed even after correction."""
+    """Return the reward of a method's solution of a task; None if it finds no valid solution."""
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)
         return execute(task, result.solution, model=model).reward
@@ -634,8 +690,11 @@ def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> flo
 
 
 def _table(rewards: Mapping[str, Array]) -> pd.DataFrame:
-    """Return the table of :func:`score` from rewards, ticks, shape ``(tasks, trials)``, by row, the
-    last of which is the best known; NaN where a trial failed or nothing is known."""
+    """Return the table of :func:`score` from the rewards of its rows.
+
+    The rewards have shape ``(tasks, trials)``, in ticks; NaN for a failed trial or an unknown
+    reward. The last row is the best known one.
+    """
     (*_, best), rows = rewards.values(), {}
     known = np.isfinite(best[:, 0])
     for name, earned in rewards.items():
@@ -654,6 +713,6 @@ def _table(rewards: Mapping[str, Array]) -> pd.DataFrame:
     return table
 
 
-for _name, _given in IDS.items():
-    if _name not in gymnasium.registry:
-        gymnasium.register(_name, entry_point="coartic.gym:TaskEnv", kwargs=_given)
+for _id, _options in IDS.items():
+    if _id not in gymnasium.registry:
+        gymnasium.register(_id, entry_point="coartic.gym:TaskEnv", kwargs=_options)

@@ -63,7 +63,7 @@ def test_a_method_of_a_file_runs_on_workers_that_are_processes(distributed, tmp_
         runs = run_and_write(tmp_path / "out", [cell], executor=dask).runs
         assert runs.status.tolist() == ["ok", "ok"]
         (tmp_path / "mine.py").write_text(f"{OWN}# changed")
-        with pytest.raises(CoarticError, match="mine.py, or a file that it loads, is not as it w"):
+        with pytest.raises(CoarticError, match="mine.py, or a file that it loads, has changed"):
             run_and_write(tmp_path / "other", [cell], executor=dask)
 
 
@@ -73,7 +73,7 @@ def test_nobody_at_an_address(tmp_path):
 
     with dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}):
         for address in ("tcp://127.0.0.1:1", "nonsense://x"):
-            with pytest.raises(CoarticError, match=f"no Dask scheduler at {address}.*8786"):
+            with pytest.raises(CoarticError, match=f"scheduler {address} does not answer.*8786"):
                 perform(planned(CELLS), tmp_path, executor=Dask(address))
 
 
@@ -90,7 +90,7 @@ def test_a_scheduler_that_is_lost(distributed, tmp_path, monkeypatch):
                 client._timeout = 0.1  # s; it would wait for half a minute that it comes back
                 cluster.close()
 
-        with pytest.raises(CoarticError, match=r"lost Dask scheduler.*repeat the command"):
+        with pytest.raises(CoarticError, match=r"is lost.*repeat the command"):
             perform(planned(CELLS), tmp_path / "out", executor=executor, watch=watch)
     again = run_and_write(tmp_path / "out", CELLS)
     assert (again.runs.status == "ok").all()

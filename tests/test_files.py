@@ -34,17 +34,17 @@ def test_a_folder_holds_what_was_published_last(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="nobody writes into /proc")
 def test_a_folder_that_cannot_be_is_refused_before_the_work():
-    with pytest.raises(CoarticError, match="cannot write /proc/x: "):
+    with pytest.raises(CoarticError, match="/proc/x cannot be written: "):
         make_folder(Path("/proc/x"))
 
 
 def test_what_is_not_ours_is_in_the_way_before_anything_is_written(tmp_path):
     (tmp_path / "b.txt").write_text("mine")
     for what in (publish, make_folder):
-        with pytest.raises(CoarticError, match=r"b.txt, which coartic did not write.*another"):
+        with pytest.raises(CoarticError, match=r"b.txt, which was not written by coartic.*another"):
             what(tmp_path, {"a.txt": b"1", "b.txt": b"2"})
     assert content(tmp_path) == {"b.txt": b"mine"}
-    with pytest.raises(CoarticError, match="b.txt: File exists"):
+    with pytest.raises(CoarticError, match="b.txt cannot be written: File exists"):
         publish(tmp_path / "b.txt", {"a.txt": b"1"})
 
 
@@ -65,7 +65,7 @@ def test_what_fails_leaves_the_old_file(tmp_path, monkeypatch):
         patch.setattr(os, "replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left")))
         with pytest.raises(OSError, match="No space"):
             write_atomically(path, b"new")
-        with pytest.raises(CoarticError, match=r"cannot write .*No space left"):
+        with pytest.raises(CoarticError, match=r"cannot be written.*No space left"):
             write_output(path, b"new", replace=True)
     assert content(tmp_path) == {"a.txt": b"old"}
 
@@ -73,12 +73,12 @@ def test_what_fails_leaves_the_old_file(tmp_path, monkeypatch):
 def test_single_files_are_replaced_only_where_that_is_asked_for(tmp_path):
     path = tmp_path / "b.txt"
     write_output(path, b"1", replace=False)
-    with pytest.raises(CoarticError, match="b.txt is there already; add --replace"):
+    with pytest.raises(CoarticError, match="b.txt exists: add --replace"):
         write_output(path, b"2", replace=False)
     assert content(tmp_path) == {"b.txt": b"1"}
     write_output(path, b"2", replace=True)
     assert content(tmp_path) == {"b.txt": b"2"}
-    with pytest.raises(CoarticError, match="there is no folder"):
+    with pytest.raises(CoarticError, match="the folder .* does not exist"):
         write_output(tmp_path / "none" / "a.txt", b"3", replace=True)
-    with pytest.raises(CoarticError, match="cannot write"):
+    with pytest.raises(CoarticError, match="cannot be written"):
         write_output(tmp_path, b"3", replace=True)

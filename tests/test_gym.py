@@ -261,9 +261,9 @@ def test_an_agent_is_scored_as_it_was_trained(tmp_path):
     loaded = sb3.PPO.load(tmp_path / "agent", device="cpu")
     for given in (norm, str(tmp_path / "norm")):
         assert score(TWO, loaded, episodes=1, vec_normalize=given).reward["policy"] == due
-    with pytest.warns(UserWarning, match="give score vec_normalize=FILE"):
+    with pytest.warns(UserWarning, match="vec_normalize=FILE"):
         assert score(TWO, loaded, episodes=1).reward["policy"] == rewards["as seen"]
-    with pytest.raises(ValueError, match="normalises already"):
+    with pytest.raises(ValueError, match="has a VecNormalize already"):
         score(vec_env.VecFrameStack(norm, 2), agent, vec_normalize=norm)
     assert (norm.training, norm.obs_rms.count) == (True, count)
 

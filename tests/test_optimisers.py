@@ -99,7 +99,7 @@ def with_width(half_width):
         (COST.many, np.where(np.arange(18) == 7, np.nan, np.zeros((2, 18))),
          "point 0: some entries of goal 2 are NaN"),
         (COST, np.where(GOALS == 1, np.inf, COST.x0), "infinite"),
-        *((call, wrong, "it should have no masked entries")
+        *((call, wrong, "it should not have masked entries")
           for call, wrong in ((COST, MASKED), (COST.evaluations_to, MASKED))),
         *((COST.evaluations_to, wrong, r"targets (are|is) .*(a cost, the ticks|real numbers)")
           for wrong in ([500, -1.0], FAILED + 1)),

@@ -92,7 +92,7 @@ def test_a_changed_library_makes_runs_again(coartic, tmp_path, library):
     library.write_text("STEP = 0.5\n", encoding="utf-8")
     code, text, error = coartic(*command, "--runs", 3)
     assert (code, "reused" in text) == (0, False), text
-    assert "Not used: 2 runs of mine from before a change of its code" in error
+    assert "Not used: 2 runs of mine, made before" in error
     after = load(tmp_path / "out").runs
     assert len(after) == 3
     assert before.reward.tolist() != after.reward.tolist()[:2]

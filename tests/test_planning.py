@@ -70,9 +70,7 @@ def test_a_second_value_of_an_option_of_run_changes_what_is_performed(
         answer = told(**{name: words})
         assert answer != usual, name
         assert isinstance(answer, str) == (name == "family_file"), answer
-    assert "strips.v1.toml has no effect: no instance of" in told(
-        family_file=OPTIONS["family_file"]
-    )
+    assert "strips.v1.toml has no effect: " in told(family_file=OPTIONS["family_file"])
     both = {name: OPTIONS[name] for name in ("jobs", "scheduler")}
     assert "--jobs has no effect with --scheduler" in told(**both)
 
@@ -112,13 +110,13 @@ def test_the_command_outranks_a_grid_and_a_block(tmp_path):
     [
         (
             {"methods": ["corrective-alone/given"], "trials": 5},
-            "trials has no effect: no parameter",
+            "trials has no effect",
         ),
-        ({"methods": ["corrective-alone/given"], "runs": 2}, "runs has no effect: no run of"),
+        ({"methods": ["corrective-alone/given"], "runs": 2}, "runs has no effect"),
         ({"methods": ["EC1", "EC4"]}, "EC4 uses the left and right hand"),
         (
             {"methods": ["EC4"], "tasks": ["ascending", "two-armed-1"]},
-            "no method to run on task 'ascending': EC4 uses the left",
+            "no method runs on task 'ascending': EC4 uses the left",
         ),
         ({"runs": range(3, 3)}, r"runs is range\(3, 3\); it must be .*, or a range, such as"),
         ({"runs": range(0, 9, 2)}, r"runs is range\(0, 9, 2\); it must be"),

@@ -56,12 +56,12 @@ HANDLED = {
                        "            os.kill(os.getpid(), signal.SIGKILL)\n"
                        "        return Result(corrected(session))", "ok", ""),
     "allocates": ("kept = [np.empty(10**8) for _ in range(10**6)]", "crashed", "MemoryError"),
-    "nothing": ("return None", "solver-failed", "returned NoneType, not a Result"),
+    "nothing": ("return None", "solver-failed", "returned NoneType"),
     "nan": ("return Result((Movement(1, 'right', 'planned', session.q0 * np.nan),) * 3)",
             "solver-failed", "finite"),
     "many": ("return Result(corrected(session) * 4000)", "solver-failed", "movements; at most"),
     "details": ("return Result(corrected(session), {'call': print})",
-                "solver-failed", "cannot be kept: TypeError"),
+                "solver-failed", "cannot be stored: TypeError"),
     "honest": ("return Result(corrected(session))", "ok", ""),
     "prints": ("print('x' * 10**6); os.write(2, b'\\x1b[31m' * 10**5)\n"
                "        return Result(corrected(session))", "ok", ""),
@@ -178,7 +178,7 @@ def test_the_last_words_of_a_run_are_kept(tmp_path):
     cells = cells_of(tmp_path, says=says, quits="os._exit(7)", prints=PRINTS)
     runs = run_and_write(tmp_path / "out", cells, executor=Local(1), runs=1).runs
     assert runs.status.tolist() == ["ok", "crashed", "crashed"]
-    assert runs.reason[1].endswith("exit code 7): it left no message")
+    assert runs.reason[1].endswith("exit code 7): it printed no error")
     assert runs.reason[2].endswith("exit code 3): one | two | the end")
 
 
@@ -186,9 +186,11 @@ def test_a_working_folder_that_is_gone(tmp_path, monkeypatch):
     (tmp_path / "gone").mkdir()
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
-    with pytest.raises(CoarticError, match="mine.py: no process for it begins .*No such file"):
+    with pytest.raises(CoarticError, match="mine.py: a process .* cannot start .*No such file"):
         entries(tmp_path, honest="pass")
-    with pytest.raises(CoarticError, match="cannot begin .*No such file.* Finished runs are kept"):
+    with pytest.raises(
+        CoarticError, match="cannot start .*No such file.* Finished runs are stored"
+    ):
         list(Local(1).perform(PLAN))
     monkeypatch.chdir(tmp_path)
 
@@ -209,7 +211,7 @@ def test_a_file_that_is_changed_after_the_plan_ends_the_suite(tmp_path):
     cells = cells_of(tmp_path, honest="return Result(corrected(session))")
     with (tmp_path / "mine.py").open("a") as file:
         file.write("# another version\n")
-    with pytest.raises(CoarticError, match="mine.py, or a file that it loads, is not as it was"):
+    with pytest.raises(CoarticError, match="mine.py, or a file that it loads, has changed"):
         perform(planned(cells), tmp_path / "out", executor=Local(1))
 
 

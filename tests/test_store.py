@@ -196,12 +196,12 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
 
 def test_one_writes_and_nobody_else_meanwhile(undisturbed):
     with writing(undisturbed.folder):
-        with pytest.raises(CoarticError, match=r"another `coartic run` is at work.*wait"):
+        with pytest.raises(CoarticError, match=r"another `coartic run` uses.*wait"):
             perform_here(undisturbed.folder)
         same_results(load(undisturbed.folder), undisturbed)  # readers do no harm
 
 
-@pytest.mark.filterwarnings("always:another program has .* open. waiting")
+@pytest.mark.filterwarnings("always:another program uses .* waiting")
 @pytest.mark.parametrize("begin", ["BEGIN", "BEGIN EXCLUSIVE"])
 def test_a_run_waits_for_a_reader_and_the_reader_reads(written, tmp_path, begin, monkeypatch):
     """Where its program keeps the file, in the middle of a transaction, until the run says that it
@@ -289,8 +289,8 @@ def of_5_0_0(path):
     ("spoil", "words"),
     [
         (sql(f"PRAGMA user_version = {FORMAT + 1}"), "later version.*update coartic"),
-        (of_5_0_0, "was written by coartic 5.0.0, .*`coartic run` with another --out makes"),
-        (foreign, "is not a file of coartic"),
+        (of_5_0_0, "was written by coartic 5.0.0, .*`coartic run` command with another --out"),
+        (foreign, "was not written by coartic"),
         (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
     ],
 )

@@ -33,7 +33,7 @@ def test_suite_ablations_frees_the_base(tmp_path):
     assert free.provenance["locked_base"].status == "chosen"
     same = {"goals", "start", "hands", "radius", "initial_hands"}
     assert free.model_dump(include=same) == rail.model_dump(include=same)
-    with pytest.raises(CoarticError, match="the base of task 'ascending' is free"):
+    with pytest.raises(CoarticError, match="free_base has no effect on task 'ascending'"):
         suite_of(tmp_path, ASCENDING + "free_base = true")
 
 
@@ -64,7 +64,7 @@ def test_cells_are_distinguished_by_their_parameters(tmp_path):
 
 
 def test_a_cell_has_one_number_of_runs(tmp_path):
-    with pytest.raises(CoarticError, match="ascending x dual-process/EC1: .* 3 runs .* then for 7"):
+    with pytest.raises(CoarticError, match="EC1 on ascending: .* 3 runs,.* for 7"):
         suite_of(tmp_path, ASCENDING, ASCENDING + "runs = 7")
     (job,) = plan_suite(tmp_path / "own.toml", runs=2)
     assert job.numbers == range(2)
@@ -94,7 +94,7 @@ def test_own_task_runs_under_every_applicable_condition(tmp_path):
     for name, by in (("ascending", "a shipped"), ("two-armed/v1/i003", "a shipped"),
                      ("arm", "another")):  # fmt: skip
         impostor = tasks[1].model_copy(update={"name": name})
-        with pytest.raises(CoarticError, match=f"{name}' is already taken by {by} task: give"):
+        with pytest.raises(CoarticError, match=f"{name}' belongs to {by} task"):
             paper_cells(tasks=[impostor, str(other)])
 
 

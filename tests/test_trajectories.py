@@ -41,7 +41,7 @@ def test_a_film_and_a_picture(tmp_path):
         show(row)
         assert figure.axes[0].get_title("right") == words
     mine.plot().savefig(tmp_path / "mine.png")
-    with pytest.raises(ValueError, match="goal is 0; it must be a whole number from 1 to 2"):
+    with pytest.raises(ValueError, match="goal is 0; it must be an integer from 1 to 2"):
         mine.subtask(0)
     for name, words in (("mine.gif", "there already"), ("mine.txt", "must end in .gif or .mp4")):
         with pytest.raises(CoarticError, match=words):

@@ -1,7 +1,7 @@
 """The command line ``coartic``.
 
-Each command is a function of :mod:`~coartic.cli.run` or :mod:`~coartic.cli.read`. A command imports
-most packages only when it is called, so that help and completion are fast.
+Each command is a function in :mod:`~coartic.cli.run` or :mod:`~coartic.cli.read`. Commands import
+most packages only when they are called, so that help and completion are fast.
 """
 
 from __future__ import annotations
@@ -65,10 +65,16 @@ for command, example in COMMANDS:
 
 
 def main() -> None:
-    """Run the command line, and exit: with code 2 after a CoarticError or wrong usage, with code 1
-    after an error of the system, or if the command found something wrong."""
+    """Run the command line, and exit.
+
+    The exit code is
+
+    - 0 after success;
+    - 1 if the command found something wrong, or after an error of the system;
+    - 2 after a CoarticError or wrong usage.
+    """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:  # closed: one of our files would get its number
+        if getattr(sys, name) is None:  # closed; otherwise a file would get its number
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
             os.set_inheritable(getattr(sys, name).fileno(), True)
     for stream in (sys.stdout, sys.stderr):
@@ -78,7 +84,7 @@ def main() -> None:
     logging.getLogger("coartic").setLevel(logging.INFO)
     logging.getLogger("coartic").addHandler(logging.StreamHandler())
     os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown
-    if os.path.lexists("matplotlibrc"):  # it can name programs to run: do not trust it
+    if os.path.lexists("matplotlibrc"):  # this file can name programs to run: do not read it
         with contextlib.chdir(os.path.dirname(__file__)):
             import matplotlib  # noqa: F401
     if sys.argv[1:2] == ["help"]:
@@ -88,9 +94,9 @@ def main() -> None:
     except CoarticError as error:
         complain("Error", str(error))
         sys.exit(2)
-    except BrokenPipeError:  # the reader, such as head, has ended: typer ends quietly
+    except BrokenPipeError:  # the reader, such as head, has ended: typer exits without a message
         raise
     except OSError as error:
-        place = f": {plain(str(error.filename), LONGEST_LINE)}" if error.filename else ""
-        complain("Error", f"{error.strerror or error}{place}")
+        file = f": {plain(str(error.filename), LONGEST_LINE)}" if error.filename else ""
+        complain("Error", f"{error.strerror or error}{file}")
         sys.exit(1)

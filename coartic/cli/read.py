@@ -1,5 +1,4 @@
-"""Commands that read and draw: reports, checks and citations of stored runs; pictures, films, and
-the page to play with."""
+"""Commands that read stored runs (reports, checks, citations) and that draw."""
 
 from __future__ import annotations
 
@@ -30,18 +29,18 @@ if TYPE_CHECKING:
 def report(
     folder: given.ResultsFolder,
     out: Annotated[
-        Path | None, given.file_or_folder("FOLDER", "Folder to write; FOLDER/report if not given.")
+        Path | None, given.file_or_folder("FOLDER", "Folder to write; by default FOLDER/report.")
     ] = None,
     for_paper: Annotated[
         bool, typer.Option("--for-paper", help="Also figures as SVG and PDF, and tables as LaTeX.")
     ] = False,
     width: Annotated[
         float | None,
-        given.within("--width", "Width of these figures, inches: 3.4 for one column.", 2.5, 20),
+        given.within("--width", "Width of these figures in inches: 3.4 for one column.", 2.5, 20),
     ] = None,
     against: Annotated[
         str | None,
-        given.option("METHOD", "Compare all methods with this one, in table differences."),
+        given.option("METHOD", "Method to compare all others with, in table differences."),
     ] = None,
 ) -> None:
     """Write the report of a results folder."""
@@ -61,51 +60,57 @@ def report(
         study = load(folder, against=against or "")
         if against and not len(TABLES["differences"](study)):
             raise CoarticError(
-                f"--against {against} has no effect: no other method solved every run on the tasks "
-                "on which this one did"
+                f"--against {against} has no effect: there are no tasks on which this method and "
+                "another one solved all runs"
             )
         files, failures = write_report(
             study, out, for_paper=for_paper, width=width, watch=display.show
         )
-    made = Counter(Path(name).suffix for name in files)
-    figures = f" and {counted(made['.svg'], 'figure')}" * for_paper
+    counts = Counter(Path(name).suffix for name in files)
+    figures = f" and {counted(counts['.svg'], 'figure')}" * for_paper
     say(f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
-        f"{counted(made['.csv'], 'table')}{figures}.")  # fmt: skip
+        f"{counted(counts['.csv'], 'table')}{figures}.")  # fmt: skip
     for part, reason in failures.items():
-        complain("Error", f"{part} could not be made, by a fault of coartic: {reason}")
+        complain("Error", f"{part} could not be made, because of a bug in coartic: {reason}")
     if failures:
         sys.exit(1)
 
 
 def say_ranking(study: Study, folder: Path) -> None:
-    """Print the ranking of a study, who is not ranked and why, to what the gaps are, why runs
-    failed, and where ``coartic report`` writes the page of ``folder``."""
+    """Print the ranking of a study, with these notes:
+
+    - which methods are not ranked, and why;
+    - the reference of the gaps;
+    - how many runs failed, and why;
+    - the command that writes the report of ``folder``.
+    """
     from coartic.analysis.report.sections import limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
     from coartic.estimates import FEWEST
     from coartic.runs.record import MOTOR_NOISE
 
-    every, what = standings(study), limits(study)
+    methods, notes = standings(study), limits(study)
     names = [
         row.title if row.built_in or row.title.startswith(row.base) else f"{row.base}: {row.title}"
-        for _, row in every.iterrows()
+        for _, row in methods.iterrows()
     ]
-    every = every.assign(name=names)
-    rows, others = every[every.why == ""], every[every.why != ""]
-    heads = ["method", "gap (%)", "share (%)", "noisy gap (%)", "runs"]
-    heads += ["note"] * any(rows.note)
+    methods = methods.assign(name=names)
+    ranked, unranked = methods[methods.why == ""], methods[methods.why != ""]
+    headings = ["method", "gap (%)", "share (%)", "noisy gap (%)", "runs"]
+    headings += ["note"] * any(ranked.note)
     cells = [
         [row["name"], interval(row, "gap", scale=100), interval(row, "share", 0, 100),
-         interval(row, "noisy_gap", scale=100), number(row["runs"]), row["note"]][: len(heads)]
-        for row in rows.to_dict("records")
+         interval(row, "noisy_gap", scale=100), number(row["runs"]),
+         row["note"]][: len(headings)]
+        for row in ranked.to_dict("records")
     ]  # fmt: skip
-    say_table(heads, cells)
+    say_table(headings, cells)
     pairs = [
         ("Not ranked", f"{why}: {'; '.join(of_reason['name'])}")
-        for why, of_reason in others.groupby("why", sort=False)
+        for why, of_reason in unranked.groupby("why", sort=False)
     ]
-    if len(rows):
+    if len(ranked):
         known = f"gaps are to the {reference(study, ranked_tasks(study))}"
         noise = f"noisy gaps, too, of solutions executed with motor noise {MOTOR_NOISE}"
         pairs.append(("Reference", f"{known}; {noise}"))
@@ -115,16 +120,16 @@ def say_ranking(study: Study, folder: Path) -> None:
     )
     if fewest < FEWEST:
         pairs.append(("Intervals", f"too few runs to test: make {FEWEST} (--runs {FEWEST})"))
-    if what["own"]:
-        known = f"of {listed(what['own'])} only the best reward of this folder is known"
-        again = "repeat the command with optimum/search among its --methods"
-        pairs.append(("", f"{known}; to search for the optimum, {again}"))
-    if what["unknown"]:
-        pairs.append(("", f"no reward is known of {listed(what['unknown'])}"))
-    if what["failed"]:
-        failed = f"{what['failed']} of {counted(what['runs'], 'run')}: {'; '.join(what['reasons'])}"
-        pairs.append(("Failed", failed))
-    pairs += [("‡", sentence) for sentence in what["late"]]
+    if notes["own"]:
+        known = f"for {listed(notes['own'])} only the best reward of this folder is known"
+        search = "repeat the command with optimum/search in its --methods"
+        pairs.append(("", f"{known}; to search for the optimum, {search}"))
+    if notes["unknown"]:
+        pairs.append(("", f"for {listed(notes['unknown'])} no reward is known"))
+    if notes["failed"]:
+        reasons = "; ".join(notes["reasons"])
+        pairs.append(("Failed", f"{notes['failed']} of {counted(notes['runs'], 'run')}: {reasons}"))
+    pairs += [("‡", sentence) for sentence in notes["late"]]
     page = folder / "report" / "report.html"
     say_pairs([*pairs, ("Report", f"coartic report {quote(str(folder))} writes {page}")])
 
@@ -134,22 +139,25 @@ def verify(
     again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
     run: Annotated[
         str | None,
-        given.option("ID", "Only perform this run again; the beginning of its id.", "--run"),
+        given.option("ID", "Only perform this run again; ID is the beginning of its id.", "--run"),
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """Execute every stored solution again and, with --again, perform runs again; with --run, only
-    perform one run again. Exit with code 1 if something differs or, without --run, is missing."""
+    """Check stored runs: execute all solutions again, and perform runs again if asked to.
+
+    Exits with code 1 if a result differs, or if the folder lacks runs. With --run only one run is
+    performed again, and nothing else is checked.
+    """
     from coartic.analysis.verify import check_runs
     from coartic.runs.store import explain_errors, open_store
 
-    alone = run is not None
-    if again and alone:
+    only_one = run is not None
+    if again and only_one:
         raise CoarticError("--again has no effect with --run, which performs one run again")
-    if method_file and not (again or alone):
+    if method_file and not (again or only_one):
         raise CoarticError("--method-file has no effect without --again or --run")
     is_right = True
-    if not alone:
+    if not only_one:
         with Display() as display, open_store(folder), explain_errors(folder):
             display.show(f"Executing the solutions of {folder}")
             report = check_runs(folder)
@@ -160,17 +168,18 @@ def verify(
             *(report.wrong or ["Nothing differs."]),
             *report.unfinished,
         )
-    unlike = _perform_again(folder, again, run, method_file) if again or alone else 0
-    if unlike or not is_right:
+    differing = _perform_again(folder, again, run, method_file) if again or only_one else 0
+    if differing or not is_right:
         sys.exit(1)
 
 
 def _perform_again(
     folder: Path, count: int, run_id: str | None, method_file: list[Path] | None
 ) -> int:
-    """Perform the run of a folder whose id begins with ``run_id`` again, or, for None, at most
-    ``count`` of its runs; print the differences from the stored runs and return the number of runs
-    with another result."""
+    """Perform runs of a folder again, print differences, and return the number of differing runs.
+
+    It is the run whose id begins with ``run_id``, or, for None, at most ``count`` runs.
+    """
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again, some_runs
     from coartic.runs.store import open_store
@@ -188,22 +197,25 @@ def _perform_again(
     given.check_used(method_file, registered, methods)
     if run_id is not None:
         _describe_run(runs[0], registered[methods[0]].code)
-    unlike = 0
+    differing = 0
     with Display() as display:
         display.show(f"Performing {counted(len(runs), 'run')} again")
-        for number, (stored, again) in enumerate(perform_runs_again(runs, registered), 1):
-            changes = compare_runs(stored, again)
-            unlike += bool(changes)
-            for difference in changes:
+        for number, (stored, new) in enumerate(perform_runs_again(runs, registered), 1):
+            differences = compare_runs(stored, new)
+            differing += bool(differences)
+            for difference in differences:
                 say(f"Run {stored.id}, performed again: {difference}")
             display.show(f"Performed {number} of {counted(len(runs), 'run')} again")
-    say(f"{counted(len(runs), 'run')} performed again: {unlike or 'none'} with another result.")
-    return unlike
+    say(f"{counted(len(runs), 'run')} performed again: {differing or 'none'} with another result.")
+    return differing
 
 
 def _describe_run(run: Run, code: str) -> None:
-    """Print id, seed, parameters and result of a run, and a sentence if ``code``, the version or
-    code of its method in this installation, differs from the run's."""
+    """Print id, seed, parameters and result of a run.
+
+    ``code`` is the version or code of its method here. If it differs from the run's, a sentence
+    says so.
+    """
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
     from coartic.runs.plan import in_words
@@ -220,7 +232,10 @@ def _describe_run(run: Run, code: str) -> None:
         ]
     )
     if code != cell.method.code:
-        say(f"Another version of the method made the run ({cell.method.code}; here is {code}).")
+        say(
+            f"The run was made by version {cell.method.code} of the method; its version here is "
+            f"{code}."
+        )
 
 
 def cite(
@@ -229,14 +244,14 @@ def cite(
         typer.Argument(
             parser=folder_named,
             metavar="FOLDER",
-            help="Results folder; without, all methods.",
+            help="Results folder; by default all built-in methods.",
         ),
     ] = None,
     analysis: Annotated[
-        bool, typer.Option("--analysis", help="Also works behind statistics and signatures.")
+        bool, typer.Option("--analysis", help="Also cite works on the statistics and signatures.")
     ] = False,
 ) -> None:
-    """Print BibTeX for coartic, the paper and the methods of a folder, or all built-in methods."""
+    """Print BibTeX for coartic, the paper and methods."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
     from coartic.runs.store import open_store
@@ -252,7 +267,7 @@ def cite(
 
 
 _PICTURED = 12
-"""Most tasks of a picture."""
+"""Most tasks in a picture."""
 
 
 def draw(
@@ -260,14 +275,15 @@ def draw(
         list[str] | None,
         typer.Argument(
             metavar="TASK",
-            help="Tasks, task files, or long/v1/i000..i003; with --run a results folder.",
+            help="Tasks, task files, or long/v1/i000..i003. With --run: a results folder.",
         ),
     ] = None,
     run: Annotated[
-        list[str] | None, given.option("ID", "A run to film; two are side by side.", "--run")
+        list[str] | None,
+        given.option("ID", "Run to film. Give it twice for two runs side by side.", "--run"),
     ] = None,
     initial: Annotated[
-        bool, typer.Option("--initial", help="Film the corrective process alone next to the run.")
+        bool, typer.Option("--initial", help="Also film the corrective process, next to the run.")
     ] = False,
     recording: Annotated[
         Path | None,
@@ -278,20 +294,24 @@ def draw(
         given.within("--ticks-per-unit", "Ticks in a unit of time of the recording.", 1e-9, 1e9),
     ] = None,
     width: Annotated[
-        int | None, given.within("--width", "Width of the film in pixels; 800.", 200, 3840)
+        int | None,
+        given.within("--width", "Width of the film in pixels; by default 800.", 200, 3840),
     ] = None,
     out: Annotated[
         Path | None,
         given.file_or_folder(
-            "FILE", "Picture (.png, .svg, .pdf), or a folder; of runs a film (.gif, .mp4)."
+            "FILE", "Picture (.png, .svg, .pdf), film of runs (.gif, .mp4), or folder for tasks."
         ),
     ] = None,
     replace: given.Replace = False,
 ) -> None:
-    """Draw tasks (a folder also gets their files), film runs, or draw a recording."""
+    """Draw tasks, film runs, or draw a recording.
+
+    If --out is a folder, the files of the tasks are written there, too.
+    """
     if recording:
         if run or initial or width is not None:
-            raise CoarticError("--run, --initial or --width has no effect with --recording")
+            raise CoarticError("--run, --initial and --width have no effect with --recording")
         if len(tasks := tasks or []) != 1:
             raise CoarticError("--recording needs one task: coartic draw TASK --recording FILE")
         return _draw_recording(tasks[0], recording, ticks_per_unit, out, replace)
@@ -303,7 +323,7 @@ def draw(
         film = out or Path("film.gif")
         return _film(folder_named(tasks[0]), run, film, initial, width or 800, replace)
     if initial or width is not None:
-        raise CoarticError("--initial or --width has no effect without --run, which names a run")
+        raise CoarticError("--initial and --width have no effect without --run")
     from coartic import builtin_tasks, load_task
     from coartic.internal.files import check_ending, check_output, publish, write_output
     from coartic.runs.plan import tasks_by_name
@@ -312,12 +332,14 @@ def draw(
 
     for folder in [name for name in tasks or () if Path(name).is_dir()]:
         raise CoarticError(
-            f"{folder} is a folder: coartic draw {folder} --run ID films a run; coartic list "
-            f"{folder} has the ids"
+            f"{folder} is a folder, not a task. `coartic draw {folder} --run ID` films a run, and "
+            f"`coartic list {folder}` lists the ids."
         )
     out = out or Path("tasks.svg")
     if replace and not out.suffix:
-        raise CoarticError("--replace has no effect on a folder, whose pictures are written again")
+        raise CoarticError(
+            "--replace has no effect on a folder, whose pictures are always replaced"
+        )
     names = [name for text in tasks or builtin_tasks() for name in named_by(text)]
     chosen = [*tasks_by_name(map(load_task, names)).values()]
     from coartic.analysis.figures.drawings import picture_of_tasks
@@ -333,15 +355,18 @@ def draw(
         files = {f"{task.name}.toml": task_text(task).encode() for task in chosen}
         files |= {"tasks.svg": picture(drawing, ".svg")}
         publish(out, files)
-    drawn = f", of which {_PICTURED} are drawn" if len(chosen) > _PICTURED else ""
+    drawn = f"; the first {_PICTURED} are drawn" if len(chosen) > _PICTURED else ""
     return say(f"{out}: {counted(len(chosen), 'task')}{drawn}.")
 
 
 def _draw_recording(
     task_name: str, recording: Path, ticks_per_unit: float | None, out: Path | None, replace: bool
 ) -> None:
-    """Write a picture of a recording. Raises CoarticError if the recording cannot be read, and,
-    after the picture is written, if its hits do not fit the task."""
+    """Write a picture of a recording.
+
+    Raises CoarticError if the recording cannot be read, or, after the picture is written, if its
+    hits do not fit the task.
+    """
     from coartic import load_task
     from coartic.analysis.figures.plot import FORMATS, picture
     from coartic.analysis.recordings import (
@@ -362,7 +387,7 @@ def _draw_recording(
     else:
         drawing = draw_recording(recording, task, ticks_per_unit=ticks_per_unit)
     write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
-    say(f"{out}: {recording}.")  # also where the hits are refused
+    say(f"{out}: {recording}.")  # said even if the hits are refused below
     if has_markers:
         hits = hits_from_markers(recording, task, ticks_per_unit=ticks_per_unit or 100.0)
     else:
@@ -375,10 +400,12 @@ def _draw_recording(
 def _film(
     folder: Path, run_ids: Sequence[str], out: Path, initial: bool, width: int, replace: bool
 ) -> None:
-    """Write a film (.gif, .mp4), ``width`` pixels wide (MP4: rounded down to even), of one or two
-    runs of a results folder side by side, or, with ``initial``, of one run next to the corrective
-    process alone. Raises CoarticError for more or unknown runs, and if the film cannot be made or
-    written."""
+    """Write a film of runs of a results folder side by side.
+
+    At most two movements are filmed: runs, or with ``initial`` the corrective process and a run.
+    ``width`` is in pixels; for MP4 it is rounded down to an even number. Raises CoarticError for
+    more runs, unknown runs, or if the film cannot be written.
+    """
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of
     from coartic.benchmarks.reproduce import find_run, trajectory_of
@@ -393,9 +420,9 @@ def _film(
         title = f"{movement.task.label}\n{title_of(stored.cell.method)}, run {stored.number}"
         movements.append((title, movement))
     if initial:
-        on = movements[0][1].task
-        initial_solution = trajectory(on, corrective_trial(on, initial_hands(on)).movements)
-        movements.insert(0, (f"{on.label}\ncorrective process alone", initial_solution))
+        task = movements[0][1].task
+        initial_solution = trajectory(task, corrective_trial(task, initial_hands(task)).movements)
+        movements.insert(0, (f"{task.label}\ncorrective process alone", initial_solution))
     frames, ticks_a_second = write_film(movements, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
 
@@ -403,13 +430,15 @@ def _film(
 def play(
     task: Annotated[
         str | None,
-        typer.Argument(metavar="TASK", help="Task to begin with, or a task file (.toml)."),
+        typer.Argument(metavar="TASK", help="First task of the page, or a task file (.toml)."),
     ] = None,
     out: given.Out = None,
-    show: Annotated[bool, typer.Option("--open/--no-open", help="Open it in the browser.")] = True,
+    show: Annotated[
+        bool, typer.Option("--open/--no-open", help="Open the page in the browser.")
+    ] = True,
     replace: given.Replace = False,
 ) -> None:
-    """Write a page on which goals can be moved and the learner learns; open it in the browser."""
+    """Open a page in the browser on which you can move goals and watch the learner learn."""
     import webbrowser
 
     from coartic import load_task

@@ -1,4 +1,4 @@
-"""Commands that run suites, list tasks, suites and methods, and begin your own method."""
+"""Commands that run suites, list tasks, suites and methods, and check or start methods."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def run(
     ] = None,
     folder: Annotated[
         str | None,
-        given.option("FOLDER", "Folder for the results; results/SUITE if not given.", "--out"),
+        given.option("FOLDER", "Folder for the results; by default results/SUITE.", "--out"),
     ] = None,
     runs: Annotated[
         Any,
@@ -52,7 +52,8 @@ def run(
         given.option("N", "Trials of each run, for methods that have this parameter."),
     ] = None,
     jobs: Annotated[
-        int | None, given.within("--jobs", "Processes; by default one a core.", 1, MOST_JOBS)
+        int | None,
+        given.within("--jobs", "Number of processes; by default one for each core.", 1, MOST_JOBS),
     ] = None,
     tasks: Annotated[
         str | None, given.option("A,B", "Only these tasks, such as two-armed-1, or files (TOML).")
@@ -65,21 +66,23 @@ def run(
         list[Path] | None, given.option("FILE", "A family of your own (TOML).")
     ] = None,
     seed: Annotated[int, given.option("N", "Seed of the suite.")] = 0,
-    time_limit: Annotated[float | None, given.option("SECONDS", "Most CPU time of a run.")] = None,
+    time_limit: Annotated[
+        float | None, given.option("SECONDS", "Most CPU time of a job: of a run, or of a few.")
+    ] = None,
     trial_budget: Annotated[
-        int | None, given.option("N", "Most trials of a run, whatever its method.")
+        int | None, given.option("N", "Most trials of a run, for all methods.")
     ] = None,
     scheduler: Annotated[
         str | None, given.option("ADDRESS", "Dask scheduler to use instead of this machine.")
     ] = None,
     include: Annotated[
         list[str] | None,
-        given.option("FOLDER", "Include the runs of a folder, or of the 'shipped' results."),
+        given.option("FOLDER", "Include the runs of a folder, or the results named 'shipped'."),
     ] = None,
 ) -> None:
-    """Run the missing part of a suite; print the ranking, unless --runs names a part.
+    """Run the missing part of a suite, and print the ranking unless --runs names a part.
 
-    If it is interrupted, repeat the command: it resumes where it stopped, and repeats runs that
+    If the command is interrupted, repeat it. It continues where it stopped, and repeats runs that
     crashed.
     """
     from coartic.analysis.study import load
@@ -93,23 +96,23 @@ def run(
     from coartic.runs.store import open_store
 
     if suite is None:
-        raise CoarticError(f"name a suite: {', '.join(suites())}, or a file (.toml)")
+        raise CoarticError(f"SUITE is missing: give {', '.join(suites())}, or a file (.toml)")
     if scheduler is not None and jobs is not None:
         raise CoarticError("--jobs has no effect with --scheduler, whose workers perform the runs")
     chosen, display = load_suite(suite), Display()
     out = folder_named(f"results/{chosen.name}" if folder is None else folder, "--out")
 
     def saved() -> str:
-        there = "no run yet"
+        runs_stored = "no run yet"
         with suppress(CoarticError), open_store(out) as store:
-            there = counted(len(store.present()), "run")
-        return one_line(f"Saved in {out}: {there}; repeat the command to resume.")
+            runs_stored = counted(len(store.present()), "run")
+        return one_line(f"Stored in {out}: {runs_stored}; repeat the command to resume.")
 
     with interruptible(saved), display:
         display.show(f"Planning the runs of {chosen.name}")
         registered = registry(method_file or ())
         names = given.methods_meant(given.names_in(methods), registered, expand=False)
-        if include and not names:  # the user's own methods alone
+        if include and not names:  # only the user's own methods
             names = [name for name, info in registered.items() if info.where.endswith(".py")]
         request = request_for(
             tasks=given.names_in(tasks),
@@ -138,11 +141,12 @@ def run(
 
 def list_(
     name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Task, suite, method, family or results.")
+        str | None,
+        typer.Argument(metavar="NAME", help="Task, suite, method, family or results folder."),
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """List tasks, suites and methods, describe what is named, or list the runs of a folder."""
+    """List tasks, suites and methods; describe one of them; or list the runs of a folder."""
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
@@ -184,16 +188,18 @@ def list_(
         except CoarticError as error:
             if not str(error).startswith("unknown"):
                 raise
-            every = [*suites(), *builtin_tasks(), *families, *registered]
-            raise CoarticError(unknown("task, suite, method or family", name, every)) from error
-        pairs = (pair for each in methods for pair in _describe_method(registered[each]))
+            known = [*suites(), *builtin_tasks(), *families, *registered]
+            raise CoarticError(unknown("task, suite, method or family", name, known)) from error
+        pairs = (pair for method in methods for pair in _describe_method(registered[method]))
     given.check_used(method_file, registered, methods)
     return say_pairs(pairs)
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: title, description, numbers of runs and trials, tasks and
-    methods of a suite, and the command that runs it. ``name``: its name or file."""
+    """Yield a description of a suite, as pairs for :func:`.say_pairs`.
+
+    ``name`` is its name or file.
+    """
     from coartic import builtin_tasks
     from coartic.analysis.words import number
 
@@ -202,17 +208,18 @@ def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
     runs = " or ".join(map(str, sorted({block.runs or suite.runs for block in suite.blocks})))
     trials = number(suite.trials) if suite.trials else "no"
     yield "Runs", f"{runs} of each method on each task, {trials} trials a run"
-    asked = [task for block in suite.blocks for task in block.tasks]
-    tasks = [task for each in asked for task in (builtin_tasks() if each == "*" else [each])]
+    entries = [entry for block in suite.blocks for entry in block.tasks]
+    tasks = [task for entry in entries for task in (builtin_tasks() if entry == "*" else [entry])]
     yield "Tasks", ", ".join(dict.fromkeys(tasks))
     yield "Methods", ", ".join(dict.fromkeys(m for block in suite.blocks for m in block.methods))
     yield "Run it", f"coartic run {name}"
 
 
 def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: label, description, goals, hands and base of a task, and, if
-    ``name`` names a task of the paper, where its goals come from. ``name``: its name or file, as
-    the user gave it."""
+    """Yield a description of a task, as pairs for :func:`.say_pairs`.
+
+    ``name`` is its name or file, as the user wrote it.
+    """
     yield "Task", f"{name} ({task.label}): {task.description}"
     yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
     yield "Hands", f"{' and '.join(task.hands)}; initially {task.initial_hands}"
@@ -222,8 +229,7 @@ def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
 
 
 def _list_runs(folder: Path) -> None:
-    """Print a line for each run of the plan that a results folder has, with the id by which other
-    commands name the run."""
+    """Print a line for each run of a results folder, with its id."""
     from coartic.runs.store import open_store
 
     with open_store(folder) as store:
@@ -234,16 +240,17 @@ def _list_runs(folder: Path) -> None:
 
 
 def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: description and instances of a family, by its name or file,
-    and a command that draws some."""
+    """Yield a description of a family, as pairs for :func:`.say_pairs`.
+
+    ``name`` is its name or file.
+    """
     yield "Family", f"{name}: {family.description}"
     yield "Instances", f"{name}/i000, ... (test); {name}/d000, ... (development)"
     yield "Draw some", f"coartic draw {quote(name)}/i000..i003 --out FOLDER"
 
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
-    """Yield pairs of word and text: title, name, information, parameters and tasks of a method,
-    whether its runs differ by seed, what it was tuned on, and its citation."""
+    """Yield a description of a method, as pairs for :func:`.say_pairs`."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import in_words
@@ -253,9 +260,9 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     yield "Called", title_of(info)
     yield "Information", ", ".join(info.information)
     yield "Parameters", in_words(info.defaults) or "none"
-    yield "Tasks", ", ".join(applies) or "none of the four"
-    yield "Runs", "differ by seed" if info.stochastic else "are all the same"
-    yield "Tuned on", info.tuned_on or "not said"
+    yield "Tasks", ", ".join(applies) or "none of the paper's tasks"
+    yield "Runs", "depend on the seed" if info.stochastic else "do not depend on the seed"
+    yield "Tuned on", info.tuned_on or "not stated"
     yield "Cites", info.citation or "nothing"
 
 
@@ -263,16 +270,16 @@ def check(
     subject: Annotated[
         str,
         typer.Argument(
-            metavar="NAME", help="A method, EC4 or 'optimum/*', or a task file (.toml)."
+            metavar="NAME", help="Methods, such as EC4 or 'optimum/*', or a task file (.toml)."
         ),
     ],
     method_file: given.MethodFiles = None,
     verbose: Annotated[
         bool,
-        typer.Option("--verbose", help="Show what the method prints, logs and crashes with."),
+        typer.Option("--verbose", help="Show what the method prints and logs, and tracebacks."),
     ] = False,
 ) -> None:
-    """Check a method or a task file against the rules; exit with code 1 if it breaks one."""
+    """Check whether a method or a task file keeps the rules; exit with code 1 if it does not."""
     from coartic import builtin_tasks
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry
@@ -281,14 +288,14 @@ def check(
 
     if subject in builtin_tasks() or address_of(subject):
         raise CoarticError(
-            f"{subject} is a task, not a method. `coartic draw {subject} --out FOLDER` writes its "
-            "file, which can be checked."
+            f"{subject} is a task, not a method or a file. `coartic draw {subject} --out FOLDER` "
+            "writes its file, which can be checked."
         )
     registered = registry(method_file or [])
     if subject.endswith(".toml"):
         check_kind(subject, "task")
         if verbose:
-            raise CoarticError("--verbose has no effect: it shows what a method prints")
+            raise CoarticError("--verbose has no effect on a task file")
         with Display() as display:
             display.show(f"Performing runs on {subject}")
             results = check_task_file(Path(subject), registered)
@@ -307,8 +314,7 @@ def check(
 
 
 def _show_results(name: str, results: Sequence[CheckResult]) -> int:
-    """Print the results of the checks of ``name``, a method or a task file, and how many passed;
-    return the number of others."""
+    """Print the results of checks, and return the number of checks that failed."""
     for result in results:
         say(f"{'pass' if result.passed else 'FAIL'}  {result.name}: {result.finding}")
     passed = sum(result.passed for result in results)
@@ -317,11 +323,13 @@ def _show_results(name: str, results: Sequence[CheckResult]) -> int:
 
 
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Its id, such as my-search.")],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="Id of the method, such as my-search.")
+    ],
     out: given.Out = None,
     replace: given.Replace = False,
 ) -> None:
-    """Write a working method, in a file of its name or --out, to be changed into your own."""
+    """Write a file with a small working method, as a start for your own."""
     from coartic.benchmarks import template
     from coartic.benchmarks.registry import check_id, registry
     from coartic.internal.files import write_output
@@ -335,7 +343,7 @@ def new(
     file = quote(str(path))
     say_pairs(
         [
-            ("Written", f"{path}: change it as you like"),
+            ("Written", f"{path}: change it into your own method"),
             ("Check", f"coartic check {name} --method-file {file}"),
             (
                 "Run",

@@ -1,4 +1,4 @@
-"""Print the output of commands: sentences, pairs, tables and progress, all by :func:`say`."""
+"""Print the output of commands: sentences, pairs, tables and progress."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ _ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\xa0": " "}
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:
-    """Return ASCII for the characters that a terminal lacks (``-`` for a minus sign, ``?`` for a
-    character without a counterpart) and the index after them: an error handler for ``codecs``."""
+    """Replace characters that a terminal lacks by ASCII, as an error handler for ``codecs``.
+
+    A character without a counterpart becomes ``?``.
+    """
     if not isinstance(error, UnicodeEncodeError):
         raise error
     lacking = error.object[error.start : error.end]
@@ -36,11 +38,24 @@ codecs.register_error("replaced", _replaced)
 
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
-    """Print lines on ``stream``, by default standard output, and then ``end``; characters that do
-    not print, such as line breaks in names, are replaced; streams replace characters that the
-    terminal lacks (:func:`coartic.cli.main`). Raises CoarticError if standard output cannot be
-    written, BrokenPipeError if the reader of ``stream`` has ended; if another stream cannot be
-    written, the lines are lost."""
+    """Print lines; characters that are not printable, such as line breaks in names, are replaced.
+
+    Parameters
+    ----------
+    *lines : str
+    stream : file, optional
+        Stream to print on, by default standard output. If another stream cannot be written, the
+        lines are lost.
+    end : str
+        String to print at the end.
+
+    Raises
+    ------
+    CoarticError
+        Standard output cannot be written.
+    BrokenPipeError
+        The reader of the stream has ended.
+    """
     stream = stream or sys.stdout
     text = "\n".join(map(one_line, lines)).replace("\u202f", " ")
     try:
@@ -49,15 +64,18 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
         raise
     except OSError as error:  # such as a full device
         with open(os.devnull, "w", encoding="utf-8") as nowhere:
-            os.dup2(nowhere.fileno(), stream.fileno())  # what is left to be written
+            os.dup2(nowhere.fileno(), stream.fileno())  # for the rest of the buffer
         if stream is sys.stdout:
-            words = f"the standard output cannot be written: {error.strerror or error}"
-            raise CoarticError(words) from None
+            raise CoarticError(
+                f"standard output cannot be written: {error.strerror or error}"
+            ) from None
 
 
 def complain(kind: str, text: str) -> None:
-    """Print each line of ``text`` on stderr after ``kind``, ``Error`` or ``Warning``, and a colon;
-    on a terminal lines are broken between words."""
+    """Print each line of ``text`` on stderr, after ``Error: `` or ``Warning: `` (``kind``).
+
+    On a terminal long lines are wrapped.
+    """
     width = shutil.get_terminal_size().columns if sys.stderr.isatty() else sys.maxsize
     wrap = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False).wrap
     for line in text.splitlines():
@@ -65,34 +83,39 @@ def complain(kind: str, text: str) -> None:
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
-    """Print pairs of a word and a text, a pair a line; long texts are wrapped."""
-    kept = list(pairs)
-    indent = max((len(word) for word, _ in kept), default=0) + 2
+    """Print pairs of a word and a sentence as two columns, and wrap the second column."""
+    rows = list(pairs)
+    indent = max((len(word) for word, _ in rows), default=0) + 2
     width = max(shutil.get_terminal_size().columns, indent + _READABLE)
-    for word, text in kept:
-        together = text.replace(" %", "\xa0%")  # a number and its % stay on one line
-        lines = textwrap.wrap(together, width - indent, break_on_hyphens=False) or [""]
+    for word, text in rows:
+        unbroken = text.replace(" %", "\xa0%")  # a number and its % stay on one line
+        lines = textwrap.wrap(unbroken, width - indent, break_on_hyphens=False) or [""]
         for number, line in enumerate(lines):
             say(f"{'' if number else word:{indent}}{line}".replace("\xa0", " ").rstrip())
 
 
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of text below their headings, the first column to the left, other columns to the
-    right; on a narrow terminal the first column is wrapped. Nothing without rows."""
+    """Print a table; without rows print nothing.
+
+    The first column is aligned to the left, and wrapped on a narrow terminal. Other columns are
+    aligned to the right.
+    """
     if not rows:
         return
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
     widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
     widths[0] = min(widths[0], max(_READABLE, width - sum(widths[1:]) - 2 * len(widths[1:])))
-    for first, *others in (headings, *rows):
-        line, *more = textwrap.wrap(first, widths[0]) or [""]
-        cells = [f"{text:>{width}}" for text, width in zip(others, widths[1:], strict=True)]
-        say("  ".join([f"{line:{widths[0]}}", *cells]), *more)
+    for name, *values in (headings, *rows):
+        line, *more_lines = textwrap.wrap(name, widths[0]) or [""]
+        cells = [f"{text:>{width}}" for text, width in zip(values, widths[1:], strict=True)]
+        say("  ".join([f"{line:{widths[0]}}", *cells]), *more_lines)
 
 
 class Display:
-    """What a command is doing, on standard error: a line that changes on a terminal; elsewhere a
-    line at most every ten seconds (:meth:`show`)."""
+    """Show on standard error what a command is doing.
+
+    On a terminal it is a line that changes. Elsewhere it is a new line at most every ten seconds.
+    """
 
     EVERY_S = 10.0
 
@@ -112,13 +135,15 @@ class Display:
             self._bar.stop()
 
     def show(self, doing: str) -> None:
-        """Show what the command is doing from now on; without a terminal only if ten seconds have
-        passed since the last such line or the beginning."""
+        """Show what the command is doing now.
+
+        Without a terminal a line is printed only if the last one is ten seconds old.
+        """
         self._show(lambda: doing)
 
     def line(self, *texts: str) -> None:
-        """Print lines that stay."""
-        for text in texts:  # rich prints them above its bar
+        """Print lines that do not change; on a terminal they are above the changing line."""
+        for text in texts:
             say(text, stream=sys.stderr)
 
     def _show(self, doing: Callable[[], str], *, at_once: bool = False) -> None:
@@ -128,40 +153,46 @@ class Display:
             self.line(doing())
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
-        """Show the progress of runs, unless no run was missing; before the first run (``cell``
-        None) first print which runs are there already."""
+        """Show the progress of runs, as the ``watch`` of :func:`coartic.benchmarks.perform`.
+
+        Before the first run (``cell`` is None) it prints which runs the folder has already. If no
+        run was missing, it shows no progress.
+        """
         if cell is None:
-            self._say_what_is_there(progress)
+            self._say_present(progress)
         if progress.present == progress.total:
             return
-        made = progress.present + progress.done
+        finished = progress.present + progress.done
         if self._bar:
-            self._bar.update(self._bar.task_ids[0], completed=made, total=progress.total)
+            self._bar.update(self._bar.task_ids[0], completed=finished, total=progress.total)
         failed = f"{progress.failed} failed" * bool(progress.failed)
-        again = ""
+        repeats = ""
         if progress.repeats:
-            again = f"{counted(progress.repeats, 'run')} again, to see whether results repeat"
-        parts = [f"Runs: {made}/{progress.total}", failed, again]
+            repeats = f"{counted(progress.repeats, 'run')} again, to see whether results repeat"
+        parts = [f"Runs: {finished}/{progress.total}", failed, repeats]
         self._show(
             lambda: "  ".join(filter(None, [*parts, _time_left(progress.time_left.seconds)])),
-            at_once=made == progress.total and progress.time_left.seconds == 0,
+            at_once=finished == progress.total and progress.time_left.seconds == 0,
         )
 
-    def _say_what_is_there(self, progress: Progress) -> None:
+    def _say_present(self, progress: Progress) -> None:
         self.line(*progress.unused)
         if progress.others > 0:
-            others = counted(progress.others, "other run")
-            words = "which this command does not ask for: they are kept, and not reported"
-            self.line(f"{progress.folder} holds {others}, {words}.")
+            others = counted(progress.others, "run")
+            self.line(
+                f"{progress.folder} also has {others} of earlier commands, which this command "
+                "does not report."
+            )
         if progress.present:
-            coming = counted(progress.total - progress.present, "run")
-            self.line(f"Already there: {progress.present} of {progress.total}; to come: {coming}.")
+            missing = counted(progress.total - progress.present, "run")
+            self.line(
+                f"Already stored: {progress.present} of {progress.total}; missing: {missing}."
+            )
             self.line(*(f"{'; '.join(sentences)}." for sentences in progress.marks.values()))
 
 
 def _progress_bar(doing: Callable[[], str]) -> Any:
-    """Return a bar of rich with the text that ``doing`` returns, asked twice a second; it is
-    removed in the end."""
+    """Return a progress bar of rich that calls ``doing`` for its text twice a second."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task
     from rich.table import Column
@@ -190,8 +221,7 @@ def _progress_bar(doing: Callable[[], str]) -> Any:
 
 
 def _time_left(seconds: float) -> str:
-    """Return a time, s, as a person would estimate it: ``about 40 s left``; empty for NaN, and for
-    no time."""
+    """Return a time, s, as a phrase such as ``about 40 s left``; empty for NaN and 0."""
     if not seconds > 0:  # True for NaN
         return ""
     if seconds < 10:

@@ -1,2 +1,4 @@
-"""Parts that the packages share and users do not see: limits, sentences, files, processes. These
-parts import no task, robot or method."""
+"""Internal code that the packages share: limits, messages, files and processes.
+
+It does not import tasks, robots or methods.
+"""

@@ -1,4 +1,4 @@
-"""Check the arguments of functions where data of users enter."""
+"""Check the arguments of public functions against their type hints."""
 
 from __future__ import annotations
 
@@ -17,29 +17,33 @@ from coartic.internal.validation import explain
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
 Numbers = Annotated[ArrayLike, PlainValidator(real_numbers)]
-"""Real numbers of any shape, as an array or lists; a checked function gets an array of float64."""
+"""Type hint for real numbers of any shape, as an array or lists. A checked function gets an array
+of float64."""
 _STRICT = ConfigDict(strict=True, arbitrary_types_allowed=True)
 
 
 class ArgumentError(CoarticError, ValueError, TypeError):
-    """An argument that a function does not take."""
+    """A function does not accept an argument."""
 
 
 def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:
-    """Return a wrapper of the function that raises ArgumentError, before the call, for an argument
-    that its type hint excludes, that is missing or that the function does not have. NumPy's scalars
-    count as Python's; strings, True and False are not numbers."""
+    """Decorate a function to check its arguments before each call.
+
+    The decorated function raises ArgumentError for an argument that does not match its type hint, a
+    missing argument and an unknown argument. Scalars of NumPy are accepted as those of Python.
+    Strings, True and False are not accepted as numbers.
+    """
     names = [*inspect.signature(function).parameters]
 
-    @cache  # hints are read at the first call: most commands make none
+    @cache  # hints are read at the first call, because most commands do not call the function
     def checked() -> Callable[..., Computed]:
         return validate_call(config=_STRICT)(function)
 
     @wraps(function)
     def call(*args: Asked.args, **named: Asked.kwargs) -> Computed:
-        places, given = plain_values([*args]), plain_values(named)
+        plain_args, plain_kwargs = plain_values([*args]), plain_values(named)
         try:
-            return checked()(*places, **given)
+            return checked()(*plain_args, **plain_kwargs)
         except ValidationError as error:
             sentence = explain(error, names, of_call=True)
             raise ArgumentError(f"{function.__name__}: {sentence}") from None

@@ -1,4 +1,4 @@
-"""Files for users, each written whole or not at all."""
+"""Write files completely or not at all."""
 
 from __future__ import annotations
 
@@ -13,16 +13,19 @@ from coartic.internal.text import plain
 
 _PART = ".coartic-"  # beginning of the name of a file that is being written
 LISTING = ".coartic-files"
-"""File in a folder that lists the files that a command wrote there, or began to, a path a line."""
+"""Name of a file that lists the files that a command has written into its folder, one on a line. It
+also lists files that an interrupted command has begun to write."""
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write ``data`` as file ``path``, in place of an earlier file; if writing fails, the earlier
-    file stays as it was, and OSError is raised."""
+    """Write a file, and replace an existing one.
+
+    If writing fails, the existing file does not change, and OSError is raised.
+    """
     part = path.with_name(f"{_PART}{os.getpid()}-{path.name}")
     try:
         part.unlink(missing_ok=True)
-        with part.open("xb") as file:  # which follows no link
+        with part.open("xb") as file:  # does not follow symbolic links
             file.write(data)
         os.replace(part, path)
     finally:
@@ -30,99 +33,133 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write ``files``, contents by path below the folder, which is made if it is missing. Files
-    that an earlier call wrote there are replaced, or removed if they are not among ``files``.
-    Raises CoarticError as :func:`make_folder`, before a file is written, and if writing fails."""
-    before = make_folder(folder, files)
+    """Write files into a folder, in place of the files that an earlier call wrote there.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder, which is made if it is missing.
+    files : mapping
+        Contents by path in the folder.
+
+    Raises
+    ------
+    CoarticError
+        The folder cannot be used (:func:`make_folder`; then nothing is written), or writing fails.
+    """
+    old_files = make_folder(folder, files)
 
     def list_files(names: Collection[str]) -> None:
         write_atomically(folder / LISTING, "".join(f"{name}\n" for name in sorted(names)).encode())
 
     with errors_in_words(folder):
-        for parent in {folder, *((folder / name).parent for name in {*before, *files})}:
+        for parent in {folder, *((folder / name).parent for name in {*old_files, *files})}:
             parent.mkdir(parents=True, exist_ok=True)
             for part in parent.glob(f"{_PART}[0-9]*"):  # of a command that was killed
                 part.unlink()
-        list_files({*before, *files})  # whatever happens now, all of them are known
+        list_files({*old_files, *files})  # so that an interrupted call leaves no unknown file
         for name, data in files.items():
             write_atomically(folder / name, data)
-        for name in before - {*files}:
+        for name in old_files - {*files}:
             (folder / name).unlink(missing_ok=True)
-            with contextlib.suppress(OSError):  # others are in it
+            with contextlib.suppress(OSError):  # the folder has other files
                 (folder / name).parent.rmdir()
         list_files(files)
 
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
-    """Make a folder, if it is missing, and return the paths of files, below the folder, that
-    :data:`LISTING` there lists. Raises CoarticError if the folder cannot be written, if another
-    file has a path among ``names``, or if a listed path or one of ``names`` leads out of it."""
+    """Make a folder if it is missing, and return the paths of the files listed in it.
+
+    Parameters
+    ----------
+    folder : Path
+    names : collection of str
+        Paths in the folder, of files to be written.
+
+    Returns
+    -------
+    set of str
+        Paths in the folder, from file :data:`LISTING`.
+
+    Raises
+    ------
+    CoarticError
+        One of these is the case:
+
+        - the folder cannot be written;
+        - a file exists that would be written, and is not listed;
+        - a path leads out of the folder.
+    """
     listing = folder / LISTING
     with errors_in_words(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         listed = listing.read_text(encoding="utf-8", errors="replace") if listing.exists() else ""
-    ours = {*listed.splitlines()}
-    for name in sorted({*ours, *names}):
+    listed_files = {*listed.splitlines()}
+    for name in sorted({*listed_files, *names}):
         check_inside(folder, folder / name)
-    if other := [name for name in names if name not in ours and (folder / name).exists()]:
+    if foreign := [name for name in names if name not in listed_files and (folder / name).exists()]:
         raise CoarticError(
-            f"{folder} holds {plain(', '.join(other), 80)}, which coartic did not write "
-            "there. Move it away or choose another folder."
+            f"{folder} contains {plain(', '.join(foreign), 80)}, which was not written by coartic. "
+            "Move it away, or choose another folder."
         )
-    return ours
+    return listed_files
 
 
 def check_inside(folder: Path, path: Path) -> None:
-    """Raise CoarticError if ``path``, which need not exist, is a symbolic link or the folder
-    itself, or leads out of ``folder``, such as by a link."""
-    home, places = os.path.realpath(folder), map(os.path.realpath, (path, path.parent))
-    if path.is_symlink() or not all(Path(place).is_relative_to(home) for place in places):
-        raise CoarticError(f"{path} leads out of {folder} by a link: remove the link")
+    """Raise CoarticError if a path leads out of a folder, or is a symbolic link.
+
+    The path need not exist.
+    """
+    home, real_paths = os.path.realpath(folder), map(os.path.realpath, (path, path.parent))
+    if path.is_symlink() or not all(Path(real).is_relative_to(home) for real in real_paths):
+        raise CoarticError(f"{path} leads out of {folder} by a symbolic link: remove the link")
 
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
-    """Write ``data`` as a file, whole or not at all. Raises CoarticError as :func:`check_output`,
-    and if writing fails."""
+    """Write a file that a user asked for, after :func:`check_output`.
+
+    Raises CoarticError if the file must not be replaced, or if writing fails.
+    """
     check_output(path, replace=replace)
     with errors_in_words(path):
         write_atomically(path, data)
 
 
 def check_ending(path: Path, endings: Collection[str]) -> None:
-    """Raise CoarticError unless the suffix of a path, such as ``.svg`` or ``.SVG``, is one of
-    ``endings``, which are in small letters."""
+    """Raise CoarticError if the suffix of a path, in lower case, is not one of ``endings``."""
     if path.suffix.lower() not in endings:
         raise CoarticError(f"{path}: the name must end in {' or '.join(endings)}")
 
 
 def check_output(path: Path, *, replace: bool) -> None:
-    """Raise CoarticError if the folder of a file is missing, or if the file exists and ``replace``
-    is False."""
+    """Raise CoarticError if the folder of a file is missing, or if the file must not be
+    replaced."""
     with errors_in_words(path):
         if not path.parent.is_dir():
-            raise CoarticError(f"cannot write {path}: there is no folder {path.parent}")
+            raise CoarticError(f"{path} cannot be written: the folder {path.parent} does not exist")
         if path.exists() and not replace:
             raise CoarticError(
-                f"{path} is there already; add --replace (in Python replace=True) to write over "
-                "it, or choose another name"
+                f"{path} exists: add --replace (in Python replace=True) to replace it, or choose "
+                "another name"
             )
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
-    """Return the name of a file or folder, which need not exist, as a path. Raises CoarticError,
-    which calls the name ``what``, for a blank name, which would be the current folder."""
+    """Return the name of a file or folder, which need not exist, as a path.
+
+    Raises CoarticError for an empty name. The message begins with ``what``.
+    """
     if not str(name).strip():
-        raise CoarticError(f"{what} is empty; the current folder is .")
+        raise CoarticError(f"{what} is empty; for the current folder write a dot")
     return Path(name)
 
 
 @contextlib.contextmanager
 def errors_in_words(path: Path) -> Iterator[None]:
-    """Turn an OSError raised in the block of this context into a CoarticError that says that
-    ``path`` cannot be written, and why."""
+    """Turn an OSError of the block into a CoarticError: a path cannot be written."""
     try:
         yield
     except OSError as error:
-        raise CoarticError(f"cannot write {path}: {error.strerror or error}") from None
+        raise CoarticError(f"{path} cannot be written: {error.strerror or error}") from None

@@ -1,5 +1,7 @@
-"""Packages that import a name when it is asked for: the compiler takes a while to import, and few
-commands need it."""
+"""Import the names of a package on first use.
+
+The compiler is slow to import, and most commands do not need it.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,22 @@ from typing import Any
 def import_lazily(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return the functions ``__getattr__`` and ``__dir__`` for module ``package``, which imports
-    names on first use. ``homes`` has, by name, a module that has the name.
-    ``__getattr__`` raises AttributeError for any other name."""
+    """Make the functions ``__getattr__`` and ``__dir__`` of a package that imports lazily.
+
+    Parameters
+    ----------
+    package : str
+        Name of the package.
+    homes : mapping
+        The module that defines a name, by name.
+
+    Returns
+    -------
+    callable
+        ``__getattr__``; it raises AttributeError for names that are not in ``homes``.
+    callable
+        ``__dir__``.
+    """
     module = sys.modules[package]
 
     def find(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Limits on what a plan may ask for, and checks of the numbers that users give."""
+"""Limits of plans, and checks of numbers from users."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ MOST_CELLS = 10_000
 MOST_RUNS = 1_000_000
 """Most runs of a cell."""
 MOST_TRIALS = 10_000_000
-"""Most trials of a run; the rewards of all of them are kept."""
+"""Most trials of a run, whose rewards are all stored."""
 MOST_SECONDS = 1_000_000
-"""Most seconds of a run: a system can wait for twice that at most."""
+"""Longest time limit, s. Systems can wait for about twice this time."""
 MOST_SEED = 2**63 - 1
 """Largest seed of a suite."""
 MOST_RUN_SEED = 2**128 - 1
@@ -29,36 +29,45 @@ WIDTHS = (1e-9, 100.0)
 
 
 def check_limits(name: str, value: Any, least: float, most: float) -> None:
-    """Raise ValueError, which calls the value ``name``, unless it is a number from ``least`` to
-    ``most``, both included, and an integer (not 3.0) if ``least`` is an ``int``. True and False are
-    no numbers."""
-    whole = isinstance(least, int)
-    kind = numbers.Integral if whole else numbers.Real
+    """Raise ValueError if a value is not a number from ``least`` to ``most``.
+
+    Both ends are allowed. The value must be an integer (not 3.0) if ``least`` is an ``int``. True
+    and False are not numbers. The message begins with ``name``.
+    """
+    is_integer = isinstance(least, int)
+    kind = numbers.Integral if is_integer else numbers.Real
     is_number = isinstance(value, kind) and not isinstance(value, bool)
     if not is_number or not least <= value <= most:
+        lower = f"{least:{'' if is_integer else 'g'}}"
+        upper = f"{most:{',' if isinstance(most, int) else 'g'}}"
         raise ValueError(
-            f"{name} is {brief_value(value)}; it must be a {'whole ' * whole}number "
-            f"from {least:{'' if whole else 'g'}} to {most:{',' if isinstance(most, int) else 'g'}}"
+            f"{name} is {brief_value(value)}; it must be "
+            f"{'an integer' if is_integer else 'a number'} from {lower} to {upper}"
         )
 
 
 def plain_values(value: Any) -> Any:
-    """Return a value with ``x.item()`` in place of each scalar x of NumPy, also in copies of lists,
-    tuples and dictionaries (values, not keys; subclasses stay)."""
+    """Replace scalars of NumPy by those of Python, also in lists, tuples and dictionaries.
+
+    Lists, tuples and dictionaries are copied, and keys are not replaced. Subclasses of these types
+    are returned unchanged.
+    """
     import numpy as np
 
     if type(value) in (list, tuple):
         return type(value)(map(plain_values, value))
     if type(value) is dict:
-        return {name: plain_values(each) for name, each in value.items()}
+        return {name: plain_values(item) for name, item in value.items()}
     if isinstance(value, np.generic):
         return value.item()
     return value
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
-    """Return real numbers as an array of float64 of their shape (:func:`real_numbers`). Raises
-    ValueError, which calls the value ``name``, for other values."""
+    """Return real numbers as an array of float64 (:func:`real_numbers`).
+
+    Raises ValueError for other values. The message begins with ``name``.
+    """
     try:
         return real_numbers(value)
     except ValueError as error:
@@ -66,11 +75,13 @@ def real_array(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def real_numbers(value: Any) -> NDArray[np.float64]:
-    """Return real numbers as an array of float64 of their shape; NaN and infinity pass. An
-    ``ndarray`` of float64 is returned itself, not a copy. Raises ValueError for anything else:
-    text, complex numbers, True and False, rows of unequal length, masked entries, integers beyond
-    float64."""
-    import numpy as np  # which the command line's help does without
+    """Return real numbers as an array of float64 of the same shape.
+
+    An ``ndarray`` of float64 is returned without a copy. NaN and infinity are allowed. Raises
+    ValueError for anything else, such as strings, complex numbers, True and False, rows of unequal
+    length, masked entries or integers that float64 cannot represent.
+    """
+    import numpy as np  # slow to import, and the help of commands does not need it
 
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
@@ -78,9 +89,9 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
     try:
         array = np.asarray(value)
     except ValueError:
-        raise ValueError("should be real numbers, in rows of one length") from None
+        raise ValueError("should be real numbers, in rows of equal length") from None
     if array.dtype == object and all(
-        isinstance(each, numbers.Real) and not isinstance(each, bool) for each in array.flat
+        isinstance(entry, numbers.Real) and not isinstance(entry, bool) for entry in array.flat
     ):
         with suppress(OverflowError):  # an integer beyond 1e308
             array = array.astype(np.float64)  # a nullable column of pandas
@@ -90,17 +101,16 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
 
 
 def _refuse_entries(value: Any) -> None:
-    """Raise ValueError for an array with masked entries, and for a list or tuple that contains, at
-    any depth of lists and tuples, such an array, True, False or an array of bools."""
+    """Raise ValueError for masked entries, and for bools in lists and tuples of any depth."""
     import numpy as np
 
     if isinstance(value, list | tuple):
-        for each in value:
-            if isinstance(each, bool) or getattr(getattr(each, "dtype", None), "kind", "") == "b":
+        for item in value:
+            if isinstance(item, bool) or getattr(getattr(item, "dtype", None), "kind", "") == "b":
                 raise ValueError("should be real numbers, without True or False")
-            _refuse_entries(each)
+            _refuse_entries(item)
     elif isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise ValueError("should have no masked entries")
+        raise ValueError("should not have masked entries")
 
 
 def brief_value(value: object) -> str:

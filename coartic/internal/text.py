@@ -1,8 +1,8 @@
-"""Text from elsewhere: what is let in, and how it is shown.
+"""Make strings from files and programs safe to show.
 
-Names, titles and reasons come from files and methods of others, and go to terminals, pages,
-LaTeX and commands to paste. What a person writes in a file is refused if it is not printable
-(:data:`Line`); what a program says is kept as one printable line (:func:`plain`).
+Names, titles and reasons come from files and methods of users. They appear in terminals, pages,
+LaTeX and commands to paste. A string in a file must be printable, or the file is refused
+(:data:`Line`). A message of a program is converted to one printable line (:func:`plain`).
 """
 
 from __future__ import annotations
@@ -18,27 +18,30 @@ from pydantic_core import PydanticCustomError
 LONGEST_LINE = 500
 """Most characters of a title, a description or a citation."""
 LONGEST_REASON = 2000
-"""Most characters of a reason that is kept."""
-_MOST_NAMED = 12  # in a sentence
+"""Most characters of a stored reason."""
+_MOST_NAMED = 12  # most names in a sentence
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
-    """Return text as one printable line (:func:`one_line`), without blanks at its ends; a line of
-    more than ``most`` characters is cut to that length and ends in ``…``. Only 4 ``most``
-    characters, from the first that is no blank, count."""
-    line = one_line(text.strip()[: 4 * most])  # an escape takes longer than what it shows
+    """Return a string as one printable line (:func:`one_line`) of at most ``most`` characters.
+
+    Blanks at both ends are removed. A longer line is cut and ends in ``…``.
+    """
+    line = one_line(text.strip()[: 4 * most])  # bounds the work for a very long string
     return line if len(line) <= most else line[: most - 1] + "…"
 
 
 def error_line(error: BaseException) -> str:
-    """Return an exception as one printable line (:func:`plain`), such as ``ValueError: text``."""
+    """Return an exception as one printable line, such as ``ValueError: message``."""
     return plain(f"{type(error).__name__}: {error}".removesuffix(": "))
 
 
 def one_line(text: str) -> str:
-    """Return text as one printable line, itself if it is one. Otherwise lines are joined by
-    `` | ``, without empty lines and without blanks (tabs, too) at the ends of lines; other
-    characters that do not print become escapes, such as ``\\x1b``."""
+    """Return a string as one printable line.
+
+    Lines are joined by `` | ``, without empty lines and without blanks at the ends of lines. Other
+    characters that are not printable become escapes, such as ``\\x1b``.
+    """
     if text.isprintable() or all(map(prints, text)):
         return text
     parts = (part.strip() for part in text.splitlines())
@@ -46,13 +49,13 @@ def one_line(text: str) -> str:
 
 
 def prints(c: str) -> bool:
-    """Return whether a character is printable, or a space of any width (Unicode category Zs); tabs
-    and line ends are not printable."""
+    """Return whether a character is printable or a space of any width, but not a tab or line
+    end."""
     return c.isprintable() or unicodedata.category(c) == "Zs"
 
 
 def escape(c: str) -> str:
-    """Return a character, or its escape, such as ``\\x1b``, if it is not printable."""
+    """Return a character; if it is not printable, return its escape, such as ``\\x1b``."""
     return c if prints(c) else c.encode("unicode_escape").decode()
 
 
@@ -62,54 +65,60 @@ def counted(count: int, thing: str) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return ``; did you mean 'a'?`` with the name that is spelt most like ``name``, capitals
-    aside; an empty string if no name is alike."""
-    known = {each.lower(): each for each in names}
-    nearest = difflib.get_close_matches(name.lower(), known, 1)
-    return f"; did you mean {known[nearest[0]]!r}?" if nearest else ""
+    """Return ``; did you mean 'a'?`` with the most similar of ``names``, ignoring case.
+
+    Return an empty string if no name is similar.
+    """
+    by_lower_case = {known.lower(): known for known in names}
+    nearest = difflib.get_close_matches(name.lower(), by_lower_case, 1)
+    return f"; did you mean {by_lower_case[nearest[0]]!r}?" if nearest else ""
 
 
 FOREIGN = (
     *(".urdf", ".xml", ".osim", ".mot", ".sto", ".trc"),
     *(".c3d", ".mat", ".xlsx", ".xls", ".ods"),
 )
-"""Endings of files of robots and recordings that other programs write."""
+"""Endings of files of robots and recordings from other programs."""
 
 
 def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto/task.md") -> str:
-    """Return a sentence that coartic does not read a file of another program, known by its ending
-    (:data:`FOREIGN`); an empty text for any other path. ``wanted`` is the end of the sentence, on
-    files that are read."""
+    """Return a sentence if a file is from another program, by its ending (:data:`FOREIGN`).
+
+    ``wanted`` is the end of the sentence, on files that coartic reads. Return an empty string for
+    any other file.
+    """
     if not path.lower().endswith(FOREIGN):
         return ""
     ending = path.lower().rpartition(".")[2]
-    return f"{plain(path, LONGEST_LINE)}: coartic reads no .{ending} file; {wanted}"
+    return f"{plain(path, LONGEST_LINE)}: coartic does not read .{ending} files; {wanted}"
 
 
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
-    """Return a sentence that no ``kind``, such as ``task``, is called ``name``, with the nearest of
-    ``names`` (:func:`did_you_mean`), or, if no name is near, with all names, of more than 12 the
-    first 12; for a file of another program return a sentence that coartic does not read it."""
-    if isinstance(name, str) and (words := foreign_file(name)):
-        return f"{words}."
-    several = list(names)
-    others = len(several) - _MOST_NAMED
-    more = f" and {counted(others, 'other')}" if others > 0 else ""
-    listed = f". Known: {', '.join(several[:_MOST_NAMED])}{more}."
-    hint = (did_you_mean(name, several) if isinstance(name, str) else "") or listed
+    """Return an error message for an unknown name.
+
+    It suggests the most similar of ``names``. If no name is similar, it lists the first 12 names.
+    For a file from another program it is the sentence of :func:`foreign_file`. ``kind`` is what the
+    name stands for, such as ``task``.
+    """
+    if isinstance(name, str) and (sentence := foreign_file(name)):
+        return f"{sentence}."
+    known = list(names)
+    others = len(known) - _MOST_NAMED
+    and_more = f" and {counted(others, 'other')}" if others > 0 else ""
+    listed = f". Known: {', '.join(known[:_MOST_NAMED])}{and_more}."
+    hint = (did_you_mean(name, known) if isinstance(name, str) else "") or listed
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 
 
 def _refuse_unprintable(text: str) -> str:
-    """Return the text itself. Raises a validation error if :func:`prints` refuses a character, such
-    as the end of a line."""
+    """Return a string; raise a validation error if a character is not printable."""
     if wrong := next((c for c in text if not prints(c)), ""):
-        words = f"should be one line of printable text, without {escape(wrong)}"
-        raise PydanticCustomError("not_plain", "{words}", {"words": words})
+        message = f"should be one printable line, without {escape(wrong)}"
+        raise PydanticCustomError("not_plain", "{words}", {"words": message})
     return text
 
 
 printable = AfterValidator(_refuse_unprintable)
-"""Validator that refuses text that is not one printable line."""
+"""Validator that refuses strings that are not one printable line."""
 Line = Annotated[str, Field(max_length=LONGEST_LINE), printable]
 """Printable line, such as a title, of at most :data:`LONGEST_LINE` characters."""

@@ -1,4 +1,4 @@
-"""Numbers of threads and processes, and the set-up that all worker processes share."""
+"""Numbers of threads and processes, and the set-up of worker processes."""
 
 from __future__ import annotations
 
@@ -23,14 +23,16 @@ from coartic.internal.interruption import ENDING
 MOST_JOBS = 10_000
 _POOLS = "OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "NUMBA_NUM", "VECLIB_MAXIMUM"
 ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
-"""Environment variables by which a worker has one thread: BLAS threads of workers compete."""
+"""Environment variables that give a worker one thread, because threads of workers would compete."""
 
 
 @cache
 def worker_variables() -> dict[str, str]:
-    """Return environment variables to set for a process in which methods run: one thread, and on
-    x86-64 OpenBLAS's kernels for Nehalem and NumPy's loops without AVX-512, so that x86-64
-    processors with AVX2 (from Haswell and Zen on) round alike."""
+    """Return the environment variables of processes in which methods run.
+
+    They set one thread. On x86-64 they also select OpenBLAS's kernels for Nehalem and NumPy's loops
+    without AVX-512, so that all processors with AVX2 (from Haswell and Zen on) round alike.
+    """
     if platform.machine() not in ("x86_64", "AMD64"):
         return ONE_THREAD
     major, minor = map(int, metadata.version("numpy").split(".")[:2])
@@ -41,11 +43,13 @@ def worker_variables() -> dict[str, str]:
 
 
 def threads_for(jobs: int) -> int:
-    """Return the number of threads or processes that ``jobs`` means: ``jobs`` itself, a whole
-    number from 1 to 10,000, or for -1 the number of cores that the process may use. Raises
-    ValueError for anything else."""
+    """Return the number of threads or processes for a parameter ``jobs``.
+
+    It is ``jobs``, an integer from 1 to 10,000, or for -1 the number of cores that the process may
+    use. Raises ValueError for anything else.
+    """
     if not (isinstance(jobs, Integral) and jobs == -1):
-        from coartic.internal.limits import check_limits  # which needs NumPy
+        from coartic.internal.limits import check_limits  # imports NumPy
 
         check_limits("jobs", jobs, 1, MOST_JOBS)
         return jobs
@@ -55,16 +59,26 @@ def threads_for(jobs: int) -> int:
 
 
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
-    """Call ``work`` with consecutive slices that together cover the indices 0 to ``count`` - 1, in
-    parallel: at least ``least`` indices each, unless one slice has all, and at most as many slices
-    as ``OMP_NUM_THREADS`` says (one for 0), or, if it has no number, as the process may use cores.
-    Returns when all calls have ended; an error that ``work`` raises passes."""
+    """Call a function with consecutive slices of a range of indices, in parallel threads.
+
+    Return when all calls have ended. Errors of the function are raised.
+
+    Parameters
+    ----------
+    work : callable
+        Function that is called with each slice.
+    count : int
+        Number of indices, from 0.
+    least : int
+        Least number of indices of a slice, unless there is only one slice. There are at most as
+        many slices as variable ``OMP_NUM_THREADS`` says, or else as the process may use cores.
+    """
     if count < 2 * least:
         work(slice(0, count))
         return
     allowed = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
-    most = int(allowed) if allowed.isdigit() else threads_for(-1)
-    threads = max(1, min(count // least, most))
+    limit = int(allowed) if allowed.isdigit() else threads_for(-1)
+    threads = max(1, min(count // least, limit))
     edges = [count * part // threads for part in range(threads + 1)]
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(work, itertools.starmap(slice, itertools.pairwise(edges))))
@@ -72,38 +86,50 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
 
 @contextlib.contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables in the block of this context, for processes that start in it; at
-    its end reset them to their former values, or remove variables that were not set."""
-    before = {name: os.environ[name] for name in variables if name in os.environ}
+    """Set environment variables for processes that start in this block, and restore them after
+    it."""
+    old_values = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)
     try:
         yield
     finally:
         for name in variables:
             del os.environ[name]
-        os.environ.update(before)
+        os.environ.update(old_values)
 
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
-    """Make this process a worker: the leader of a new group of processes, with the
-    first ``streams`` of input, output and errors connected to the null device. SIGTERM kills the
-    process with its group, and so does :func:`end_with_parent`, which removes ``folder`` before."""
-    nobody = os.open(os.devnull, os.O_RDWR)
+    """Make this process a worker, the leader of a new process group.
+
+    SIGTERM, or the end of the parent, kills the process and its group.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Folder to remove when the parent ends.
+    streams : int
+        How many of the streams input, output and errors, in this order, are connected to the null
+        device.
+    """
+    null_device = os.open(os.devnull, os.O_RDWR)
     for stream in range(streams):
-        os.dup2(nobody, stream)
+        os.dup2(null_device, stream)
     os.setpgid(0, 0)
     signal.signal(signal.SIGTERM, lambda *_: end_group(os.getpid()))
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
     end_with_parent(folder, lambda: end_group(os.getpid()))
-    # A worker that ends by itself, as when its parent closes the pipe first, takes its group along.
+    # A worker that ends in another way, such as when its parent closes the pipe, also kills its
+    # group.
     Finalize(None, end_group, (os.getpid(),), exitpriority=0)
 
 
 def end_with_parent(
     folder: Path | None = None, end: Callable[[], object] = lambda: os._exit(1)
 ) -> None:
-    """Start a thread that, when the parent of this process by ``multiprocessing`` has ended,
-    removes ``folder``, if given, and calls ``end``."""
+    """Start a thread that ends this process when its parent (by ``multiprocessing``) has ended.
+
+    The thread removes ``folder``, if there is one, and calls ``end``.
+    """
 
     def wait() -> None:
         if (parent := multiprocessing.parent_process()) is not None:
@@ -116,8 +142,7 @@ def end_with_parent(
 
 
 def end_group(pid: int) -> None:
-    """Kill the group of processes that process ``pid`` leads, and process ``pid``; pass over either
-    that does not exist or may not be killed."""
-    for end in (os.killpg, os.kill):
+    """Kill a process and the process group that it leads, as far as they exist."""
+    for kill in (os.killpg, os.kill):
         with contextlib.suppress(OSError):
-            end(pid, signal.SIGKILL)
+            kill(pid, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""Read files of users."""
+"""Read files, with error messages that name the file."""
 
 from __future__ import annotations
 
@@ -11,18 +11,22 @@ from coartic.internal.text import LONGEST_LINE, plain
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
-    """Return the content of a TOML file as a dictionary. Raises an exception of class ``error``,
-    which names the file, if it cannot be read or is not TOML in UTF-8."""
+    """Return the content of a TOML file.
+
+    Raises an exception of class ``error`` if the file cannot be read, or is not TOML in UTF-8.
+    """
     try:
         return tomllib.loads(read_bytes(path, error=error).decode("utf-8-sig"))
-    except ValueError as failure:  # of TOML, or of UTF-8
+    except ValueError as failure:  # wrong TOML or UTF-8
         shown = plain(str(path), LONGEST_LINE)
         raise error(f"{shown}: is not valid TOML in UTF-8: {plain(str(failure), 80)}") from None
 
 
 def read_bytes(path: str | Path, *, error: type[CoarticError] = CoarticError) -> bytes:
-    """Return the content of a file. Raises an exception of class ``error``, which names the file,
-    if it cannot be read."""
+    """Return the content of a file.
+
+    Raises an exception of class ``error`` if the file cannot be read.
+    """
     try:
         return Path(path).read_bytes()
     except OSError as failure:

@@ -1,4 +1,4 @@
-"""Data of files that users write, and sentences for what is wrong with them."""
+"""Validate data from files and calls, with error messages of one sentence."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ T = TypeVar("T")
 
 
 def in_sentences(kind: type[T]) -> type[T]:
-    """Make a pydantic class raise ValueError with one sentence (:func:`explain`)."""
+    """Decorate a pydantic class to raise ValueError with one sentence (:func:`explain`)."""
     init: Any = kind.__init__
 
     @wraps(init)
-    def call(self: Any, *args: Any, **given: Any) -> None:
+    def call(self: Any, *args: Any, **named: Any) -> None:
         try:
-            init(self, *plain_values(args), **plain_values(given))
+            init(self, *plain_values(args), **plain_values(named))
         except ValidationError as error:
             fields = [*type(self).__pydantic_fields__]
             raise ValueError(f"{type(self).__name__}: {explain(error, fields)}") from None
@@ -33,9 +33,11 @@ def in_sentences(kind: type[T]) -> type[T]:
 
 
 def equal_contents(a: Any, b: Any) -> Any:
-    """Return whether two objects of one class are equal in all fields that count, arrays by shape
-    and entries, in which NaN and masked entries are equal: the ``__eq__`` of classes with arrays.
-    NotImplemented for objects of two classes."""
+    """Compare two objects field by field, as the ``__eq__`` of classes with arrays.
+
+    Arrays are equal if their shapes and entries are. NaN is equal to NaN and to a masked entry.
+    Return NotImplemented for objects of different classes.
+    """
     import numpy as np
 
     def plain(value: Any) -> Any:
@@ -56,30 +58,34 @@ def equal_contents(a: Any, b: Any) -> Any:
 
 @in_sentences
 class FileData(BaseModel):
-    """Content of a file, whose fields cannot be set and whose unknown keys are refused."""
+    """Base of the contents of files: immutable, and without unknown keys."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     __eq__ = equal_contents
 
 
 def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool = False) -> str:
-    """Return pydantic's message on the first problem of an error, with the key and the value.
+    """Return a sentence on the first problem of a validation error, with its key and value.
 
     Parameters
     ----------
     error : ValidationError
-        Error of a model or a function, with at least one problem.
+        Error of a model or of a checked function.
     keys : iterable of str
-        Names of all keys that are known, or of a function's arguments in their order; the nearest
-        is suggested for an unknown key.
+        Known keys, or the arguments of the function in their order. For an unknown key, the
+        sentence suggests the most similar one.
     of_call : bool
-        True for arguments of a function: names within an argument are of types, not keys.
+        True for the arguments of a function. Names inside of an argument are then types, not keys.
+
+    Returns
+    -------
+    str
     """
     problem = error.errors(include_url=False)[0]
     message = problem["msg"].removeprefix("Value error, ")
-    first, *rest = problem["loc"] or [""]
-    key = str(dict[int | str, str](enumerate(keys)).get(first, first))
-    for part in rest:  # such as goals[1][0] or robot.left_links
+    root, *parts = problem["loc"] or [""]
+    key = str(dict[int | str, str](enumerate(keys)).get(root, root))
+    for part in parts:  # such as goals[1][0] or robot.left_links
         if isinstance(part, int):
             key += f"[{part}]"
         elif not of_call:
@@ -88,12 +94,12 @@ def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool =
         case "missing" | "missing_argument" | "missing_keyword_only_argument":
             message = f"{key} is missing"
         case "extra_forbidden" | "unexpected_keyword_argument":
-            message = f"{key} is an unknown key{did_you_mean(str((first, *rest)[-1]), keys)}"
+            message = f"{key} is an unknown key{did_you_mean(str((root, *parts)[-1]), keys)}"
         case kind if key and kind != "sentence":
             message = f"{key} is {brief_value(problem['input'])}: {message}"
     return plain(message)
 
 
 def sentence_error(text: str) -> PydanticCustomError:
-    """Return a validation error whose message is ``text``, without the key."""
+    """Return a validation error whose message is ``text``, without key and value."""
     return PydanticCustomError("sentence", "{text}", {"text": text})

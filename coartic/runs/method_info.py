@@ -1,4 +1,4 @@
-"""MethodInfo: the declaration of a method without its code, and where its code is."""
+"""MethodInfo: what a method declares, and where its code is."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from coartic.method import Method, Outline, outline_of
 from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
-"""Origin of this project's methods."""
+"""Origin of the methods of this project."""
 ALWAYS_IN_IDS = frozenset(
     {
         *("base", "chains", "corrects", "counted", "credit", "direction", "discount", "drift"),
@@ -33,16 +33,16 @@ ALWAYS_IN_IDS = frozenset(
         *("other_arm", "period", "pull", "rounds", "sigma", "starts", "stop", "stored", "trials"),
     }
 )
-"""Names of parameters that count in the id of a run whatever their values. Add none: any other
-parameter counts only if its value is not the default. So a new field of a method, or of an
-exploration condition, changes no id of a run that does not use it."""
+"""Names of parameters that are always a part of the id of a run. Do not add names. Any other
+parameter is a part of the id only if its value is not the default. So a new parameter of a method,
+or a new field of an exploration condition, does not change the ids of existing runs."""
 VERSION = re.compile(r"\d+\.\d+")
-"""Code of a built-in method, versions of model and method, in place of a hash."""
+"""Pattern of the code of a built-in method: versions of model and method."""
 
 
 @dataclass(frozen=True)
 class MethodInfo:
-    """The declaration of a method, its origin, and the place of its code."""
+    """Declaration of a method, with the location of its code."""
 
     name: str
     """Id of the method."""
@@ -57,8 +57,8 @@ class MethodInfo:
     origin: str
     """``built in``, or the path of a method file, as a printable line."""
     code: str
-    """Versions of model and method, such as ``1.2``; for a method file, the hash of what its
-    results come from (:mod:`coartic.benchmarks.method_files`)."""
+    """Versions of model and method, such as ``1.2``. For a method file it is a hash of the code
+    (:mod:`coartic.benchmarks.method_files`)."""
     packages: dict[str, str] = field(default_factory=dict, compare=False)
     """Versions of the installed packages that its method file imports, by name."""
     tuned_on: str = field(default="", compare=False)
@@ -73,59 +73,82 @@ class MethodInfo:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Module or method file, id and, for a method file, code, else an empty text: the arguments
-        of :func:`load_method`."""
+        """Arguments of :func:`load_method`; the code is empty for a built-in method."""
         return self.where, self.name, "" if self.is_ours else self.code
 
     def load(self) -> type[Method]:
-        """Import the method and return its class (:func:`load_method`); a process imports it once
-        for each ``code``, and notices no change of the file."""
+        """Import the method and return its class.
+
+        A process imports it once for each ``code``. It does not notice when the file changes.
+        """
         return load_method(*self.key)
 
     def configure(self, parameters: Mapping[str, Any]) -> Method:
-        """Import the method and return an instance with these parameters, and defaults for all
-        other parameters. Raises ValueError for wrong parameters."""
+        """Import the method and return an instance with parameters.
+
+        Parameters that are not passed have their defaults. Raises ValueError for a wrong parameter.
+        """
         method = self.load()
         return method(method.Parameters(**parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the parameters that identify a run, by name, as plain data: those of
-        :data:`ALWAYS_IN_IDS`, and others that do not have their defaults. Raises CoarticError for a
-        wrong parameter."""
+        """Return the parameters that identify a run, by name, as plain data.
+
+        These are the parameters of :data:`ALWAYS_IN_IDS`, and all that differ from their defaults.
+        Raises CoarticError for a wrong parameter.
+        """
         return dict(self._ask("complete", parameters))
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
-        """Return the reason why the method with parameters (None: defaults) does not apply to a
-        task; None if it applies. Raises CoarticError as :func:`answer`."""
+        """Return why the method with parameters does not apply to a task; None if it applies.
+
+        Parameters that are not passed have their defaults. Raises CoarticError for a wrong
+        parameter, or if the method cannot say whether it applies.
+        """
         reason = self._ask("why_not", parameters or {}, *outline_of(task))
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:
-        """Return a dictionary: ``quick`` has :attr:`.Method.quick`, ``config`` two settings of
-        Pydantic: ``extra`` is ``"forbid"`` if unknown parameters are refused, ``frozen`` is True if
-        parameters cannot be set."""
+        """Return settings of the method that its check needs.
+
+        Returns
+        -------
+        dict
+            - ``quick``: :attr:`.Method.quick`;
+            - ``config``: pydantic's settings of its parameters, ``extra`` (``"forbid"`` if unknown
+              parameters are refused) and ``frozen`` (True if parameters cannot be set).
+        """
         return dict(self._ask("rules"))
 
     def _ask(self, question: str, *arguments: Any) -> Any:
-        """Return the answer of the method, or of the process that has imported its file, to a
-        question of :func:`answer`. Raises CoarticError for wrong parameters or no answer."""
+        """Ask the method, or the process that has imported its file (:func:`answer`)."""
         if self.where in READERS:
             return READERS[self.where](self.name, question, *arguments)
         return answer(self.load(), question, *arguments)
 
 
 READERS: dict[str, Callable[..., Any]] = {}
-"""Functions that ask the process which has imported a method file, by the path of the file; this
-process imports no method file."""
+"""Functions that ask the process which has imported a method file, by the path of the file. This
+process does not import method files."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
-    """Return the result of the function of :class:`MethodInfo` that ``question`` names:
-    ``"complete"``, ``"why_not"`` or ``"rules"``.
+    """Answer a question about a method.
 
-    ``arguments`` are parameters (none for ``"rules"``), then for ``"why_not"`` the entries of an
-    outline. Raises CoarticError for parameters that do not fit, and if the method cannot say
-    whether it applies; other errors that a method's own check of parameters raises pass.
+    Parameters
+    ----------
+    method : type
+        Class of the method.
+    question : {"complete", "why_not", "rules"}
+        Name of the function of :class:`MethodInfo` whose result is returned.
+    *arguments
+        Parameters, except for ``"rules"``; then, for ``"why_not"``, the entries of an outline.
+
+    Raises
+    ------
+    CoarticError
+        A parameter is wrong, or the method cannot say whether it applies. Other errors of the
+        method's own check of parameters are raised as they are.
     """
     if question == "rules":
         config = method.Parameters.model_config
@@ -136,9 +159,10 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         typed = method.Parameters.model_validate(parameters)
     except ValidationError as error:
         names = list(method.Parameters.model_fields)
-        wrong, listed = explain(error, names), ", ".join(names) or "none"
-        text = f"method {method.name!r}: {wrong} (its parameters: {listed})"
-        raise CoarticError(text) from None
+        problem, listed = explain(error, names), ", ".join(names) or "none"
+        raise CoarticError(
+            f"method {method.name!r}: {problem} (its parameters: {listed})"
+        ) from None
     if question == "complete":
         values = json.loads(json.dumps(typed.model_dump(mode="json")))
         return {
@@ -157,8 +181,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
-    """Return the info of a method from its class, its ``origin`` (``built in``, or the path of its
-    file), ``where`` a worker imports it (module or file) and its ``code``."""
+    """Make the MethodInfo of a class; other parameters are its fields of the same names."""
     return MethodInfo(
         name=method.name,
         title=method.title,
@@ -174,8 +197,7 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return the default of each parameter as plain data, by name; None for a parameter without a
-    default."""
+    """Return the defaults of parameters as plain data, by name; None for one without a default."""
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
         for name, field in method.Parameters.model_fields.items()
@@ -184,9 +206,22 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 
 
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
-    """Return the class of the method with id ``name`` from ``where``, a module or the path of a
-    method file, which is imported once for each ``code``, a hash. Raises CoarticError if no method
-    there has this id; an error of the import passes."""
+    """Import a method and return its class.
+
+    Parameters
+    ----------
+    where : str
+        Module, or path of a method file.
+    name : str
+        Id of the method.
+    code : str
+        Hash of the code. A process imports a method file once for each hash.
+
+    Raises
+    ------
+    CoarticError
+        No method has this id. Errors of the import are raised as they are.
+    """
     if where.endswith(".py"):
         methods = methods_in(load_file(Path(where), code)[0])
     else:
@@ -198,8 +233,11 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 
 
 def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Method]]:
-    """Return the classes of methods that a module itself defines: complete classes, or, with
-    ``abstract``, classes that lack a function, such as ``solve``."""
+    """Return the classes of methods that a module defines itself, not those that it imports.
+
+    With ``abstract`` it returns the classes that lack a function, such as ``solve``; otherwise the
+    complete classes.
+    """
     return [
         value
         for value in vars(module).values()
@@ -212,9 +250,11 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 @cache
 def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
-    """Import a method file, once for each ``code``, a hash, and return the module, and the names of
-    the modules that the import has loaded; an error of the file passes. The folder of the file is
-    added to ``sys.path``, for modules from there."""
+    """Import a method file, and return the module and the names of the modules that it loaded.
+
+    A process imports the file once for each ``code``, a hash. The folder of the file is added to
+    ``sys.path``. Errors of the file are raised as they are.
+    """
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))

@@ -1,6 +1,6 @@
 """Cells and jobs: the runs that a suite asks for, with their ids and seeds.
 
-A plan is a list of jobs, one job for each cell.
+A cell is a method with its parameters on a task. A plan is a list of jobs, one for each cell.
 """
 
 from __future__ import annotations
@@ -29,12 +29,11 @@ class Cell:
     parameters: dict[str, Any]
     """Parameters of the method, by name (:meth:`.MethodInfo.complete`)."""
     trial_budget: int | None = None
-    """Most trials of a run, without the search for initial hands; None for any number."""
+    """Most trials of a run, without the search for initial hands; None for no limit."""
 
     @property
     def setting(self) -> str:
-        """Parameters that differ from the defaults, as a text, such as ``noise_sd=0.1``; an empty
-        text for none."""
+        """Parameters that differ from the defaults, such as ``noise_sd=0.1``; empty for none."""
         defaults = self.method.defaults
         return in_words(
             {
@@ -51,8 +50,7 @@ class Cell:
 
     @cached_property
     def id(self) -> str:
-        """Id of the cell: 16 hex digits of :attr:`digest`, a hyphen, and the version or code of the
-        method."""
+        """Id of the cell: 16 hex digits of :attr:`digest`, ``-``, version or code of the method."""
         return f"{self.digest[:16]}-{self.method.code}"
 
     @cached_property
@@ -62,14 +60,15 @@ class Cell:
 
     @cached_property
     def digest(self) -> str:
-        """Hash, 64 hex digits, of task, method, parameters, model and trial budget; not of the
-        method's code, nor of a time limit."""
+        """Hash of task, method, parameters, model and trial budget, 64 hex digits.
+
+        The code of the method and the time limit do not count.
+        """
         return hash_of(self.content | {"method": self.method.name})
 
     @property
     def content(self) -> dict[str, Any]:
-        """The cell as plain data, with the motion model, and without fields of its method that are
-        not stored."""
+        """The cell as plain data, as it is stored, with the motion model."""
         return {
             "task": self.definition,
             "method": asdict(replace(self.method, tuned_on="", where="")),
@@ -87,21 +86,23 @@ class Job:
     seed: int
     """Seed of the suite."""
     numbers: Sequence[int]
-    """Numbers of the runs, from 0 within the cell; in a plan a range. A job of runs 50 to 99 is
-    stored in the plan of a results folder as the job of runs 0 to 99."""
+    """Numbers of the runs, from 0 in each cell. In a plan they are a range. The plan of a results
+    folder stores a job of runs 50 to 99 as a job of runs 0 to 99."""
     time_limit_s: float | None = None
-    """Most CPU time of all these runs together, s; None if no limit is set."""
+    """Most CPU time of all runs of the job, s; None for no limit."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
     suite_trials: int | None = None
-    """Trials of a run by the suite's file, where the command asks for a number of its own; else
-    None."""
+    """Trials of a run in the suite's file, if the command asks for another number; else None."""
     question: tuple[str, str] | None = None
-    """Title and description of a suite of the user's own, run on its own tasks; or None."""
+    """Title and description of a suite of the user's own on its own tasks; otherwise None."""
 
     def run_id(self, number: int) -> str:
-        """Return the id of a run: 16 hex digits of a hash of cell, seed and number, a hyphen, and
-        the version or code of the method (:attr:`MethodInfo.code`)."""
+        """Return the id of a run.
+
+        It is 16 hex digits of a hash of cell, seed and number, a hyphen, and the version or code of
+        the method.
+        """
         text = f"{self.cell.digest} {self.seed} {number}"
         digits = hashlib.sha256(text.encode()).hexdigest()[:16]
         return f"{digits}-{self.cell.method.code}"
@@ -118,10 +119,27 @@ def cell_of(
     trials: int | None = None,
     trial_budget: int | None = None,
 ) -> Cell:
-    """Return the cell of a method on a task, with these parameters and defaults for all others.
+    """Return the cell of a method on a task.
 
-    ``trials`` becomes the default number of trials if the method has parameter ``trials``; a number
-    in ``parameters`` goes before it. Raises CoarticError for parameters that the method refuses.
+    Parameters
+    ----------
+    task : Task
+    method : MethodInfo
+    parameters : mapping
+        Parameters of the method, by name. Other parameters have their defaults.
+    trials : int, optional
+        Default of parameter ``trials``, for methods that have it.
+    trial_budget : int, optional
+        Most trials of a run.
+
+    Returns
+    -------
+    Cell
+
+    Raises
+    ------
+    CoarticError
+        The method does not accept the parameters.
     """
     if trials is not None and "trials" in method.defaults:
         method = replace(method, defaults=method.defaults | {"trials": trials})
@@ -130,37 +148,40 @@ def cell_of(
 
 
 def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
-    """Return tasks by name; equal tasks count once. Raises CoarticError for two different tasks of
-    one name."""
+    """Return tasks by name. Raises CoarticError if two different tasks have the same name."""
     named = dict[str, Task]()
     for task in tasks:
         if named.setdefault(task.name, task) != task:
-            raise CoarticError(f"two tasks are called {task.name!r}: give one of them another name")
+            raise CoarticError(
+                f"two tasks have the name {task.name!r}: give one of them another name"
+            )
     return named
 
 
 def run_seed(suite_seed: int, task: str, number: int) -> int:
-    """Return the seed of a run, from the suite's seed, the task's name and the run's number alone:
-    the same for all methods, so that runs are paired."""
+    """Return the seed of a run.
+
+    It depends only on the suite's seed, the task's name and the run's number. It does not depend on
+    the method, so that the runs of two methods are paired.
+    """
     words = np.frombuffer(hashlib.sha256(task.encode()).digest()[:16], dtype="<u4")
     sequence = np.random.SeedSequence(suite_seed, spawn_key=(*map(int, words), number))
     return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
 def hash_of(content: Any) -> str:
-    """Return the SHA-256 of plain data, of its JSON with sorted keys, as hex digits."""
+    """Return the SHA-256 of plain data as hex digits, computed from its JSON with sorted keys."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def in_words(parameters: Mapping[str, Any]) -> str:
-    """Return parameters as a text, such as ``noise_sd=0.1, trials=100``; empty for none."""
+    """Return parameters as a string, such as ``noise_sd=0.1, trials=100``; empty for none."""
     return ", ".join(f"{name}={value}" for name, value in parameters.items())
 
 
 def trials_in(parameters: Mapping[str, Any]) -> int:
-    """Return the value of a method's parameter ``trials``, trials of a run; 0 if there is no such
-    parameter or its value is not an int above 0 (a float, a bool, a NumPy integer)."""
+    """Return the value of parameter ``trials``; 0 if it is missing or is not an ``int`` above 0."""
     trials = parameters.get("trials")
     return trials if type(trials) is int and trials > 0 else 0
 

@@ -1,4 +1,4 @@
-"""The record of a run: its job, outcome and scores, and the columns under which it is stored."""
+"""The record of a run: its job, outcome and scores, and the columns in which it is stored."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from coartic.tasks.task import Task
 Status = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
 """Status of a run."""
 PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
-"""Prefixes of columns by the part of a run that the columns score: ``solution``, ``initial`` (the
-first trial of a learner) and ``replay`` (one noiseless greedy trial after learning)."""
+"""Prefixes of columns by part of a run. The parts are ``solution``, ``initial`` (the first trial of
+a learner) and ``replay`` (a greedy trial without noise after learning)."""
 PARTS = tuple(PREFIXES)
 MOTOR_NOISE = 0.01
 """Standard deviation of the motor noise with which each solution is executed when it is scored, rad
@@ -38,29 +38,28 @@ and length unit (:func:`coartic.execute_noisy`)."""
 NOISY_EXECUTIONS = 100
 """Number of these executions."""
 UNREPEATED = "made_again"
-"""Entry of the details of a run that was made again with another result: what differs."""
+"""Key of the details of a run for the difference that was found when the run was made again."""
 _MOST_MOVEMENTS = 10_000
 """Most movements of a solution."""
 _MOST_NUMBERS = 400_000
-"""Most numbers in the start, targets and waypoints of a solution."""
+"""Most numbers in the start, the targets and the waypoints of a solution."""
 MOST_STEPS = 1_000_000
-"""Most movement steps of a solution from the start straight through its targets and waypoints."""
+"""Most movement steps on the straight path from the start through all targets and waypoints."""
 
 
 class Score(NamedTuple):
-    """Score of a part of a run (solution, initial or replay), from its execution; None where
-    blank."""
+    """Score of a part of a run (solution, initial or replay); None for missing values."""
 
     reward: int | None = None
-    """Total reward, minus the ticks."""
+    """Total reward: the negative number of ticks."""
     hands: str | None = None
     """Hand of each goal, such as ``LRLR``."""
     movements: tuple[Movement, ...] = ()
-    """Movements as executed, with their ticks."""
+    """Executed movements, with their ticks."""
     corrections: int | None = None
-    """Corrective movements that a solution needed."""
+    """Number of corrective movements; only for a solution."""
     other_arm_travel: float | None = None
-    """Joint travel of the arm that a solution does not choose, rad."""
+    """Joint travel of arms during movements of the other hand, rad; only for a solution."""
     noisy_ticks: float | None = None
     """Mean ticks of a solution over :data:`NOISY_EXECUTIONS` executions with motor noise of
     standard deviation :data:`MOTOR_NOISE`; None if one of them fails."""
@@ -68,7 +67,7 @@ class Score(NamedTuple):
 
 @dataclass(frozen=True)
 class Times:
-    """Time and memory of a run. Runs of one job share the time of the job evenly."""
+    """Time and memory of a run. The runs of a job share its time equally."""
 
     wall_s: float | None = None
     """Wall time, s; None if unknown."""
@@ -77,33 +76,33 @@ class Times:
     warm: bool | None = None
     """True if the process had run the method before; None if unknown."""
     together: int = 1
-    """Number of runs of the job."""
+    """Number of runs of the job, which were made side by side."""
     process_peak_mb: float | None = None
-    """Most memory of the worker so far, MiB, with all its earlier runs; None if unknown."""
+    """Most memory of the worker so far, also in earlier runs, MiB; None if unknown."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a run, without scores."""
+    """Result of a run, before it is scored."""
 
     status: Status
     """``ok``, ``infeasible``, ``solver-failed``, ``timeout`` or ``crashed``."""
     reason: str = ""
-    """The reason why the run is not ok; empty if the run is ok."""
+    """Why the run is not ok; empty if it is ok."""
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
-    """Movements by part (``solution``, ``initial``, ``replay``), not yet executed and scored."""
+    """Movements by part (``solution``, ``initial``, ``replay``), not yet executed."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Further data that the method or the process keeps, by name."""
+    """Further data from the method or the process, by name."""
     used: tuple[str, ...] = ()
     """Declared information that the method used."""
     meter: Meter | None = None
-    """Counts of trials, of evaluations and of movements; None if the worker gave no answer."""
+    """Counts of trials, evaluations and movements; None if the worker gave no answer."""
     rewards: list[Annotated[int, Field(gt=-(2**31), lt=2**31)] | None] = field(default_factory=list)
-    """Reward of each trial; None if the trial failed or its reward is not kept."""
+    """Reward of each trial; None if the trial failed or its reward is not stored."""
     times: Times = Times()
     environment: dict[str, Any] | None = None
-    """Versions, platform, processor, variables, arithmetic and commit, by name, or only the entries
-    that differ from the environment of the process that scores the run."""
+    """Versions, platform, processor, variables, arithmetic and commit, by name. Entries may be left
+    out if they are those of the process that scores the run."""
 
 
 @dataclass(frozen=True)
@@ -111,9 +110,9 @@ class Run:
     """A run: its job, its outcome and the scores of its parts."""
 
     job: Job
-    """A job of this run alone."""
+    """A job with only this run."""
     outcome: Outcome
-    """The outcome, without ``parts``: the scores have their movements."""
+    """The outcome. Its ``parts`` are empty, because the scores have the movements."""
     scores: dict[str, Score]
     """Scores by part (``solution``, ``initial``, ``replay``); empty if the run is not ok."""
     date: str
@@ -121,12 +120,12 @@ class Run:
 
     @property
     def cell(self) -> Cell:
-        """Task, method and parameters of the run (:class:`Cell`)."""
+        """Task, method and parameters of the run."""
         return self.job.cell
 
     @property
     def number(self) -> int:
-        """Number of the run, from 0 within its cell."""
+        """Number of the run, from 0 in its cell."""
         return self.job.numbers[0]
 
     @cached_property
@@ -141,86 +140,106 @@ class Run:
 
     @property
     def solution(self) -> Score:
-        """Score of the solution; a blank score if the run is not ok."""
+        """Score of the solution; its values are None if the run is not ok."""
         return self.scores.get("solution", Score())
 
     @property
     def initial(self) -> Score:
-        """Score of a learner's first trial; blank if the trial or the run failed, or for other
-        methods."""
+        """Score of a learner's first trial.
+
+        Its values are None for other methods, or if the trial or the run failed.
+        """
         return self.scores.get("initial", Score())
 
     @property
     def replay(self) -> Score:
-        """Score of a learner's greedy trial after learning; blank if the trial or the run failed,
-        or for other methods."""
+        """Score of a learner's greedy trial after learning.
+
+        Its values are None for other methods, or if the trial or the run failed.
+        """
         return self.scores.get("replay", Score())
 
     @property
     def counts(self) -> Any:
-        """Counts of the run, by the names of :class:`~coartic.method.Meter`, each None if the
-        worker gave no answer."""
+        """Counts of the run, as attributes of :class:`~coartic.method.Meter`.
+
+        They are None if the worker gave no answer.
+        """
         return self.outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter())))
 
     @property
     def best_trial(self) -> int | None:
-        """The first trial with the reward of the solution, from 0; None if no trial has it."""
+        """Number of the first trial with the reward of the solution, from 0; None if there is
+        none."""
         reward, rewards = self.solution.reward, self.outcome.rewards
         return None if reward is None or reward not in rewards else rewards.index(reward)
 
     @property
     def early_corrections(self) -> int | None:
-        """Corrective movements in the first tenth of a learner's trials after trial 0; None if they
-        were not counted."""
+        """Corrective movements in the first tenth of a learner's trials after trial 0.
+
+        It is None if they were not counted.
+        """
         return self._corrections(1)
 
     @property
     def late_corrections(self) -> int | None:
-        """Corrective movements in the last tenth of a learner's trials after trial 0; None if they
-        were not counted."""
+        """Corrective movements in the last tenth of a learner's trials after trial 0.
+
+        It is None if they were not counted.
+        """
         return self._corrections(-1)
 
-    def _corrections(self, place: int) -> int | None:
-        """Return the corrective movements of a learner in tenth ``place``, from 1 (-1: the last),
-        of its trials after trial 0; None unless the details have a list of 11 counts."""
+    def _corrections(self, tenth: int) -> int | None:
+        """Return the corrective movements in a tenth of a learner's trials, from 1 (-1: the
+        last)."""
         counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
         if not isinstance(counts, list) or len(counts) != 11:
             return None
         are_counts = all(type(count) is int and 0 <= count <= MOST_COUNT for count in counts)
-        return counts[place] if are_counts else None
+        return counts[tenth] if are_counts else None
 
     @property
     def is_downsampled(self) -> bool:
-        """True if rewards of some trials that did not fail are not kept: None in their place."""
+        """True if rewards of some successful trials are not stored."""
         meter = self.outcome.meter
         return meter is not None and self.outcome.rewards.count(None) > meter.failed_trials
 
     def downsample(self) -> Run:
-        """Return a copy of the run with the rewards of its best trial and of each trial that was
-        better than all earlier trials, and None as the reward of other trials."""
-        best, solved, kept = -math.inf, self.best_trial, list[int | None]()
+        """Return a copy of the run with fewer rewards.
+
+        It has the rewards of the best trial and of each trial that was better than all earlier
+        ones. Other rewards are None.
+        """
+        best, solved, rewards = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
             better = reward is not None and reward > best
-            kept.append(reward if better or trial == solved else None)
+            rewards.append(reward if better or trial == solved else None)
             best = max(best, -math.inf if reward is None else reward)
-        return replace(self, outcome=replace(self.outcome, rewards=kept))
+        return replace(self, outcome=replace(self.outcome, rewards=rewards))
 
     @cached_property
     def result(self) -> str:
-        """Hash, 16 hex digits, of status, movements with their ticks and configurations, and the
-        rewards that are kept; not of times and counts."""
-        movements = [[part, *each] for part in PARTS for each in self.movement_data(part)]
+        """Hash of status, movements and stored rewards, 16 hex digits.
+
+        Movements count with their ticks and configurations. Times and counts do not count.
+        """
+        movements = [[part, *data] for part in PARTS for data in self.movement_data(part)]
         content = json.dumps([self.outcome.status, *movements]).encode()
         return hashlib.sha256(content + reward_bytes(self.outcome.rewards)).hexdigest()[:16]
 
     def movement_data(self, part: str) -> list[list[Any]]:
-        """Return the movements of a part (``solution``, ``initial`` or ``replay``), each as a list
-        for JSON (:func:`movement_data`); an empty list if the run lacks the part."""
-        return [movement_data(each) for each in self.scores.get(part, Score()).movements]
+        """Return the movements of a part as lists for JSON (:func:`movement_data`).
+
+        The list is empty if the run does not have the part.
+        """
+        return [movement_data(movement) for movement in self.scores.get(part, Score()).movements]
 
     def to_row(self) -> dict[str, Any]:
-        """Return the columns of the run in table ``results`` by name, without the ids of rows that
-        the store adds: ``id``, ``cell`` and ``environment``."""
+        """Return the columns of the run in table ``results``, by name.
+
+        The store adds the others: ``cell``, ``environment``, ``movements`` and ``rewards``.
+        """
         row = {name: attrgetter(source)(self) for name, _, source, _ in COLUMNS if source}
         details = json.dumps(self.outcome.details)
         used = ", ".join(self.outcome.used)
@@ -298,46 +317,55 @@ COLUMNS = (
      "versions of model and method, such as `1.2`; of a method file a hash of its code"),
     ("packages", "TEXT", "", "hash of the versions of Python and of libraries"),
 )  # fmt: skip
-"""Columns of view ``runs``, which has a row for each stored run of the plan; SQL, data frames and
-documentation follow from them. Each has its name; its type in SQL, with ``NOT NULL`` if table
-``results`` has a value for every run; the attribute of :class:`Run` that table ``results`` stores,
-empty for a column of another table; and a phrase of the documentation."""
+"""Columns of view ``runs``, which has a row for each stored run of the plan. SQL, data frames and
+documentation are made from them. A column has
+
+- its name;
+- its type in SQL, with ``NOT NULL`` if all runs have a value in table ``results``;
+- the attribute of :class:`Run` that table ``results`` stores; empty for a column of another table;
+- a phrase for the documentation."""
 
 
 def movement_data(movement: Movement) -> list[Any]:
-    """Return a movement as a list of goal, hand, kind, ticks and path: the form in which workers
-    send, hashes count and folders store movements.
+    """Return a movement as a list of goal, hand, kind, ticks and path.
 
-    The path is JSON: the target, or the waypoints of a movement of kind ``path``, without the sign
-    of -0.0; None stands for missing ticks and a missing target. Raises an error, such as TypeError
-    or ValueError, for a movement that has no such form.
+    Workers send movements in this form, hashes are computed from it, and folders store it. The path
+    is JSON: the target, or the waypoints of a movement of kind ``path``. -0.0 becomes 0.0. Missing
+    ticks and a missing target are None. Raises an error, such as TypeError or ValueError, for a
+    movement that cannot be converted.
     """
-    m, place = movement, movement.target
+    m, path = movement, movement.target
     if m.waypoints is not None:
-        if m.kind != "path" or not (place is None or np.array_equal(place, m.waypoints[-1])):
-            raise ValueError("only a path has waypoints, and its target is the last of them")
-        place = m.waypoints
-    numbers = None if place is None else (real_array("a path", place) + 0.0).tolist()
+        if m.kind != "path" or not (path is None or np.array_equal(path, m.waypoints[-1])):
+            raise ValueError(
+                "only a movement of kind path can have waypoints, and its target must be the last "
+                "of them"
+            )
+        path = m.waypoints
+    numbers = None if path is None else (real_array("a path", path) + 0.0).tolist()
     text = None if numbers is None else json.dumps(numbers, separators=(",", ":"))
     return [int(m.goal), str(m.hand), str(m.kind), m.ticks and int(m.ticks), text]
 
 
 def movement_from(data: Sequence[Any]) -> Movement:
-    """Return a movement from the list that :func:`movement_data` returns. Other data may raise
-    TypeError, ValueError or IndexError."""
+    """Return a movement from the list of :func:`movement_data`.
+
+    Wrong data may raise TypeError, ValueError or IndexError.
+    """
     goal, hand, kind, ticks, text = data
-    place = None if text is None else real_array("a path", json.loads(text))
-    if kind == "path" and place is not None:
-        return Movement(goal, hand, kind, place[-1], ticks, place)
-    return Movement(goal, hand, kind, place, ticks)
+    path = None if text is None else real_array("a path", json.loads(text))
+    if kind == "path" and path is not None:
+        return Movement(goal, hand, kind, path[-1], ticks, path)
+    return Movement(goal, hand, kind, path, ticks)
 
 
 def reward_bytes(rewards: Sequence[int | None]) -> bytes:
-    """Return the rewards of trials as bytes, four a number; the caller packs them.
+    """Encode the rewards of trials as bytes, which the caller compresses.
 
-    The first number is the best reward, signed (0 without any reward). Then each trial has the
-    number of ticks by which it is worse, plus 1, or 0 if its reward is None. All lowest bytes of
-    the numbers come first, then all next bytes: so they pack best.
+    The numbers have four bytes. The first number is the best reward, signed (0 if there is none).
+    The number of each trial is 1 plus the ticks by which its reward is lower, or 0 if its reward is
+    None. The lowest bytes of all numbers come first, then the next bytes, because they compress
+    better in this order.
     """
     values = np.array(rewards, np.float64)  # None becomes NaN
     best = 0.0 if np.isnan(values).all() else np.nanmax(values)
@@ -346,10 +374,20 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 
 
 def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
-    """Execute solutions of a task, whose targets and waypoints are arrays of floats, under the
-    paper's model. Return a list with the execution of each solution, in order; in its place the
-    error, not raised, of a solution that breaks the rules of the task or is too long
-    (:func:`too_long`)."""
+    """Execute solutions of a task under the paper's model.
+
+    Parameters
+    ----------
+    task : Task
+    solutions : sequence of sequence of Movement
+        Solutions, whose targets and waypoints are arrays of floats.
+
+    Returns
+    -------
+    list of Execution or Exception
+        Execution of each solution, in order. For a solution that breaks the rules of the task or is
+        too long (:func:`too_long`) it is the error, which is not raised.
+    """
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
     executions = iter(execute_many(compiled_task(task, PAPER), short))
@@ -357,24 +395,32 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
 
 
 def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
-    """Return the error of a solution with more than 10,000 movements, with more numbers (in the
-    start, waypoints and targets) than :data:`_MOST_NUMBERS`, or, if all configurations have the
-    shape of the start, with more steps from the start through them than :data:`MOST_STEPS`; None
-    for any other solution. Targets and waypoints are arrays."""
+    """Return the error of a solution that is too long; None for any other solution.
+
+    A solution is too long if it has
+
+    - more than 10,000 movements;
+    - more than 400,000 numbers in the start, the targets and the waypoints;
+    - more than 1,000,000 steps on the straight path through them.
+    """
     if len(solution) > _MOST_MOVEMENTS:
-        return SolutionError(f"{len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed")
+        return SolutionError(
+            f"the solution has {len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed"
+        )
     corners = [task.q0]
     for movement in solution:
         corners += [] if movement.waypoints is None else list(movement.waypoints)
         corners += [] if movement.target is None else [movement.target]
     if (count := sum(map(np.size, corners))) > _MOST_NUMBERS:
-        return SolutionError(f"its paths have {count} numbers; at most {_MOST_NUMBERS} are allowed")
+        return SolutionError(
+            f"the solution has {count} numbers in its paths; at most {_MOST_NUMBERS} are allowed"
+        )
     shapes = {np.shape(corner) for corner in corners}
-    if len(shapes) == 1:  # otherwise the solution breaks the rules
+    if len(shapes) == 1:  # a solution with other shapes breaks the rules of the task
         with np.errstate(over="ignore"):
             steps = segment_lengths(corners).sum() / PAPER.step
         if steps > MOST_STEPS:
             return SolutionError(
-                f"its path has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
+                f"the path of the solution has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
             )
     return None

@@ -1,5 +1,8 @@
-"""Open the shipped results: ``benchmarks/shipped/SUITE.sqlite.xz``, each the file of a results
-folder, which ``docs/scripts/pack_shipped.py`` has packed."""
+"""Open the shipped results.
+
+``benchmarks/shipped/SUITE.sqlite.xz`` is the compressed file of a results folder. Script
+``docs/scripts/pack_shipped.py`` writes it.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +16,18 @@ from coartic.errors import CoarticError
 from coartic.runs.store import Store, open_content, open_store
 
 SHIPPED = "shipped"
-"""Name of the shipped results, in place of a folder."""
+"""Name that stands for the shipped results in place of a folder."""
 SHIPPED_FOLDER = Path(coartic.__file__).parent / "benchmarks" / "shipped"
 HASHES = "SHA256SUMS"
 PACKED = ".sqlite.xz"
 
 
 def open_shipped(suite: str) -> AbstractContextManager[Store]:
-    """Open the shipped results of a suite, unpacked in memory. Raises CoarticError if the suite has
-    no shipped results, or if their file was changed or cannot be read."""
+    """Open the shipped results of a suite in memory.
+
+    Raises CoarticError if no results of the suite are shipped, or if their file was changed or
+    cannot be read.
+    """
     path = SHIPPED_FOLDER / f"{suite}{PACKED}"
     try:
         hashes = shipped_hashes()
@@ -29,20 +35,22 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
     except (OSError, ValueError) as error:
         raise CoarticError(f"{path} cannot be read: install coartic again ({error})") from None
     if suite not in hashes:
-        raise CoarticError(f"no results of suite {suite!r} are shipped, but of {', '.join(hashes)}")
+        raise CoarticError(
+            f"no results of suite {suite!r} are shipped; those of {', '.join(hashes)} are"
+        )
     if hashlib.sha256(content).hexdigest() != hashes[suite]:
-        raise CoarticError(f"{path} is not as it was shipped: install coartic again")
+        raise CoarticError(f"{path} was changed after it was shipped: install coartic again")
     return open_content(lzma.decompress(content), SHIPPED)
 
 
 def open_results(folder: Path) -> AbstractContextManager[Store]:
-    """Open a results folder for reading (:func:`open_store`), or, by the name ``shipped``, the
-    shipped results of suite ``comparison`` (:func:`open_shipped`)."""
+    """Open a results folder for reading; ``shipped`` opens the shipped results of the
+    comparison."""
     return open_shipped("comparison") if str(folder) == SHIPPED else open_store(folder)
 
 
 def shipped_hashes() -> dict[str, str]:
-    """Return, by suite, the SHA-256 of its packed file, as ``SHA256SUMS`` lists it."""
+    """Return the SHA-256 of the compressed files by suite, from file ``SHA256SUMS``."""
     lines = (SHIPPED_FOLDER / HASHES).read_text(encoding="ascii").splitlines()
     pairs = (line.split() for line in lines)
     return {name.removesuffix(PACKED): digits for digits, name in pairs}

@@ -1,10 +1,12 @@
-"""The runs of a results folder: one SQLite file, ``runs.sqlite``.
+"""The runs of a results folder, in the SQLite file ``runs.sqlite``.
 
-Table ``cells`` has a row for each cell that was ever asked for; ``position`` and ``runs`` are set
-in the cells that the last ``coartic run`` asked for, its plan. Table ``results`` has a row for each
-run, with its movements and the rewards of its trials. The views ``runs`` and ``solutions`` show the
-runs of the plan; docs/results.md lists their columns. One process writes, a batch of finished runs
-at a time; whatever interrupts it, a batch is there whole or not at all.
+Table ``cells`` has a row for each cell that a command has asked for. Its columns ``position`` and
+``runs`` are set only for the cells of the last ``coartic run``, which are the plan of the folder.
+Table ``results`` has a row for each run, with its movements and the rewards of its trials. The
+views ``runs`` and ``solutions`` show the runs of the plan; docs/results.md lists their columns.
+
+Only one process writes at a time. It writes finished runs in batches. After any interruption a
+batch is stored completely or not at all.
 """
 
 from __future__ import annotations
@@ -52,7 +54,7 @@ if TYPE_CHECKING:
 
 RUNS_FILE = "runs.sqlite"
 FORMAT = 7
-"""Number of the format: a change of a table or of a view raises it."""
+"""Number of the format. A change of a table or a view must increase it."""
 _APPLICATION = 0x636F6172  # "coar"
 
 _KINDS = {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64", "BOOLEAN": "boolean"}
@@ -61,7 +63,7 @@ _DTYPES: dict[str, Any] = {
     **dict.fromkeys(("order", "goal", "ticks"), "Int64"),
     **{name: _KINDS[kind.split()[0]] for name, kind, *_ in COLUMNS},
 }
-"""Types of the columns of views in data frames; all have room for missing values."""
+"""Types of the columns of views in data frames; all allow missing values."""
 _CELL = TypeAdapter(Cell)
 _STORED = ", ".join(f"{name} {kind}" for name, kind, source, _ in COLUMNS if source)
 _IN_VIEW = ", ".join(f'"{name}"' for name, *_ in COLUMNS)
@@ -69,8 +71,8 @@ _SOLUTIONS = """SELECT run_id, key AS "order", json_extract(value, '$[0]') AS go
     json_extract(value, '$[1]') AS hand, json_extract(value, '$[2]') AS kind,
     json_extract(value, '$[3]') AS ticks, json_extract(value, '$[4]') AS path
     FROM asked, json_each(movements, '$.solution') ORDER BY position, run, key"""
-"""Query of view ``solutions``. The view is for people: without trust in the schema of a file, some
-versions of SQLite call no function of JSON in a view."""
+"""Query of view ``solutions``. The code uses the query instead of the view, because some versions
+of SQLite do not call functions of JSON in a view of a file whose schema is not trusted."""
 _SCHEMA = f"""BEGIN;
 CREATE TABLE suite (name TEXT NOT NULL, seed INTEGER NOT NULL, content TEXT NOT NULL);
 CREATE TABLE cells (id TEXT PRIMARY KEY, position INTEGER, runs INTEGER, digest TEXT NOT NULL,
@@ -92,8 +94,8 @@ CREATE VIEW solutions AS {_SOLUTIONS};
 PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"""
 """Statements that make the tables and views."""
 
-WAIT_S = 5.0  # wait for another program before the user is told
-_ROWS_AT_ONCE = 5_000  # of a frame, as objects
+WAIT_S = 5.0  # wait for another program before a warning
+_ROWS_AT_ONCE = 5_000  # rows of a data frame that are Python objects at the same time
 
 
 class Store:
@@ -102,14 +104,14 @@ class Store:
     def __init__(
         self, folder: Path, connection: sqlite3.Connection, content: bytes | None = None
     ) -> None:
-        """Use an open ``connection``; ``content`` is that of a file which is only in memory."""
+        """Use an open connection; ``content`` is the content of a file that is only in memory."""
         self.folder = folder
         self._db, self._content = connection, content
 
     # The plan.
 
     def replace_plan(self, plan: Sequence[Job], made_with: Mapping[str, Any]) -> None:
-        """Store a plan in place of the earlier plan, whose runs stay in the file.
+        """Replace the plan of the folder. Runs of the earlier plan stay in the file.
 
         Parameters
         ----------
@@ -121,7 +123,7 @@ class Store:
         Raises
         ------
         CoarticError
-            The folder holds another suite, or cannot be written.
+            The folder has results of another suite, or cannot be written.
         """
         first = plan[0]
         content = dict(made_with) | {"time_limit_s": first.time_limit_s}
@@ -131,7 +133,7 @@ class Store:
             for (name,) in self._rows("SELECT name FROM suite"):
                 if name != first.suite:
                     raise CoarticError(
-                        f"{self.folder} holds results of suite {name!r}: name another folder for "
+                        f"{self.folder} has results of suite {name!r}: choose another folder for "
                         f"suite {first.suite!r}"
                     )
             self._db.execute("DELETE FROM suite")
@@ -142,10 +144,10 @@ class Store:
                 self._insert("cells", **row)
 
     def plan(self) -> list[Job]:
-        """Return the plan of the folder, a list of the jobs of the last suite.
+        """Return the plan of the folder.
 
-        The jobs have no ``question``, and ``where`` of their methods is empty. Raises CoarticError
-        if no plan is stored yet.
+        ``question`` of the jobs is None, and ``where`` of their methods is empty. Raises
+        CoarticError if no plan is stored yet.
         """
         made_with = self.made_with()
         limits = made_with.get("time_limit_s"), made_with.get("suite_trials")
@@ -162,7 +164,9 @@ class Store:
 
     def made_with(self) -> dict[str, Any]:
         """Return versions, platform, commit, ``command`` and ``date`` of the last ``coartic run``.
-        Raises CoarticError if no plan is stored yet."""
+
+        Raises CoarticError if no plan is stored yet.
+        """
         if not (rows := self._rows("SELECT content FROM suite")):
             raise CoarticError(f"{self.folder} is not finished: {_RESUME}")
         with explain_errors(self.folder):
@@ -170,9 +174,11 @@ class Store:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """Write all changes of the block of this context, or none if the block fails. A block
-        within another block is a part of the outer block. Raises CoarticError for an error of
-        SQLite, such as a full disk."""
+        """Write all changes of the block, or none if the block fails.
+
+        A block within another block is a part of the outer block. Raises CoarticError for an error
+        of SQLite, such as a full disk.
+        """
         if self._db.in_transaction:
             yield
             return
@@ -189,13 +195,21 @@ class Store:
     # Ids and counts of runs.
 
     def present(self) -> list[tuple[int, int, str, float | None]]:
-        """Return the runs of the plan that the folder has: for each run the position of its job in
-        the plan, from 0, its number, its status and its time limit in s, None for no limit."""
+        """Return the runs of the plan that the folder has.
+
+        Returns
+        -------
+        list of tuple
+            For each run: the position of its job in the plan, from 0; its number; its status; its
+            limit of CPU time, s, or None for no limit.
+        """
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
     def stale(self) -> Counter[tuple[str, str, str]]:
-        """Return the number of runs of the plan that the folder has from another version or code of
-        their method, by a triple: id of the method, other version, and version in the plan."""
+        """Return numbers of runs of the plan that another version or code of their method made.
+
+        The keys are triples: id of the method, that version, and the version in the plan.
+        """
         query = """SELECT now.method, old.code, now.code, count(*) FROM suite
             JOIN cells AS now ON now.runs IS NOT NULL
             JOIN cells AS old ON old.digest = now.digest AND old.runs IS NULL
@@ -204,36 +218,55 @@ class Store:
         return Counter({(name, old, now): count for name, old, now, count in self._rows(query)})
 
     def marks(self) -> dict[str, list[str]]:
-        """Return, by id of a method, warnings about its runs of the plan, in sentences: that a run
-        gave another result when it was made again, and that packages which its file imports had
-        other versions."""
-        found = defaultdict[str, list[str]](list)
+        """Return warnings about the runs of the plan, as sentences by id of the method.
+
+        The warnings are that
+
+        - a run had another result when it was made again;
+        - runs were made with other versions of packages that the method's file imports.
+        """
+        warnings_by_method = defaultdict[str, list[str]](list)
         query = f"""SELECT DISTINCT method, task FROM asked
             WHERE json_extract(details, '$.{UNREPEATED}') IS NOT NULL ORDER BY method, task"""
         for method, rows in groupby(self._rows(query), itemgetter(0)):
             tasks = ", ".join(task for _, task in rows)
-            found[method].append(f"{method}: another result when a run was made again ({tasks})")
+            warnings_by_method[method].append(
+                f"{method}: another result when a run was made again ({tasks})"
+            )
         for method, made, last in self._packages():
-            older = ", ".join(f"{name} {made[name]}" for name in made if made[name] != last[name])
-            if older:
-                newer = ", ".join(
-                    f"{name} {last[name]}" for name in made if made[name] != last[name]
+            changed = [name for name in made if made[name] != last[name]]
+            if changed:
+                old_versions = ", ".join(f"{name} {made[name]}" for name in changed)
+                new_versions = ", ".join(f"{name} {last[name]}" for name in changed)
+                warnings_by_method[method].append(
+                    f"{method}: runs were made with {old_versions}; now it has {new_versions}"
                 )
-                found[method].append(f"{method}: runs were made with {older}; now it has {newer}")
-        return dict(found)
+        return dict(warnings_by_method)
 
     def imports(self) -> dict[str, list[str]]:
-        """Return, by id of a method from a file, the packages that its file imports, over all runs
-        of the plan, each as a name with a version."""
-        found = defaultdict[str, dict[str, None]](dict)
+        """Return the packages that the files of methods import, by id of the method.
+
+        They are names with versions, over all runs of the plan.
+        """
+        by_method = defaultdict[str, dict[str, None]](dict)
         for method, made, _ in self._packages():
-            found[method] |= dict.fromkeys(f"{name} {version}" for name, version in made.items())
-        return {method: sorted(packages) for method, packages in found.items() if packages}
+            by_method[method] |= dict.fromkeys(
+                f"{name} {version}" for name, version in made.items()
+            )
+        return {method: sorted(packages) for method, packages in by_method.items() if packages}
 
     def _packages(self) -> Iterator[tuple[str, dict[str, str], dict[str, str]]]:
-        """Yield, for each method from a file and each environment of its runs, the id of the method
-        and the versions of the packages that its file imports: as the runs were made, and as the
-        last ``coartic run`` had them."""
+        """Yield the packages that a method's file imports, for each environment of its runs.
+
+        Yields
+        ------
+        str
+            Id of the method.
+        dict
+            Versions with which the runs were made, by name of the package.
+        dict
+            Versions that the last ``coartic run`` had.
+        """
         query = """SELECT DISTINCT asked.method, json_extract(environments.content, '$.imports'),
             json_extract(cells.content, '$.method.packages') FROM asked
             JOIN cells ON cells.id = asked.cell JOIN environments ON environments.id = environment
@@ -244,25 +277,28 @@ class Store:
             yield method, *versions
 
     def others(self) -> int:
-        """Return the number of runs in the folder that the plan does not ask for, with the runs of
-        another version or code of their method (:meth:`stale`)."""
+        """Return the number of runs in the folder that the plan does not ask for, stale ones
+        too."""
         query = "SELECT (SELECT count(*) FROM results) - (SELECT count(*) FROM asked)"
         return int(self._rows(query)[0][0])
 
     def ids(self, prefix: str = "") -> list[str]:
-        """Return the ids that begin with ``prefix``, of all runs, also of earlier plans."""
+        """Return the ids that begin with ``prefix``, of all runs in the folder."""
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
     def results(self) -> dict[str, str]:
-        """Return the hash of the outcome of each run that the folder has, by the run's id."""
+        """Return the hash of the outcome of each run in the folder, by id of the run."""
         return dict(self._rows("SELECT run_id, result FROM results"))
 
     # Writing and reading runs.
 
     def write(self, runs: Iterable[Run]) -> None:
-        """Write finished runs, all of them or none, in place of earlier runs of the same cells,
-        seeds and numbers. Raises CoarticError if they cannot be stored, such as on a full disk."""
+        """Write finished runs, all of them or none.
+
+        They replace stored runs with the same cell, seed and number. Raises CoarticError if they
+        cannot be stored, such as on a full disk.
+        """
         with self.transaction():
             for run in runs:
                 environment = run.outcome.environment or {}
@@ -289,8 +325,7 @@ class Store:
             raise CoarticError(f"cannot use {plain(str(self.folder / RUNS_FILE))}: {_DAMAGED}")
 
     def include(self, other: Store) -> None:
-        """Copy the runs that the plan asks for and this folder lacks from another folder. Runs that
-        both have stay as they are here."""
+        """Copy runs of the plan that this folder lacks from another folder."""
         file = f"{(other.folder / RUNS_FILE).absolute().as_uri()}?mode=ro"
         with explain_errors(other.folder):
             self._db.execute("ATTACH ? AS other", (":memory:" if other._content else file,))
@@ -310,15 +345,18 @@ class Store:
             self._db.execute("DETACH DATABASE other")
 
     def run(self, run_id: str) -> Run:
-        """Return a run by its id; ``suite`` of its job and ``where`` of its method are empty.
-        Raises CoarticError if the folder has no such run, or its row does not fit its id."""
+        """Return a run by its id.
+
+        ``suite`` of its job and ``where`` of its method are empty. Raises CoarticError if the
+        folder does not have the run, or if the stored run does not match the id.
+        """
         query = """SELECT results.*, cells.content AS cell_content, environments.content AS made
             FROM results JOIN cells ON cells.id = cell
             JOIN environments ON environments.id = environment WHERE run_id = ?"""
         with explain_errors(self.folder):
             row = self._db.execute(query, (run_id,)).fetchone()
             if row is None:
-                raise CoarticError(f"{self.folder} has no run {run_id}")
+                raise CoarticError(f"{self.folder} does not have run {run_id}")
             rewards = _unpack(row["rewards"]).tolist()
             outcome = Outcome(
                 row["status"],
@@ -332,8 +370,8 @@ class Store:
             )
             scores = {}
             for part, movements in json.loads(row["movements"]).items():
-                hits = row[f"{PREFIXES[part]}reward"], row[f"{PREFIXES[part]}hands"]
-                scores[part] = Score(*hits, tuple(map(movement_from, movements)))
+                reward, hands = row[f"{PREFIXES[part]}reward"], row[f"{PREFIXES[part]}hands"]
+                scores[part] = Score(reward, hands, tuple(map(movement_from, movements)))
             if "solution" in scores:
                 scores["solution"] = scores["solution"]._replace(
                     corrections=row["solution_corrections"],
@@ -344,23 +382,40 @@ class Store:
             job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])
             run = Run(job, outcome, scores, row["date"])
             if run.id != run_id:
-                raise ValueError(f"run {run_id} is not the run that its id says")
+                raise ValueError(f"run {run_id} does not match its id")
             return run
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``, a row for each run of the plan that the folder has, in order, as a
-        data frame with the columns :data:`.COLUMNS` (nullable types)."""
+        """Return view ``runs``: a row for each run of the plan that the folder has, in order.
+
+        Returns
+        -------
+        DataFrame
+            Columns :data:`.COLUMNS`, with nullable types.
+        """
         return self._frame("SELECT * FROM runs")
 
     def solutions(self) -> pd.DataFrame:
-        """Return view ``solutions``, a row for each movement of the plan's solutions, as a data
-        frame (nullable types). Columns: ``run_id``, ``order`` (from 0), ``goal`` (from 1),
-        ``hand``, ``kind``, ``ticks`` and ``path`` (configurations as JSON)."""
+        """Return view ``solutions``: a row for each movement of the plan's solutions.
+
+        Returns
+        -------
+        DataFrame
+            Columns ``run_id``, ``order`` (from 0), ``goal`` (from 1), ``hand``, ``kind``, ``ticks``
+            and ``path`` (configurations as JSON), with nullable types.
+        """
         return self._frame(_SOLUTIONS)
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
-        """Return, by run id, the movements of a part (``solution``, ``initial`` or ``replay``) of
-        the first ``most`` ok runs of each cell of the plan; runs without the part are left out."""
+        """Return the movements of a part of runs, by id of the run.
+
+        Parameters
+        ----------
+        part : {"solution", "initial", "replay"}
+            Runs without this part are left out.
+        most : int
+            Number of ok runs of each cell of the plan, from the first.
+        """
         query = """SELECT run_id, json_extract(movements, ?) FROM
             (SELECT run_id, movements, position, run,
             row_number() OVER (PARTITION BY position ORDER BY run) AS place
@@ -373,8 +428,15 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield, for each run of the plan with rewards of trials, its id and its k rewards, shape
-        ``(k,)``; NaN stands for a trial that failed or whose reward is not kept."""
+        """Yield the rewards of trials for each run of the plan that has any.
+
+        Yields
+        ------
+        str
+            Id of the run.
+        ndarray, shape (k,)
+            Rewards; NaN for a trial that failed or whose reward is not stored.
+        """
         query = """SELECT run_id, rewards FROM asked WHERE rewards IS NOT NULL
             ORDER BY position, run"""
         with explain_errors(self.folder):
@@ -384,36 +446,38 @@ class Store:
     # Rows.
 
     def _insert(self, table: str, **row: Any) -> None:
-        """Insert a row, values by column, into a table. A row with the same id is replaced in
-        place, because other rows may refer to it."""
+        """Insert a row into a table, or update the row with the same id."""
         key = {"cells": "id", "environments": "id", "results": "run_id"}.get(table)
         names, marks = ", ".join(f'"{name}"' for name in row), ", ".join("?" * len(row))
-        # A key that is set, though to itself, has SQLite look through all rows that refer to it.
-        news = ", ".join(f'"{name}" = excluded."{name}"' for name in row if name != key)
-        text = f"INSERT INTO {table} ({names}) VALUES ({marks})"
-        text += f" ON CONFLICT ({key}) DO UPDATE SET {news}" if key else ""
-        self._db.execute(text, [*row.values()])
+        # Setting the key, even to its own value, would make SQLite check all rows that refer to it.
+        updates = ", ".join(f'"{name}" = excluded."{name}"' for name in row if name != key)
+        statement = f"INSERT INTO {table} ({names}) VALUES ({marks})"
+        statement += f" ON CONFLICT ({key}) DO UPDATE SET {updates}" if key else ""
+        self._db.execute(statement, [*row.values()])
 
     def _rows(self, query: str, *values: object) -> list[Any]:
-        """Return a list of the rows of a query. Raises CoarticError if the file cannot be read."""
+        """Return the rows of a query. Raises CoarticError if the file cannot be read."""
         with explain_errors(self.folder):
             return [tuple(row) for row in self._db.execute(query, values)]
 
     def _frame(self, query: str) -> pd.DataFrame:
-        """Return the rows of a query as a data frame, with nullable types."""
+        """Return the rows of a query as a data frame with nullable types."""
         import pandas as pd
 
         with explain_errors(self.folder):
-            rows, parts, once = self._db.execute(query), list[pd.DataFrame](), dict[Any, Any]()
+            rows, parts, interned = self._db.execute(query), list[pd.DataFrame](), dict[Any, Any]()
             names = [column[0] for column in rows.description]
-            while (some := rows.fetchmany(_ROWS_AT_ONCE)) or not parts:
-                columns = dict(zip(names, zip(*some, strict=True), strict=True)) if some else {}
+            while (batch := rows.fetchmany(_ROWS_AT_ONCE)) or not parts:
+                columns = dict(zip(names, zip(*batch, strict=True), strict=True)) if batch else {}
                 parts.append(
                     pd.DataFrame(
                         {
-                            # Equal texts of a column are one object.
+                            # Equal strings share one object.
                             name: pd.array(
-                                [once.setdefault(value, value) for value in columns.get(name, ())]
+                                [
+                                    interned.setdefault(value, value)
+                                    for value in columns.get(name, ())
+                                ]
                                 if _DTYPES[name] == "string"
                                 else list(columns.get(name, ())),
                                 dtype=_DTYPES[name],
@@ -425,7 +489,7 @@ class Store:
             return pd.concat(parts, ignore_index=True)
 
     def _wait_for(self, statement: str) -> None:
-        """Execute a statement; while another program locks the file, warn once and try again."""
+        """Execute a statement; while another program locks the file, warn once and retry."""
         for attempt in itertools.count():
             try:
                 self._db.execute(statement)
@@ -435,7 +499,7 @@ class Store:
                     raise
             if not attempt:
                 warnings.warn(
-                    f"another program has {self.folder / RUNS_FILE} open: waiting for it",
+                    f"another program uses {self.folder / RUNS_FILE}: waiting for it",
                     stacklevel=2,
                 )
 
@@ -444,7 +508,7 @@ _RESUME = "repeat the `coartic run` command"
 
 
 def _cell_row(cell: Cell) -> dict[str, Any]:
-    """Return the row of a cell in table ``cells``, values by column, except its place in a plan."""
+    """Return the row of a cell in table ``cells``, except its position in a plan."""
     return {
         "id": cell.id,
         "digest": cell.digest,
@@ -459,16 +523,18 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 
 
 def _cell_from(cell_id: str, content: str) -> Cell:
-    """Return a cell from its ``content``, JSON; ``where`` of its method is empty. Raises ValueError
-    if the content makes no cell, or another cell than ``cell_id`` says."""
+    """Return a cell from its JSON; ``where`` of its method is empty.
+
+    Raises ValueError if the JSON is not a cell, or not the cell of this id.
+    """
     cell: Cell = _CELL.validate_python(json.loads(content))
     if cell.id != cell_id:
-        raise ValueError(f"{cell.label} on {cell.task.name} is not the cell that was run")
+        raise ValueError(f"{cell.label} on {cell.task.name} does not match the id of its cell")
     return cell
 
 
 def _environment_row(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the row of an environment: the versions, platform and commit of a process."""
+    """Return the row of an environment in table ``environments``."""
     commit = content.get("commit")
     return {
         "id": hash_of(content)[:16],
@@ -479,23 +545,26 @@ def _environment_row(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _from_row(kind: Any, row: sqlite3.Row) -> Any:
-    """Return an object of a dataclass, whose fields are columns of a row."""
+    """Return an object of a dataclass whose fields are columns of a row."""
     return kind(**{name: row[name] for name in vars(kind())})
 
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
-    """Open a results folder for reading in the block of this context. Raises CoarticError if the
-    folder has no results, or results in another format."""
+    """Open a results folder for reading, in a ``with`` block.
+
+    Raises CoarticError if the folder has no results, or results in another format.
+    """
     path = folder / RUNS_FILE
     with explain_errors(folder):
         if not path.is_file():
             near = [*folder.parent.glob(RUNS_FILE), *sorted(folder.glob(f"*/{RUNS_FILE}"))][:3]
-            meant = " or ".join(str(each.parent) for each in near)
-            hint = f"; did you mean {meant}?" if near else ""
-            what = f"{folder} is not a results folder: it has no {RUNS_FILE}"
-            what = what if os.path.lexists(folder) else f"there is no folder {folder}"
-            raise CoarticError(f"{what}{hint}")
+            candidates = " or ".join(str(file.parent) for file in near)
+            hint = f"; did you mean {candidates}?" if near else ""
+            problem = f"{folder} is not a results folder: it does not contain {RUNS_FILE}"
+            if not os.path.lexists(folder):
+                problem = f"folder {folder} does not exist"
+            raise CoarticError(f"{problem}{hint}")
         opened = _connect(f"{path.absolute().as_uri()}?mode=rw")
     with closing(opened) as connection:
         with explain_errors(folder):
@@ -508,8 +577,10 @@ def open_store(folder: Path) -> Iterator[Store]:
 
 @contextmanager
 def open_content(content: bytes, name: str) -> Iterator[Store]:
-    """Open the content of a ``runs.sqlite`` in memory for reading; ``name`` stands for its folder
-    in messages."""
+    """Open the content of a ``runs.sqlite`` in memory, for reading in a ``with`` block.
+
+    ``name`` stands for its folder in messages.
+    """
     with closing(_connect(":memory:")) as connection:
         connection.deserialize(content)
         yield Store(Path(name), connection, content)
@@ -517,14 +588,16 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[Store]:
-    """Open a results folder for writing in the block of this context, by this process alone
-    (:func:`lock`), and make a missing folder. Raises CoarticError if the folder holds something
-    else or cannot be written, and while another process writes into it."""
+    """Lock a results folder, and open it for writing in a ``with`` block.
+
+    A missing folder is made. Raises CoarticError if the folder contains something else, if it
+    cannot be written, or if another process writes into it.
+    """
     path = folder / RUNS_FILE
     with explain_errors(folder):
         if folder.is_dir() and not path.exists() and any(folder.glob("[!.]*")):
             raise CoarticError(
-                f"{folder} is not empty and holds no results of coartic. Choose another folder."
+                f"{folder} contains other files, but no results of coartic: choose another folder"
             )
         make_folder(folder)
     with lock(folder):
@@ -532,28 +605,31 @@ def writing(folder: Path) -> Iterator[Store]:
             opened = _connect(path.absolute().as_uri())
         with closing(opened) as connection:
             with explain_errors(folder):
-                is_there = _has_tables(connection, path)  # raises before anything is written
-                # No write-ahead log, which is unsafe on network disks and adds a file.
+                has_tables = _has_tables(connection, path)  # raises before anything is written
+                # A write-ahead log would be unsafe on network disks, and would add a file.
                 connection.execute("PRAGMA journal_mode = DELETE")
                 connection.execute("PRAGMA foreign_keys = ON")
-                if not is_there:
+                if not has_tables:
                     connection.executescript(_SCHEMA)
             yield Store(folder, connection)
 
 
 @contextmanager
 def lock(folder: Path, *, command: str = "coartic run") -> Iterator[None]:
-    """Lock a folder for this process in the block of this context; do nothing where the disk has no
-    such locks. Raises CoarticError, which names ``command``, if the lock is held elsewhere."""
+    """Lock a folder for this process in a ``with`` block.
+
+    It does nothing on a disk without such locks. Raises CoarticError, which names ``command``, if
+    another process has locked the folder.
+    """
     opened = os.open(folder, os.O_RDONLY)
     try:
         try:
             fcntl.flock(opened, fcntl.LOCK_NB | fcntl.LOCK_EX)
         except BlockingIOError:
             raise CoarticError(
-                f"another `{command}` is at work in {folder}; wait for it, or choose another folder"
+                f"another `{command}` uses {folder}: wait for it, or choose another folder"
             ) from None
-        except OSError:  # as on some network disks
+        except OSError:  # some network disks do not have locks
             pass
         yield
     finally:
@@ -569,15 +645,17 @@ def _connect(where: str) -> sqlite3.Connection:
 
 
 def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
-    """Return True if the file ``path`` is marked as coartic's in this format, and False if it is
-    empty. Raises CoarticError for any other file."""
+    """Return True for a file of coartic in this format, and False for an empty file.
+
+    Raises CoarticError for any other file.
+    """
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application != _APPLICATION:
         if connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
             raise CoarticError(
-                f"{path} is not a file of coartic, or was restored from a dump: move it away, or "
-                "copy the file itself"
+                f"{path} was not written by coartic, or was restored from a dump: move it away, or "
+                "copy the original file"
             )
         return False
     if version > FORMAT:
@@ -588,18 +666,20 @@ def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
             query = "SELECT max(json_extract(content, '$.coartic')) FROM environments"
             writer = f"coartic {connection.execute(query).fetchone()[0]}"
         raise CoarticError(
-            f"{path} was written by {writer}, in a format that this version does not read: "
-            "`coartic run` with another --out makes the runs again"
+            f"{path} was written by {writer}, in a format that this version cannot read: repeat "
+            "the `coartic run` command with another --out"
         )
     return True
 
 
 @contextmanager
 def explain_errors(folder: Path) -> Iterator[None]:
-    """Turn an error of the block of this context into a CoarticError that names the file.
+    """Turn errors of a ``with`` block into a CoarticError that names the file.
 
-    Errors of the system and of SQLite are explained. A ValueError, LookupError, TypeError or error
-    of zlib stands for content that coartic did not write. Other errors pass.
+    - Errors of the system and of SQLite are explained.
+    - A ValueError, LookupError, TypeError or error of zlib means that coartic did not write the
+      content.
+    - Other errors are raised as they are.
     """
     try:
         yield
@@ -607,47 +687,51 @@ def explain_errors(folder: Path) -> Iterator[None]:
         raise CoarticError(_explain(folder / RUNS_FILE, error)) from None
 
 
-_BUSY = "another program has it open: close it there, or wait for it"
+_BUSY = "another program uses it: close it there, or wait for it"
 _DAMAGED = (
-    "it is damaged. Move it away and repeat the `coartic run` command, or restore a copy: the file "
-    "itself, no dump, nor a pointer of Git LFS, for which `git lfs pull` brings the file"
+    "it is damaged. Move it away and repeat the `coartic run` command, or restore a copy of the "
+    "file. A dump is not a copy. If the file is a pointer of Git LFS, run `git lfs pull`"
 )
 _SENTENCES = {
     "SQLITE_BUSY": _BUSY,
     "SQLITE_LOCKED": _BUSY,
-    "SQLITE_READONLY": "it or its folder cannot be written. If a `coartic run` was interrupted "
-    "there, copy the whole folder, and use the copy",
+    "SQLITE_READONLY": "the file or its folder cannot be written. If a `coartic run` was "
+    "interrupted there, copy the whole folder, and use the copy",
     "SQLITE_READONLY_DBMOVED": "it was removed, renamed or replaced while the suite ran: put it "
     "back, or repeat the command to start again",
-    "SQLITE_CANTOPEN": "it cannot be opened: look at the rights of the file and of its folder",
+    "SQLITE_CANTOPEN": "it cannot be opened: check the permissions of the file and its folder",
     "SQLITE_CORRUPT": _DAMAGED,
     "SQLITE_NOTADB": _DAMAGED,
-    "SQLITE_IOERR": "the system cannot read or write it, as where a disk, a quota or the limit of "
-    "file size (`ulimit -f`) is full: make room, and repeat the command",
+    "SQLITE_IOERR": "the system cannot read or write it. The disk, a quota or the limit of file "
+    "size (`ulimit -f`) may be exhausted: make room, and repeat the command",
     "SQLITE_FULL": "the disk is full: make room, and repeat the command",
 }
 """Sentences by SQLite's names of errors, or by the first two words of the names."""
 
 
 def _explain(path: Path, error: Exception) -> str:
-    """Return the sentence of :func:`explain_errors` on an error of the file ``path``."""
-    said = plain(str(error), 200) or type(error).__name__
+    """Return the message of :func:`explain_errors` for an error of the file ``path``."""
+    problem = plain(str(error), 200) or type(error).__name__
     if isinstance(error, OSError):
-        path, said = Path(error.filename or path), error.strerror or said
+        path, problem = Path(error.filename or path), error.strerror or problem
     elif isinstance(error, sqlite3.Error):
         name = getattr(error, "sqlite_errorname", "")
-        said = _SENTENCES.get(name, _SENTENCES.get("_".join(name.split("_")[:2]), said))
-        if "decode to UTF-8" in said or said.startswith("no such table"):  # cut while it is open
-            said = _DAMAGED
+        problem = _SENTENCES.get(name, _SENTENCES.get("_".join(name.split("_")[:2]), problem))
+        # The file was cut off while it was open.
+        if "decode to UTF-8" in problem or problem.startswith("no such table"):
+            problem = _DAMAGED
     else:
-        wrong = explain(error) if isinstance(error, ValidationError) else said
-        said = f"it holds what coartic does not write ({plain(wrong, 200)})"
-    return f"cannot use {plain(str(path))}: {said}"
+        wrong = explain(error) if isinstance(error, ValidationError) else problem
+        problem = f"its content was not written by coartic ({plain(wrong, 200)})"
+    return f"{plain(str(path))} cannot be used: {problem}"
 
 
 def _unpack(blob: bytes | None) -> Array:
-    """Return the rewards in a ``blob`` (:func:`reward_bytes`), shape ``(k,)``; NaN for a trial that
-    failed or whose reward is not kept. Raises zlib.error or ValueError for a damaged blob."""
+    """Decompress and decode rewards (:func:`reward_bytes`), shape ``(k,)``.
+
+    NaN stands for a trial that failed or whose reward is not stored. Raises zlib.error or
+    ValueError for a damaged blob.
+    """
     if blob is None:
         return np.empty(0)
     numbers = np.frombuffer(zlib.decompress(blob), np.uint8).reshape(4, -1).T.copy().view("<u4")

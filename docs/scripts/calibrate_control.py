@@ -1,10 +1,10 @@
-"""Compare the control of signatures with itself: how often samples of it differ.
+"""Compare the control of signatures with itself, to see how often the tests are significant.
 
     python docs/scripts/calibrate_control.py docs/stored/random-search
 
-draws 500 pairs of samples, twenty runs each, of the shipped runs of random search on both one-armed
-tasks, compares one with the other as a learner is compared with random search, and writes
-calibration.csv: the share of pairs in which the test is significant at 5 %.
+The script draws 500 pairs of samples from the shipped runs of random search on both one-armed
+tasks. A sample has twenty runs. It compares the samples of a pair as a learner is compared with
+random search, and writes calibration.csv: the share of pairs in which a test is significant at 5 %.
 """
 
 import sys
@@ -23,7 +23,7 @@ TASKS, SEARCH = ("ascending", "descending"), "random-search"
 
 
 def calibrate(study):
-    """Return the share of pairs of samples that differ significantly, by what is compared."""
+    """Return the share of pairs of samples that differ significantly, by signature."""
     rng = np.random.default_rng(0)
     first = [study.signature("first", task, SEARCH).dropna().to_numpy() for task in TASKS]
     at_goal = [study.configurations(task, SEARCH)[:, 0] for task in TASKS]

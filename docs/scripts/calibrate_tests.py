@@ -1,18 +1,19 @@
-"""Choose the test of two samples: how often candidates reject a true hypothesis.
+"""Choose the test of two samples by how often candidates reject a true hypothesis.
 
     python docs/scripts/calibrate_tests.py docs/stored/two-samples
 
-writes ``cells.csv``, a row for each population and pair of sizes, and ``candidates.csv``, with the
-number of cells in which a candidate rejects more than 6 % of samples at 5 %, or more than 1.5 % at
-1 %. Taken is the candidate with the fewest of both; at a tie the simpler, which stands first.
+The script writes ``cells.csv``, with a row for each population and pair of sizes, and
+``candidates.csv``, with the number of cells in which a candidate rejects too often: more than 6 %
+of samples at the level 5 %, or more than 1.5 % at the level 1 %. The package uses the candidate
+with the fewest such cells. At a tie it uses the simpler candidate, which is the first in the table.
 
-Candidates, all studentised with a variance for each sample (t infinite or 0 without spread), and
-judged by their two-sided p:
+All candidates are two-sided and studentised, with a variance for each sample. If no sample varies,
+t is infinite or 0. The candidates are
 
-- ``exchange``: labels of the values are exchanged, in all ways if these are no more than resamples;
-- ``bootstrap``: each sample is shifted to the mean 0 and resampled; without spread in any sample
-  the least p of an exchange of as many values;
-- ``exchange below N``: exchange if the smaller sample has fewer than N values, or else bootstrap.
+- ``exchange``: labels of the values are exchanged, in all ways if there are no more than resamples;
+- ``bootstrap``: each sample is shifted to mean 0 and resampled. If no sample varies, p is the least
+  p of an exchange of as many values;
+- ``exchange below N``: exchange if the smaller sample has fewer than N values, otherwise bootstrap.
 
 Columns that begin with ``greater`` and ``less`` have the exchange one-tailed, that the mean of the
 first sample is the higher or the lower one, for populations with skew and unequal spread; they
@@ -42,11 +43,11 @@ LIMITS = {
     "exchange": math.inf, "bootstrap": 0,
     **{f"exchange below {n}": n for n in (10, 20, 50)},
 }  # fmt: skip
-"""Candidates, the simpler first: they are the exchange if the smaller sample has fewer values."""
+"""Candidates, the simpler first, with the size of the smaller sample below which they exchange."""
 
 
 def levels(values, shares):
-    """Return a population of few values, by the shares of these."""
+    """Return a population of a few values with these shares."""
     return lambda rng, shape: rng.choice(np.array(values, dtype=float), size=shape, p=shares)
 
 
@@ -88,8 +89,10 @@ ONE_TAILED = [*POPULATIONS][-4:]
 
 
 def studentised(sums, squares, sizes):
-    """Return t of two samples from the sums of their values and squares, 0 or infinite without
-    spread."""
+    """Return |t| of two samples from the sums of their values and squares.
+
+    It is 0 or infinite if no sample varies.
+    """
     means = [total / n for total, n in zip(sums, sizes, strict=True)]
     parts = [
         np.maximum(square / n - mean**2, 0.0) / (n - 1)
@@ -104,8 +107,10 @@ def studentised(sums, squares, sizes):
 
 
 def exchanges(sizes, rng):
-    """Return the values of the first sample in each exchange, 0 or 1, shape ``(values, ways)``, and
-    whether these are all ways."""
+    """Return which values are in the first sample after each exchange, and if these are all ways.
+
+    The first result has entries 0 and 1, shape ``(values, ways)``.
+    """
     n, first = sum(sizes), sizes[0]
     if math.comb(n, first) <= RESAMPLES:
         chosen = np.array([*itertools.combinations(range(n), first)])
@@ -127,7 +132,8 @@ def p_by_test(samples, members, exact, drawn):
     sizes = [sample.shape[1] for sample in samples]
     both = np.concatenate(samples, axis=1)
     both = both - both.mean(axis=1, keepdims=True)
-    ways = np.column_stack([np.arange(len(members)) < sizes[0], members])  # at first as they are
+    # The first column leaves the labels as they are.
+    ways = np.column_stack([np.arange(len(members)) < sizes[0], members])
     first = [values @ ways for values in (both, both**2)]
     whole = [values.sum(axis=1, keepdims=True) for values in (both, both**2)]
     parts = [(one, total - one) for one, total in zip(first, whole, strict=True)]
@@ -156,7 +162,8 @@ def p_by_test(samples, members, exact, drawn):
 
 
 def cell(name, sizes):
-    """Return shares of rejected samples of one population and pair of sizes, by test and level."""
+    """Return the shares of rejected samples of a population and pair of sizes, by test and
+    level."""
     rng = np.random.default_rng([SEED, [*POPULATIONS].index(name), *sizes])
     members, exact = exchanges(sizes, rng)
     drawn, found = draws(sizes, rng), []

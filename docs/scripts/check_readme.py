@@ -1,5 +1,9 @@
-"""Compare the table of README.md with a results folder of suite ``comparison``, number by number:
-``python docs/scripts/check_readme.py FOLDER``. A difference is printed, and is no error."""
+"""Compare the numbers in the table of README.md with a results folder of suite ``comparison``.
+
+    python docs/scripts/check_readme.py FOLDER
+
+Differences are printed. They are not an error.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +29,10 @@ def rows_of(text: str) -> dict[str, tuple[str, ...]]:
 
 
 def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
-    """Return the number of rows of README's text, and a line for each that the ranking, by the
-    titles of its methods, has otherwise."""
+    """Compare README's table with a ranking whose index has the titles of methods.
+
+    Return the number of rows of README's table, and a line for each row that differs.
+    """
     lines, rows = [], rows_of(text)
     for name, printed in rows.items():
         titles = [title for title in ranking.index if title.partition(" (")[0] == name]
@@ -34,22 +40,22 @@ def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
             lines.append(f"{name}: not in this folder")
             continue
         row, decimals = ranking.loc[titles[0]], (cell.split()[0].partition(".") for cell in printed)
-        there = tuple(
+        computed = tuple(
             interval(row, column, len(digits), 100, " %")
             for column, (*_, digits) in zip(COLUMNS, decimals, strict=True)
         )
-        if there != printed:
-            lines.append(f"{name}: gap {there[0]}, with motor noise {there[1]}, share {there[2]}")
+        if computed != printed:
+            lines.append(f"{name}: gap {computed[0]}, with motor noise {computed[1]}, share {computed[2]}")
     return len(rows), lines
 
 
 def main(folder: str) -> None:
-    """Print what differs between README and a folder."""
+    """Print the differences between README and a folder."""
     study = load(folder)
     ranking = TABLES["ranking"](study)
     ranking.index = study.methods.title.reindex(ranking.index)
     count, lines = differences(README.read_text("utf-8"), ranking)
-    print(f"As the table of README: {count - len(lines)} of {count} rows.")
+    print(f"{count - len(lines)} of {count} rows are equal to the table of README.")
     print(*(f"  {line}" for line in lines), sep="\n", end="\n" if lines else "")
 
 

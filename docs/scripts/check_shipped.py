@@ -1,9 +1,11 @@
-"""Perform shipped runs again, and compare them with what is shipped, to the tick and the hand:
-``python docs/scripts/check_shipped.py``.
+"""Perform shipped runs again, and compare rewards, hands and ticks with the shipped ones.
 
-One run of each cell of suite ``comparison``, and of the cheapest cell of each method on each family
-of suite ``families``; with ``--all`` one run of each cell of both, which takes an hour. A run of an
-earlier version than its method has here is counted as to be made again.
+    python docs/scripts/check_shipped.py
+
+The script performs one run of each cell of suite ``comparison``, and one run of the cheapest cell
+of each method on each family of suite ``families``. With ``--all`` it performs one run of each cell
+of both suites, which takes an hour. Runs by an earlier version of their method are not performed:
+the script counts them as to be made again.
 """
 
 from __future__ import annotations
@@ -23,8 +25,11 @@ CELL = ["suite", "task", "method", "setting"]
 
 
 def shipped_runs() -> pd.DataFrame:
-    """Return all shipped runs that have a solution, the cheapest first, with their ``suite`` and
-    ``family`` (of a task of the paper: its name)."""
+    """Return all shipped runs that have a solution, the cheapest first.
+
+    They have the additional columns ``family`` (for a task of the paper its name) and
+    ``is_current`` (True if the version of the method is that of this installation).
+    """
     frames = []
     for suite in shipped_hashes():
         with open_shipped(suite) as store:
@@ -39,8 +44,11 @@ def shipped_runs() -> pd.DataFrame:
 
 
 def chosen(runs: pd.DataFrame, *, every: bool = False) -> pd.DataFrame:
-    """Return the first run of each cell of ``comparison``, and of the cheapest cell of each method
-    on each family, or with ``every`` of each cell."""
+    """Select the runs to perform: the first of each cell of ``comparison``, and of cheap cells.
+
+    The cheap cells are the cheapest of each method on each family; with ``every`` they are all
+    cells.
+    """
     cells = runs.sort_values("run", kind="stable").groupby(CELL, sort=False).head(1)
     if every:
         return cells
@@ -50,24 +58,23 @@ def chosen(runs: pd.DataFrame, *, every: bool = False) -> pd.DataFrame:
 
 
 def differences(rows: pd.DataFrame) -> Iterator[str]:
-    """Perform runs again and yield a sentence for each that has another result, with both results
-    and the way on. ``rows`` is as of :func:`shipped_runs`; rows of earlier versions are left out.
-    """
+    """Perform the current ones of some shipped runs again, and yield a sentence on each
+    difference."""
     runs = list[Run]()
     for suite, of_suite in rows[rows.is_current].groupby("suite"):
         with open_shipped(str(suite)) as store:
             runs += map(store.run, of_suite.run_id)
-    for run, again in perform_runs_again(runs, built_in()):
-        if (before := result_of(run)) != (now := result_of(again)):
+    for run, repeated in perform_runs_again(runs, built_in()):
+        if (shipped := result_of(run)) != (result := result_of(repeated)):
             yield (
-                f"{run.cell.label} on {run.cell.task.name}, run {run.number} ({run.id}), is "
-                f"shipped with {before} and gives {now} here: mend the change, or raise the "
-                "version of the method and make its runs again"
+                f"{run.cell.label} on {run.cell.task.name}, run {run.number} ({run.id}), no longer "
+                f"reproduces. It is shipped with {shipped} and has {result} here: fix your change, "
+                "or raise the version of the method and make its runs again"
             )
 
 
 def result_of(run: Run) -> str:
-    """Return reward, hands and ticks by movement of the parts of a run, in words."""
+    """Return reward, hands and ticks of each movement of the parts of a run, as a string."""
     scores = {part: run.scores[part] for part in PARTS if part in run.scores}
     ticks = [[m.ticks for m in score.movements] for score in scores.values()]
     words = [f"{part} {score.reward} ({score.hands})" for part, score in scores.items()]
@@ -78,18 +85,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Check what the command line asks for; return 1 if a run differs."""
     parser = argparse.ArgumentParser(prog="python docs/scripts/check_shipped.py")
     parser.add_argument("--all", action="store_true", help="one run of each cell (an hour)")
-    parser.add_argument("--release", action="store_true", help="no run may be of an old version")
-    asked = parser.parse_args(arguments)
+    parser.add_argument("--release", action="store_true", help="fail if a run has an old version")
+    options = parser.parse_args(arguments)
     runs = shipped_runs()
-    rows = chosen(runs, every=asked.all)
+    rows = chosen(runs, every=options.all)
     found = list(differences(rows))
     old = runs[~runs.is_current]
     print(f"{rows.is_current.sum()} shipped runs performed again: {len(found) or 'none'} differ.")
     print(*(f"- {sentence}" for sentence in found), sep="\n", end="\n" * bool(found))
-    print(f"To be made again, as of earlier versions: {len(old) or 'no'} of {len(runs)} runs.")
-    for (suite, method, version), of in old.groupby(["suite", "method", "code"]):
-        print(f"- {suite}: {len(of)} of {method} {version}; here {built_in()[method].code}")
-    return int(bool(found) or (asked.release and len(old) > 0))
+    print(f"Runs by earlier versions, to be made again: {len(old) or 'none'} of {len(runs)}.")
+    for (suite, method, version), rows_of in old.groupby(["suite", "method", "code"]):
+        print(f"- {suite}: {len(rows_of)} of {method} {version}; here {built_in()[method].code}")
+    return int(bool(found) or (options.release and len(old) > 0))
 
 
 if __name__ == "__main__":

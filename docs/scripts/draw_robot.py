@@ -1,5 +1,9 @@
-"""Draw the robot with its joints named, and its null space: ``python docs/scripts/draw_robot.py``
-writes ``docs/robot.svg`` and ``docs/nullspace.svg``."""
+"""Draw the robot with the names of its joints, and its null space.
+
+    python docs/scripts/draw_robot.py
+
+writes ``docs/robot.svg`` and ``docs/nullspace.svg``.
+"""
 
 from pathlib import Path
 
@@ -52,12 +56,12 @@ def robot() -> Figure:
 
 @styled
 def nullspace() -> Figure:
-    """Draw postures that hit goal 1, the one nearest to a posture of goal 2 in black."""
+    """Draw postures that hit goal 1; the one nearest to a posture of goal 2 is black."""
     task = load_task("ascending")
     arm, goals = task.robot.joints("right"), np.array([(3.2, 1.4), (3.6, -0.4)])
 
     def hitting(goal: Array, angles: Array) -> Array:
-        """Configuration that Newton's steps of the four joints find from some angles."""
+        """Return the configuration that Newton steps of the four joints find from some angles."""
         q = np.zeros(task.robot.dof)
         q[arm] = angles
         for _ in range(200):

@@ -1,9 +1,12 @@
-"""Pack shipped results: ``python docs/scripts/pack_shipped.py FOLDER`` packs a results folder whose
-runs have the same results as the shipped runs. ``--noise`` in place of folders executes the shipped
-solutions with motor noise again and packs the new ticks; no method runs.
+"""Pack shipped results from results folders.
 
-The rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`): 5 MB in place of
-150 MB.
+    python docs/scripts/pack_shipped.py FOLDER
+    python docs/scripts/pack_shipped.py --noise
+
+The second form executes the shipped solutions with motor noise again and packs the new ticks. No
+method runs. Without ``--changed`` the script packs a folder only if its runs have the same results as the
+shipped runs. The rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`), so
+that the files have 5 MB instead of 150 MB.
 """
 
 from __future__ import annotations
@@ -27,10 +30,9 @@ from coartic.runs.store import RUNS_FILE, Store, open_store, writing
 
 
 def changed_runs(folder: Path) -> Iterator[str]:
-    """Yield a sentence for each shipped run that a folder lacks or that has another result there,
-    whatever its version.
+    """Yield a sentence for each shipped run that a folder lacks or whose result differs there.
 
-    Raises CoarticError if the folder has another version of a method.
+    Raises CoarticError if a method of the folder has another version here.
     """
     with open_store(folder) as made:
         plan = made.plan()
@@ -38,8 +40,8 @@ def changed_runs(folder: Path) -> Iterator[str]:
             here = built_in()[method.name].code if method.name in built_in() else "missing"
             if here != method.code:
                 raise CoarticError(
-                    f"{folder} has {method.name} {method.code}, and here it is {here}: run the "
-                    "suite again"
+                    f"{folder} has version {method.code} of {method.name}, whose version here is "
+                    f"{here}: run the suite again"
                 )
         if (suite := plan[0].suite) not in shipped.shipped_hashes():
             return
@@ -81,26 +83,26 @@ def main() -> int:
     parser.add_argument("--changed", action="store_true", help="pack results that have changed")
     parser.add_argument("--noise", action="store_true", help="pack noisy ticks made again")
     parser.add_argument("folders", nargs="*", type=folder_named, metavar="FOLDER")
-    given = parser.parse_args()
-    if given.noise == bool(given.folders):
+    options = parser.parse_args()
+    if options.noise == bool(options.folders):
         parser.error("name the folders to pack, or --noise")
-    if given.noise:
+    if options.noise:
         for suite in shipped.shipped_hashes():
             with shipped.open_shipped(suite) as source:
                 pack(source, runs_with_noise(source), shipped.SHIPPED_FOLDER)
         return 0
     try:
-        changes = {folder: list(changed_runs(folder)) for folder in given.folders}
+        changes = {folder: list(changed_runs(folder)) for folder in options.folders}
     except CoarticError as error:
         parser.error(str(error))
     for folder, sentences in changes.items():
-        print(f"{folder}: {len(sentences) or 'no'} differences to what is shipped")
+        print(f"{folder}: {len(sentences) or 'no'} differences from the shipped results")
         for sentence in sentences[:20]:
             print(f"- {sentence}")
-    if any(changes.values()) and not given.changed:
-        print("Nothing is packed. If results change on purpose, add --changed.")
+    if any(changes.values()) and not options.changed:
+        print("Nothing was packed. If the results should change, add --changed.")
         return 1
-    for folder in given.folders:
+    for folder in options.folders:
         with open_store(folder) as source:
             runs = map(source.run, source.runs().run_id)
             pack(source, runs, shipped.SHIPPED_FOLDER)

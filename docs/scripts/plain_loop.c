@@ -1,7 +1,7 @@
-/* A trial as one would write it in C: a loop over control steps, of coartic.motion.
+/* A trial of coartic.motion as a programmer would first write it in C: a loop over control steps.
  *
- * With bounds it skips, as coartic.motion.movement.clear_steps does, the steps during which the hand
- * provably stays out of the goal and away from the end of the movement. */
+ * With bounds it skips the steps in which the hand provably stays outside the goal and away from the
+ * end of the movement, as coartic.motion.movement.clear_steps does. */
 
 #include <math.h>
 #include <string.h>

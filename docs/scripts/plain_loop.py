@@ -1,4 +1,4 @@
-"""A trial as one would write it, in C: ``plain_loop.c``, a loop over control steps."""
+"""Compile and call ``plain_loop.c``, a plain loop over the control steps of a trial in C."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from coartic.robot import BASE_DOF, HANDS, Array
 
 
 def trials_in_c(task: Task, hands: str, targets: Array) -> dict[str, Callable[[], Array]]:
-    """Compile ``plain_loop.c``; return functions that make these trials, one after the other, and
-    return their ticks, without and with bounds."""
+    """Compile ``plain_loop.c``, and return functions that make trials one after the other.
+
+    The functions return the ticks of the trials. One of them skips steps by bounds.
+    """
     library = Path(tempfile.mkdtemp()) / "plain_loop.so"
     source = Path(__file__).with_suffix(".c")
     options = ["-O3", "-march=native", "-shared", "-fPIC", "-lm", "-o"]

@@ -1,9 +1,9 @@
-"""How fast trials are, through each public way and in each of the paper's cells.
+"""Measure how fast trials are, through each public function and in each of the paper's experiments.
 
     python docs/scripts/speed.py
 
-writes the ways into the page ``docs/how-fast.md``. Times depend on the machine; compare ratios, and
-times of one call.
+The script writes the times of the functions into the page ``docs/how-fast.md``. Times depend on the
+machine: compare ratios, and times of the same call.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from coartic.motion.solution import movements_of
 
 
 def main() -> None:
-    """Measure and print."""
-    show_ways()
+    """Print all times, and write the page."""
+    show_functions()
     warm_up(load_task("ascending"))
     print(f"{'experiment':20}{'one run':>12}{f'{SLOTS} runs':>12}   microseconds of a core a trial")
     for cell in (job.cell for job in plan_suite("paper")):
         task, condition = cell.task, cell.method.name.removeprefix(METHOD_PREFIX)
-        alone, many = (_us_a_trial(task, condition, runs) for runs in (1, SLOTS))
-        print(f"{task.name:16}{condition:4}{alone:12.1f}{many:12.1f}", flush=True)
+        one, many = (_us_a_trial(task, condition, runs) for runs in (1, SLOTS))
+        print(f"{task.name:16}{condition:4}{one:12.1f}{many:12.1f}", flush=True)
 
 
 PAGE = Path(__file__).parents[1] / "how-fast.md"
 ROUNDS = 50
-"""Number of times that each way is measured."""
+"""Number of times that each function is measured."""
 HEAD = """\
 # How fast
 
@@ -56,29 +56,29 @@ FOOT = """
 """
 
 
-def show_ways() -> None:
-    """Print what a trial costs through each public way, and write the page."""
-    columns = {name: ways(load_task(name)) for name in ("ascending", "two-armed-1")}
+def show_functions() -> None:
+    """Print the time of a trial by each public function, and write the page."""
+    columns = {name: functions(load_task(name)) for name in ("ascending", "two-armed-1")}
     rounds: dict[str, list[dict[str, float]]] = {name: [] for name in columns}
-    for _ in range(ROUNDS):  # all ways in turn: what else the machine does slows each of them
-        for name, every in columns.items():
-            rounds[name].append({way: _us(*each) for way, each in every.items()})
-    spread = ["median", "min", "max"]
-    seen = {name: pd.DataFrame(each).agg(spread).T for name, each in rounds.items()}
-    print("CPU microseconds a trial", pd.concat(seen, axis=1).round(2).to_string(), sep="\n")
-    table = pd.DataFrame({name: of_task["median"] for name, of_task in seen.items()})
+    for _ in range(ROUNDS):  # in turn, so that other work of the machine slows all functions
+        for name, calls in columns.items():
+            rounds[name].append({function: _us(*call) for function, call in calls.items()})
+    statistics = ["median", "min", "max"]
+    times = {name: pd.DataFrame(rows).agg(statistics).T for name, rows in rounds.items()}
+    print("CPU microseconds a trial", pd.concat(times, axis=1).round(2).to_string(), sep="\n")
+    table = pd.DataFrame({name: of_task["median"] for name, of_task in times.items()})
     rules = " | ".join(["---:"] * len(columns))
     text = HEAD.format(heads=" | ".join(columns), rules=rules)
-    for way, cells in table.map("{:.3g}".format).iterrows():
-        text += f"| {way} | {' | '.join(cells)} |\n"
+    for function, cells in table.map("{:.3g}".format).iterrows():
+        text += f"| {function} | {' | '.join(cells)} |\n"
     PAGE.write_text(text + FOOT, encoding="utf-8")
 
 
-def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
-    """Ways to make trials: how many each makes, and a function that makes them.
+def functions(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
+    """Return, by name, the number of trials that a function makes, and the function.
 
-    They lie around the solution of CMA-ES, so that few goals are missed; trials of environments lie
-    around the postures of the corrective process.
+    The targets are near the solution of CMA-ES, so that few goals are missed. Those of environments
+    are near the postures of the corrective process.
     """
     session = Session(task, 0, CMAES.information)
     solution = CMAES(CMAES.Parameters(trials=3000)).solve(session).solution
@@ -101,7 +101,7 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
             env.step(action)
 
     return {
-        **{way: (1000, make) for way, make in in_c.items()},
+        **{name: (1000, make) for name, make in in_c.items()},
         "objective, one by one": (100, lambda: [cost(point) for point in points]),
         "Session.trial, one by one": (100, lambda: [session.trial(each) for each in solutions]),
         "execute, one by one": (100, lambda: [execute(task, each) for each in solutions]),
@@ -115,16 +115,16 @@ def ways(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
 
 
 def _us(trials: int, make: Callable[[], object]) -> float:
-    """CPU time of a trial in microseconds; ``make`` makes so many trials."""
-    clock = time.process_time()  # of all threads
+    """Return the CPU time of a trial, µs, where ``make`` makes ``trials`` trials."""
+    started = time.process_time()  # of all threads
     make()
-    return (time.process_time() - clock) / trials * 1e6
+    return (time.process_time() - started) / trials * 1e6
 
 
 def _us_a_trial(task: Task, condition: str, runs: int) -> float:
-    clock = time.thread_time()
+    started = time.thread_time()
     learn_many(task, CONDITIONS[condition], seeds=range(runs), jobs=1)
-    return (time.thread_time() - clock) / runs / TRIALS * 1e6
+    return (time.thread_time() - started) / runs / TRIALS * 1e6
 
 
 if __name__ == "__main__":
