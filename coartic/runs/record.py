@@ -315,7 +315,7 @@ def movement_from(data: Sequence[Any]) -> Movement:
     """Return a movement from the list that :func:`movement_data` returns. Other data may raise
     TypeError, ValueError or IndexError."""
     goal, hand, kind, ticks, text = data
-    place = None if text is None else real_array("a path", json.loads(text))
+    place = None if text is None else np.array(json.loads(text), np.float64)
     if kind == "path" and place is not None:
         return Movement(goal, hand, kind, place[-1], ticks, place)
     return Movement(goal, hand, kind, place, ticks)
