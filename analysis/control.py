@@ -27,7 +27,7 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.methods import BY_TRIAL, LEARNERS, RANDOM_SEARCH, headline_methods
-from coartic.analysis.signatures import TwoContexts, context_pairs
+from coartic.analysis.signatures import SIGNATURES, TwoContexts, context_pairs
 from coartic.analysis.study import MOST_EXECUTED, Study, solved
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
@@ -85,10 +85,10 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
     are left out. Signature ``hand``, a measure of the choice of hands itself, has one entry ``""``
     for all hand sequences together, or none if no run has it. It is cached: do not change it.
     """
-    values = study.signature(signature, task, label).to_numpy(np.float64)
-    hands = np.array(study.cells[task, label].hands.tolist(), dtype=object)
-    if signature == "hand":
-        hands[:] = ""
+    executed = study.executed(task, label)
+    values = SIGNATURES[signature].each(executed)
+    every = [run.hands if signature != "hand" else "" for run in executed.runs]
+    hands = np.array(every, dtype=object)
     there = np.isfinite(values)
     return {each: values[there & (hands == each)] for each in sorted({*hands[there]})}
 
@@ -106,6 +106,7 @@ def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool =
     return controls.get((hands, trials, explored), other)
 
 
+@lru_cache(maxsize=4_096)
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
     """Return True if a method adds exploration noise to the arm that is not to hit: the learner by
     its condition, others, such as random search, by their parameter ``idle_arm``, True without it.

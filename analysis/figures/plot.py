@@ -180,7 +180,7 @@ def for_page(plot: Plot) -> str:
     """
 
     def shorten(attribute: re.Match[str]) -> str:  # lengths to tenths of a point
-        cut = re.sub(r"(\.\d)\d+", r"\1", attribute[0])
+        cut = re.sub(r"\.0\b", "", re.sub(r"(\.\d)\d+", r"\1", attribute[0]))
         return re.sub(r"\s*\b([MLQCzZ])\s*", r"\1", cut) if cut.startswith("d=") else cut
 
     none = dict.fromkeys(("Date", "Creator", "Format", "Type"))

@@ -22,7 +22,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import EngFormatter, NullFormatter
+from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from coartic import estimates
 from coartic.analysis.frames import checked
@@ -257,10 +257,14 @@ def legend_line(label: str, **line: Any) -> Line2D:
 
 
 def log_axis(axes: Axes) -> None:
-    """Make the x axis logarithmic, with numbers at whole decades: 1, 100, 1k, 1M; 100m for 0.1."""
+    """Make the x axis logarithmic, with numbers at whole decades: 1, 100, 1k, 1M; 100m for 0.1.
+
+    Small ticks are at 2 and 5 times each decade.
+    """
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(EngFormatter(sep=""))
     axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_locator(LogLocator(subs=(2, 5)))
 
 
 def letters(panels: Iterable[Axes], pad: float | None = None) -> None:

@@ -36,7 +36,6 @@ from coartic.analysis.tables import (
     list_differences,
     list_failed,
     list_family_gaps,
-    list_learning,
     list_methods,
     list_not_ranked,
     list_ranking,
@@ -187,7 +186,7 @@ Methods at shared goals by verdict: {{ every.verdict | commonest(none) | listed 
     Section(
         "cost",
         "Cost",
-        (list_runtimes, list_learning),
+        (list_runtimes,),
         (draw_runtimes, draw_learning_curves),
         sentence="""\
 {% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \

@@ -353,7 +353,7 @@ def movement_from(data: Sequence[Any]) -> Movement:
     Wrong data may raise TypeError, ValueError or IndexError.
     """
     goal, hand, kind, ticks, text = data
-    path = None if text is None else real_array("a path", json.loads(text))
+    path = None if text is None else np.array(json.loads(text), np.float64)
     if kind == "path" and path is not None:
         return Movement(goal, hand, kind, path[-1], ticks, path)
     return Movement(goal, hand, kind, path, ticks)

@@ -45,7 +45,9 @@ def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
             for column, (*_, digits) in zip(COLUMNS, decimals, strict=True)
         )
         if computed != printed:
-            lines.append(f"{name}: gap {computed[0]}, with motor noise {computed[1]}, share {computed[2]}")
+            lines.append(
+                f"{name}: gap {computed[0]}, with motor noise {computed[1]}, share {computed[2]}"
+            )
     return len(rows), lines
 
 

@@ -4,7 +4,9 @@
     python docs/scripts/pack_shipped.py --noise
 
 The second form executes the shipped solutions with motor noise again and packs the new ticks. No
-method runs. Without ``--changed`` the script packs a folder only if its runs have the same results as the
+method runs.
+
+Without ``--changed`` the script packs a folder only if its runs have the same results as the
 shipped runs. The rewards of trials are downsampled (:meth:`coartic.runs.record.Run.downsample`), so
 that the files have 5 MB instead of 150 MB.
 """
