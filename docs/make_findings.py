@@ -18,7 +18,7 @@ from typing import Any, get_args
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import by_task, load
+from coartic.analysis import by_task, load, mean
 from common.judging import Verdict
 from common.writing import fill_page
 
@@ -104,6 +104,19 @@ def gain_of_best_hands() -> float:
     return float((-100 * share / (1 - share)).mean())
 
 
+def early_less_late(family: str) -> dict[str, float]:
+    """Return by how much a hundred trials with drift gain more than ten thousand of the paper's
+    learner (``more``, points of the way to the best known reward), a mean over a family's tasks."""
+    runs = pd.read_csv(STUDIES / "dial" / "runs.csv.xz").query(f"family == '{family}'")
+    way = runs.best_known - runs.corrective_best
+    gains = {n: 100 * (runs[f"reward_{n}"] - runs.corrective_best) / way for n in (100, 10_000)}
+    tasks = [
+        gains[n][(runs.setting == setting) & (way > 0)].groupby(runs.task).mean()
+        for n, setting in ((100, "1 0.01 next-goal"), (10_000, "0 0.05"))
+    ]
+    return mean((tasks[0] - tasks[1]).dropna()).columns("more")
+
+
 def filled_pages() -> dict[str, str]:
     """Every page that is made from a template, by its path below ``docs``."""
     replication = STUDIES / "replication"
@@ -118,6 +131,7 @@ def filled_pages() -> dict[str, str]:
         "published_spreads": published_spreads,
         "p_of_shares": p_of_shares,
         "gain_of_best_hands": gain_of_best_hands,
+        "early_less_late": early_less_late,
         "published": published["general"],
         "readings": table("reconstruction", "readings"),
         "goal_sets": pd.read_csv(replication / "sets.csv"),

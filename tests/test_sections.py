@@ -76,10 +76,7 @@ def test_ranking(study):
     names = ["method", "information", "gap", f"on {ONE}", f"on {TWO}", "runs"]
     same(table, names, cells)
     assert len(TABLES["not-ranked"](study)) == 0
-    # Of two-armed 1 there is no spread: half of what ascending's runs span, -300 to -305.
-    assert LEARNED[1] / 2 + 8 / 584 <= table.gap_low[BOTH] < table.gap[BOTH]
-    assert table.gap[BOTH] < table.gap_high[BOTH] <= LEARNED[1] / 2 + 13 / 584
-    assert np.isnan(table.gap_low[PLAN])
+    assert table.gap_low.isna().all()  # three runs, and one of the plan, are too few
 
 
 def test_methods(study):
@@ -108,17 +105,17 @@ def test_runtimes(study):
     """Within 20, 50, 100, 101, 500 and 1000 trials the learner has 5, 10, 15, 21, 26 and 82 of 120
     pairs: 45 of two-armed 1 at trial 1000.
 
-    An interval ends where 1 of 27 resamples of ascending's runs does, the last run three times.
+    Three runs are too few for an interval.
     """
     names = ["reached", "trials_to_quarter", "trials_to_quarter_low", "trials_to_quarter_high",
              "trials_to_half", "trials_to_half_low", "trials_to_half_high",
              "forward_kinematics_to_half", "forward_kinematics_to_half_low",
              "forward_kinematics_to_half_high", "seconds_to_half", "seconds_to_half_low",
              f"half on {ONE}", f"half on {TWO}"]  # fmt: skip
-    # The first run is cold: the time of the other two, which are too few for an interval.
+    # The first run is cold: the time of the other two.
     cells = {
-        BOTH: (82 / 120, 1000, 50, 1000, 1000, 1000, 1000, 1e6, 1e6, 1e6, 0.25, NONE, 500, 1000),
-        CMA: (37 / 40, 10, 10, 10, 10, 10, 10, 1e4, 1e4, 1e4, 0.025, NONE, 10, 10),
+        BOTH: (82 / 120, 1000, NONE, NONE, 1000, NONE, NONE, 1e6, NONE, NONE, 0.25, NONE, 500, 1000),
+        CMA: (37 / 40, 10, NONE, NONE, 10, NONE, NONE, 1e4, NONE, NONE, 0.025, NONE, 10, 10),
         PLAN: (26 / 40, 0, NONE, NONE, 0, NONE, NONE, 500, NONE, NONE, 0.25, NONE, NONE, NONE),
     }
     table = TABLES["runtimes"](study)

@@ -457,10 +457,11 @@ def test_verdicts_on_postures_at_a_shared_goal(method, difference, runs, verdict
 
 
 def shifted(task, label, first, *, others=-20, shift=0.0, hands="RRR"):
-    """Three runs whose first movement takes so many ticks more than the corrective process's."""
+    """Runs, mostly three, whose first movement takes so many ticks more than the corrective
+    process's."""
     first = [first] * 3 if np.ndim(first) == 0 else first
     alone, runs = corrective_trial(task, hands).ticks_by_goal(), []
-    for each, noise in zip(first, (0.0, 0.1, 0.2), strict=True):
+    for each, noise in zip(first, 0.1 * np.arange(len(first)), strict=True):
         ticks = np.add(alone, [each, others, *[0] * (len(alone) - 2)])
         runs += posed(task, label, [posture(shift + noise)], ticks, hands).runs
     return Solutions(task, label, tuple(runs))

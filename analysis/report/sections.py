@@ -60,7 +60,7 @@ from coartic.learner.learning import TRIALS
 Made = TypeVar("Made")
 RUNS = 20
 """Number of runs of every experiment of the paper."""
-TOO_FEW = f"; too few runs to test: make {FEWEST}"
+TOO_FEW = f" (too few runs to test: make {FEWEST})"
 NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer runs as points."
 
 

@@ -17,9 +17,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from measures import MEASURES
+from scipy import stats
 
 from coartic import trajectory
 from coartic.analysis import figures, load
+from coartic.analysis.statistics import holm
 from coartic.estimates import Estimate
 from common.writing import write_study
 
@@ -194,6 +196,15 @@ def bootstrap(sides, statistic, level):
     (k − 1)) for k tasks, by which resamples fall short of the spread. NaN without tasks, and
     without an interval of one.
     """
+    value, count, values = resampled(sides, statistic)
+    if count < 2:
+        return Estimate(value, n=(count,))
+    return Estimate(value, *np.quantile(values, [level / 2, 1 - level / 2]), n=(count,))
+
+
+def resampled(sides, statistic):
+    """Return a statistic of all tasks, their number, and the statistic of resamples of tasks, moved
+    away from the former by √(k / (k − 1)); none with fewer than two tasks (:func:`bootstrap`)."""
     tasks = [task for task in sides[0].index.unique() if all(task in side.index for side in sides)]
     rows = [[pd.DataFrame(side).loc[[task]].to_numpy() for task in tasks] for side in sides]
     count = len(tasks)
@@ -204,12 +215,11 @@ def bootstrap(sides, statistic, level):
 
     value = difference(range(count)) if count else np.nan
     if count < 2:
-        return Estimate(value, n=(count,))
+        return value, count, np.empty(0)
     drawn = np.random.default_rng(0).integers(count, size=(RESAMPLES, count))
     different, which = np.unique(drawn, axis=0, return_inverse=True)
     values = np.array([*map(difference, different)])[which.ravel()]
-    away = (values - value) * np.sqrt(count / (count - 1))
-    return Estimate(value, *(value + np.quantile(away, [level / 2, 1 - level / 2])), n=(count,))
+    return value, count, value + (values - value) * np.sqrt(count / (count - 1))
 
 
 def verdict_of(tests):
@@ -220,12 +230,74 @@ def verdict_of(tests):
     return next((kind for kind in ("disagrees", "no cases") if kind in tests), "undecided")
 
 
-def tabulate(effects):
+def p_of_side(values, bound, side):
+    """Return p, two-sided, that a statistic lies beyond a bound: above for ``side`` 1, below for
+    -1. ``values``: those of resamples."""
+    return min(1.0, 2 * (1 + (side * (values - bound) <= 0).sum()) / (1 + len(values)))
+
+
+def p_of_test(row, test, values):
+    """Return p of a test's verdict: of agreement the larger one of both that it needs, beyond the
+    bound and beyond random search. ``row``: its effect; ``values``: a frame by task for ``model``
+    and ``control``."""
+    side, word = (1, "above") if "above" in test else (-1, "below")
+    if row.finding == "body-shares":  # of which only intervals ship
+        z = stats.norm.ppf(1 - LEVEL / len(FINDINGS["body-shares"]["tests"]) / 2)
+        p = 0.0
+        for name, bound in (("value", test[word]), ("over_random_search", 0)):
+            width = row[f"{name}_high"] - row[f"{name}_low"]
+            if width > 0:
+                p = max(p, 2 * stats.norm.sf(abs(row[name] - bound) * 2 * z / width))
+        return p
+    statistic = MEASURES[test["measure"]][1]
+    sides = [values[sample] for sample in ("model", "control") if len(values[sample])]
+    seen = resampled(sides[:1], statistic)[2]
+    if row.of_test == "disagrees":
+        return p_of_side(seen, test.get("disagree", test[word]), -side)
+    p = p_of_side(seen, test[word], side)
+    return max(p, p_of_side(resampled(sides, statistic)[2], 0, side)) if len(sides) > 1 else p
+
+
+def correct(effects, values):
+    """Return the verdicts of models on findings, corrected over all of them (Holm): a row for each
+    pair, with ``tasks``, ``uncorrected`` verdict, ``p`` of it, ``p_holm`` and ``verdict``.
+
+    Tests of one finding are corrected by Bonferroni, as their intervals are. Verdicts that follow
+    from how a model is built stay. ``values``: table ``runs``.
+    """
+    rows = {}
+    for (finding, model), tests in effects.groupby(["finding", "model"], sort=False):
+        kind, built_in = tests.verdict.iloc[0], bool(tests.built_in.iloc[0])
+        p = []
+        for (_, row), test in zip(tests.iterrows(), FINDINGS[finding]["tests"], strict=True):
+            if row.of_test == kind and kind in ("agrees", "disagrees") and not built_in:
+                of = values[(values.index == test["measure"]) & (values.model == model)]
+                samples = {
+                    name: of[of["sample"] == name]
+                    .set_index("task")
+                    .drop(columns=["model", "sample"])
+                    for name in ("model", "control")
+                }
+                samples = {name: side.dropna(axis=1, how="all") for name, side in samples.items()}
+                p.append(p_of_test(row, test, samples))
+        made = not built_in and kind in ("agrees", "disagrees", "undecided")
+        rows[f"{finding} {model}"] = {
+            "finding": finding, "model": model, "tasks": tests.tasks.min(), "uncorrected": kind,
+            "built_in": built_in, "judged": made and tests.tasks.min() > 0,
+            "p": len(tests) * (max if kind == "agrees" else min)(p) if p else np.nan,
+        }  # fmt: skip
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
+    table["p_holm"] = holm(table.p.clip(upper=1), int(table.judged.sum()))
+    open_ = table.p_holm >= LEVEL
+    return table.assign(verdict=table.uncorrected.mask(open_, "undecided"))
+
+
+def tabulate(verdicts):
     """Verdicts of models on findings; a star: it follows from how the model is built."""
-    cells = effects.drop_duplicates(["finding", "model"]).set_index(["finding", "model"])
+    cells = verdicts.set_index(["finding", "model"])
     words = cells.verdict + cells.built_in.map({True: " *", False: ""})
     table = pd.DataFrame({name: words[:, name] for name in MODELS}).add_prefix("of ")
-    table = table.loc[effects.finding.unique()]
+    table = table.loc[verdicts.finding.unique()]
     table.insert(0, "finding", [FINDINGS[name]["statement"] for name in table.index])
     return table.rename_axis("row")
 
@@ -256,10 +328,35 @@ def measure(study):
     """Return the tables by name; each becomes a CSV file. ``runs`` has values by task; verdicts are
     also on finding body-shares."""
     effects, values = measure_effects(study)
+    values = values.set_index("measure")
+    return {**judge_all(effects, values), "effects": effects, "runs": values}
+
+
+def judge_all(effects, values):
+    """Return the tables of verdicts by name, those on finding body-shares among them."""
     body = pd.read_csv(HERE / "body.csv", index_col=0)
-    results = tabulate(pd.concat([effects, body]))
-    return {"results": results, "effects": effects, "runs": values.set_index("measure")}
+    verdicts = correct(pd.concat([effects, body]), values)
+    same = on_the_same_tasks(values, "slope norm at distance 2", "all goals ahead")
+    return {"results": tabulate(verdicts), "verdicts": verdicts, "same": same}
+
+
+def on_the_same_tasks(values, measure, model):
+    """Return a measure of each model that has it on all tasks of ``model``, on these tasks."""
+    of = values[(values.index == measure) & (values["sample"] == "model")]
+    tasks = of.task[of.model == model].unique()
+    rows = {}
+    for name, of_model in of[of.task.isin(tasks)].groupby("model", sort=False):
+        side = of_model.set_index("task").drop(columns=["model", "sample"])
+        found = bootstrap([side.dropna(axis=1, how="all")], MEASURES[measure][1], LEVEL)
+        if found.n == (len(tasks),):
+            rows[name] = {"tasks": len(tasks), **found.columns("value")}
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("model")
 
 
 if __name__ == "__main__":
-    write_study(HERE, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)
+    if sys.argv[1:]:
+        tables = measure(load(sys.argv[1]))
+    else:
+        stored = [pd.read_csv(HERE / name, index_col=0) for name in ("effects.csv", "runs.csv.xz")]
+        tables = judge_all(*stored)
+    write_study(HERE, tables, draw)

@@ -127,18 +127,22 @@ def test_random_search_has_the_hands_of_the_learner():
 
 
 def test_a_mean_of_unequal_families_is_tested_at_its_level():
-    """At its bound the test rejects in 5 % of planted studies; families differ in size, spread and
-    mean, as the tasks of *memory* do on which both have an idle hand."""
-    rng, sizes, spreads = np.random.default_rng(0), [40, 30, 12, 5], [1.0, 0.5, 2.0, 4.0]
+    """At its bound the test rejects in 5 % of planted studies. Families are as large as those of
+    tasks with an idle hand, and the smallest has the largest spread. A test with the spread of
+    pooled tasks rejects in 15 %."""
+    rng, sizes, spreads = np.random.default_rng(0), [32, 12, 27, 34], [1.0, 2.5, 1.0, 0.8]
     families = pd.Series(np.repeat([*"abcd"], sizes))
     means = np.repeat([1.0, 2.0, -1.0, -2.0], sizes)  # their mean over families is 0
-    p = []
+    p, pooled = [], []
     for _ in range(1_000):
         values = pd.Series(means + rng.normal(size=len(means)) * np.repeat(spreads, sizes))
         tested = SCALES.by_task(values, families)
         assert tested.mean() == pytest.approx(values.groupby(families).mean().mean())
         p.append(bootstrap_test(tested, 0.0, resamples=199).p)
-    assert 0.03 < np.mean(np.array(p) <= 0.05) < 0.07
+        within = values - values.groupby(families).transform("mean") + tested.mean()
+        pooled.append(bootstrap_test(within, 0.0, resamples=199).p)
+    assert 0.03 < np.mean(np.array(p) <= 0.05) < 0.08
+    assert np.mean(np.array(pooled) <= 0.05) > 0.09
 
 
 def test_tables_are_made_from_the_cells_that_ship():
