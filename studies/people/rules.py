@@ -236,4 +236,4 @@ if __name__ == "__main__":
     folder = Path(__file__).parent
     stored = read(folder / "postures.csv")
     counts = contexts_of(stored[left_out(stored) == ""])
-    tabulate_power(counts).to_csv(folder / "power.csv", float_format="%.4g", lineterminator="\n")
+    tabulate_power(counts).to_csv(folder / "power.csv", float_format="%.6g", lineterminator="\n")
