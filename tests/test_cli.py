@@ -368,7 +368,7 @@ def test_draw(coartic, tmp_path, monkeypatch):
     assert coartic("draw", "ascending", "--out", tmp_path / "one.pdf")[0] == 0
     assert (tmp_path / "one.pdf").stat().st_size > 5000
     monkeypatch.setattr(read, "_PICTURED", 2)
-    for count, words in ((2, "2 tasks."), (3, "3 tasks, of which 2 are drawn.")):
+    for count, words in ((2, "2 tasks."), (3, "3 tasks; the first 2 are drawn.")):
         many = (f"long/v1/i001..i00{count}", "--out", tmp_path / f"{count}.svg")
         assert coartic("draw", *many)[1].endswith(f": {words}\n")
     assert (tmp_path / "2.svg").read_bytes() == (tmp_path / "3.svg").read_bytes()
