@@ -218,7 +218,7 @@ def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic,
         code, text, _ = coartic("run", "paper", "--tasks", name, "--methods", "EC4", "--runs", 1,
                                 "--trials", 5, "--out", "out")  # fmt: skip
         assert (code, text[:5]) == (0, "2 run" if ".." in name[3:] else "1 run")
-        assert "no reward is known of" in " ".join(text.split())
+        assert "no reward is known" in " ".join(text.split())
     for wrong in ("i0", "x000", "i00x"):
         with pytest.raises(TaskError, match="is not an instance of a family"):
             load_task(f"{path}/{wrong}")
