@@ -97,7 +97,7 @@ def test_a_report_is_not_written_through_a_link(traced, tmp_path):
     study.folder.mkdir()
     (tmp_path / "mine").mkdir()
     (study.folder / "report").symlink_to(tmp_path / "mine")
-    with pytest.raises(CoarticError, match="by a link"):
+    with pytest.raises(CoarticError, match="by a symbolic link"):
         write_report(study, study.folder / "report")
     assert not list((tmp_path / "mine").iterdir())
 

@@ -43,7 +43,7 @@ def test_a_film_and_a_picture(tmp_path):
     mine.plot().savefig(tmp_path / "mine.png")
     with pytest.raises(ValueError, match="goal is 0; it must be an integer from 1 to 2"):
         mine.subtask(0)
-    for name, words in (("mine.gif", "there already"), ("mine.txt", "must end in .gif or .mp4")):
+    for name, words in (("mine.gif", "mine.gif exists"), ("mine.txt", "must end in .gif or .mp4")):
         with pytest.raises(CoarticError, match=words):
             mine.animate(tmp_path / name)
 
