@@ -3,7 +3,8 @@
 ``tests/studies/NAME`` has a results folder of a small version of the study's suite, and the tables
 that the report of version 1.1.0 (commit f7064014, before studies left the package) made of it; but
 one verdict of dose there is now undecided, as it hangs on one of five tasks, two of human are, as
-verdicts are corrected over models, and comparisons of dose and human with random search have the same hands.
+verdicts are corrected over models, and comparisons of dose and human with random search have the
+same hands.
 """
 
 import hashlib
