@@ -114,7 +114,7 @@ def test_runtimes(study):
              f"half on {ONE}", f"half on {TWO}"]  # fmt: skip
     # The first run is cold: the time of the other two.
     cells = {
-        BOTH: (82 / 120, 1000, NONE, NONE, 1000, NONE, NONE, 1e6, NONE, NONE, 0.25, NONE, 500, 1000),
+        BOTH: (41 / 60, 1e3, NONE, NONE, 1e3, NONE, NONE, 1e6, NONE, NONE, 0.25, NONE, 500, 1e3),
         CMA: (37 / 40, 10, NONE, NONE, 10, NONE, NONE, 1e4, NONE, NONE, 0.025, NONE, 10, 10),
         PLAN: (26 / 40, 0, NONE, NONE, 0, NONE, NONE, 500, NONE, NONE, 0.25, NONE, NONE, NONE),
     }
