@@ -131,6 +131,14 @@ def traced(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def shipped():
+    """The shipped results of suite ``comparison``, which nobody changes."""
+    from coartic.analysis.study import load
+
+    return load("shipped")
+
+
+@pytest.fixture(scope="session")
 def report(traced, tmp_path_factory):
     """The folder of a report on those results, as a user gets it."""
     from coartic.analysis.report import build, sections
