@@ -71,6 +71,13 @@ def in_this_process(unranked, monkeypatch):
         monkeypatch.setattr(module, "Local", InProcess)
 
 
+@pytest.fixture(autouse=True)
+def _pages_here(request):
+    """Examples of pages run in this process."""
+    if isinstance(request.node, pytest.DoctestItem):
+        request.getfixturevalue("in_this_process")
+
+
 @pytest.fixture(scope="module")
 def not_repeated():
     """No run of a method of a file is made again in the end."""
