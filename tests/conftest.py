@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -71,6 +72,13 @@ def in_this_process(unranked, monkeypatch):
         monkeypatch.setattr(module, "Local", InProcess)
 
 
+@pytest.fixture(autouse=True)
+def _pages_here(request):
+    """Examples of pages run in this process."""
+    if isinstance(request.node, pytest.DoctestItem):
+        request.getfixturevalue("in_this_process")
+
+
 @pytest.fixture(scope="module")
 def not_repeated():
     """No run of a method of a file is made again in the end."""
@@ -128,6 +136,24 @@ def traced(tmp_path_factory):
         run_and_write(folder, traced_cells(), runs=4, trials=150)
 
     return load(made_once(tmp_path_factory, "traced", make))
+
+
+@pytest.fixture(scope="session")
+def shipped():
+    """The shipped results of suite ``comparison``, which nobody changes."""
+    from coartic.analysis.study import load
+
+    return load("shipped")
+
+
+@pytest.fixture(scope="session")
+def shipped_families():
+    """The shipped results of suite ``families``, likewise."""
+    from coartic.analysis.study import Study
+    from coartic.runs.shipped import open_shipped
+
+    with open_shipped("families") as store:
+        return Study(Path("families"), store.plan(), store.made_with(), store.runs())
 
 
 @pytest.fixture(scope="session")

@@ -29,7 +29,7 @@ def distributed():
 @pytest.fixture(scope="module")
 def address(distributed):
     """Of a cluster in this process, which is as far as patches reach."""
-    more = {"n_workers": 2, "threads_per_worker": 1, "processes": False}
+    more = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "protocol": "tcp://"}
     with distributed.LocalCluster(**more, **QUIET) as cluster:
         yield cluster.scheduler_address
 
@@ -54,17 +54,15 @@ class Mine(Method):
 """
 
 
-def test_a_method_of_a_file_runs_on_workers_that_are_processes(distributed, tmp_path):
-    """As on a cluster. One whose file was changed there is refused."""
+def test_a_method_of_a_file_runs_on_workers(address, tmp_path):
+    """All that goes there is serialised. A method whose file was changed there is refused."""
     (tmp_path / "mine.py").write_text(OWN)
     cell = cell_on(load_task("ascending"), registry([tmp_path / "mine.py"])["mine"])
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, **QUIET) as cluster:
-        dask = Dask(cluster.scheduler_address)
-        runs = run_and_write(tmp_path / "out", [cell], executor=dask).runs
-        assert runs.status.tolist() == ["ok", "ok"]
-        (tmp_path / "mine.py").write_text(f"{OWN}# changed")
-        with pytest.raises(CoarticError, match="mine.py, or a file that it loads, has changed"):
-            run_and_write(tmp_path / "other", [cell], executor=dask)
+    runs = run_and_write(tmp_path / "out", [cell], executor=Dask(address)).runs
+    assert runs.status.tolist() == ["ok", "ok"]
+    (tmp_path / "mine.py").write_text(f"{OWN}# changed")
+    with pytest.raises(CoarticError, match="mine.py, or a file that it loads, has changed"):
+        run_and_write(tmp_path / "other", [cell], executor=Dask(address))
 
 
 @pytest.mark.usefixtures("distributed")

@@ -28,5 +28,6 @@ def test_a_wrong_hand_sequence_is_refused_with_the_choices(call):
 
 
 def test_conditions_are_shown_as_they_are_written():
+    names = {name: getattr(coartic, name) for name in coartic.__all__}
     for condition in (coartic.CONDITIONS | coartic.ABLATIONS).values():
-        assert eval(repr(condition), {**vars(coartic)}) == condition
+        assert eval(repr(condition), names) == condition

@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from coartic import CoarticError, load_task
-from coartic.analysis import FIGURES, load
+from coartic.analysis import FIGURES
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.pictures import drawing
@@ -19,11 +19,10 @@ from tests.support.suites import KNOWN
 
 
 @pytest.fixture(scope="module")
-def shipped():
+def few(shipped):
     """The shipped results with five runs of each method on each task, on which figures and
     sentences name the same methods as on all runs."""
-    study = load("shipped")
-    return replace(study, stored=study.stored[study.stored.run < 5])
+    return replace(shipped, stored=shipped.stored[shipped.stored.run < 5])
 
 
 def test_robots_and_goals_are_drawn_where_they_are():
@@ -40,8 +39,8 @@ def test_robots_and_goals_are_drawn_where_they_are():
 
 
 @pytest.mark.parametrize("name", sorted({*FIGURES} - {"gaps-by-family"}))
-def test_no_text_leaves_a_narrow_figure_or_lies_on_another(name, shipped):
-    plot = FIGURES[name](shipped, width=3.4)
+def test_no_text_leaves_a_narrow_figure_or_lies_on_another(name, few):
+    plot = FIGURES[name](few, width=3.4)
     texts = texts_of(plot.figure)
     assert misplaced(plot.figure) == ([], [])
     assert max(lightness(to_hex(text.get_color())) for text in texts) < 49.9  # 4.5 : 1 with white
@@ -52,8 +51,8 @@ def test_no_text_leaves_a_narrow_figure_or_lies_on_another(name, shipped):
     assert all(map(len, (plot.alt, plot.caption, plot.data)))
 
 
-def test_a_figure_has_chosen_style(shipped, tmp_path):
-    plot = FIGURES["ranking"](shipped, style={"axes.labelsize": 20.0})
+def test_a_figure_has_chosen_style(few, tmp_path):
+    plot = FIGURES["ranking"](few, style={"axes.labelsize": 20.0})
     assert plot.figure.axes[0].xaxis.label.get_fontsize() == 20.0
     plot.save(tmp_path / "mine.pdf")
     assert (tmp_path / "mine.pdf").read_bytes().startswith(b"%PDF")

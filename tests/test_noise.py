@@ -17,7 +17,6 @@ from coartic import (
     load_task,
     movements_of,
 )
-from coartic.analysis.study import load
 from tests.support import noise as reference
 from tests.support.strategies import (
     STUCK,
@@ -38,14 +37,16 @@ SHORT = MotionModel(max_iterations=120)
 """Corrections that take longer fail."""
 
 
-@pytest.mark.parametrize("signal_dependent", [False, True])
 @pytest.mark.parametrize("name", TASKS)
-def test_executions_are_those_of_the_slow_implementation(name, signal_dependent):
-    rng, options = np.random.default_rng(7), {"signal_dependent": signal_dependent}
+def test_executions_are_those_of_the_slow_implementation(name):
+    rng = np.random.default_rng(7)
     solutions = [random_solution(TASKS[name], SHORT, rng) for _ in range(8)]
     seen = []
-    for motor_noise in (0.01, 0.1):
-        case = (TASKS[name], solutions, motor_noise, 3, 3, SHORT)
+    for motor_noise, grows in ((0.01, False), (0.1, True)):
+        case, options = (
+            (TASKS[name], solutions, motor_noise, 3, 3, SHORT),
+            {"signal_dependent": grows},
+        )
         made = execute_noisy(*case, **options)
         np.testing.assert_array_equal(made, reference.execute_noisy(*case, **options))
         seen.append(made)
@@ -173,10 +174,10 @@ def test_an_execution_fails_where_the_corrective_process_does():
         assert np.isfinite(execute_noisy(task, [aimed], 0.01, 3, 0)).all()
 
 
-def test_shipped_runs_without_noise_have_their_rewards():
-    study, seen = load("shipped"), set()
-    for task, method in study.cells:
-        executed = study.executed(task, method).runs[:1]
+def test_shipped_runs_without_noise_have_their_rewards(shipped):
+    seen = set()
+    for task, method in shipped.cells:
+        executed = shipped.executed(task, method).runs[:1]
         made = execute_noisy(task, [each.movements for each in executed], 0.0, 1, 0)
         assert made[:, 0].tolist() == [each.ticks for each in executed]
         seen |= {movement.kind for each in executed for movement in each.movements}

@@ -3,7 +3,6 @@
 import math
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +20,6 @@ from coartic.analysis.statistics import holm, stratified_test
 from coartic.analysis.study import Study
 from coartic.analysis.tables import shown_columns
 from coartic.analysis.words import number
-from coartic.runs.shipped import open_shipped
 from tests.support.made_up import MadeUp, made_up_optima, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
 
@@ -215,11 +213,11 @@ def test_a_study_of_numbers_of_trials_is_ranked_whole():
     assert rows.index.tolist() == [f"{EC1} {setting}" for setting in settings[::-1]]
 
 
-@pytest.mark.parametrize("suite", ["comparison", "families"])
-def test_the_frame_of_shipped_runs_ranks_methods_on_all_tasks(suite):
-    with open_shipped(suite) as store:
-        seen = Study(Path(suite), store.plan(), store.made_with(), store.runs())
-    some = seen.runs.task.isin(seen.runs.task.unique()[:: 10 if suite == "families" else 1])
+@pytest.mark.parametrize("every", [1, 10])
+def test_the_frame_of_shipped_runs_ranks_methods_on_all_tasks(every, shipped, shipped_families):
+    """Of the comparison, and of some instances of the families."""
+    seen = shipped if every == 1 else shipped_families
+    some = seen.runs.task.isin(seen.runs.task.unique()[::every])
     runs = seen.runs[some & ~seen.runs.method.str.startswith("optimum")]
     ranked, tasks = ranking(runs), runs.task.nunique()
     ran = runs.groupby("ranked_as").task.nunique()

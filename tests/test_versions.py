@@ -99,8 +99,8 @@ def built_in_digest(name):
     return cell_of(TASK, info, {}).digest
 
 
-SLOW = {"receding-horizon"}
-"""Methods whose cheapest shipped run takes several seconds."""
+SLOW = {"receding-horizon", "optimum/search"}
+"""Methods whose cheapest shipped run takes seconds, and which have exact tests of their own."""
 RUNS = {
     "dual-process/EC1-uncorrected": (-357, "RRRR", 384_054),
     "dual-process/EC4-uncorrected": (-357, "RRRR", 406_895),
