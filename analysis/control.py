@@ -27,7 +27,7 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.methods import BY_TRIAL, LEARNERS, RANDOM_SEARCH, headline_methods
-from coartic.analysis.signatures import SIGNATURES, TwoContexts, context_pairs
+from coartic.analysis.signatures import TwoContexts, context_pairs
 from coartic.analysis.study import MOST_EXECUTED, Study, solved
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
@@ -85,10 +85,10 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
     are left out. Signature ``hand``, a measure of the choice of hands itself, has one entry ``""``
     for all hand sequences together, or none if no run has it. It is cached: do not change it.
     """
-    executed = study.executed(task, label)
-    values = SIGNATURES[signature].each(executed)
-    every = [run.hands if signature != "hand" else "" for run in executed.runs]
-    hands = np.array(every, dtype=object)
+    values = study.signature(signature, task, label).to_numpy(np.float64)
+    hands = np.array(study.cells[task, label].hands.tolist(), dtype=object)
+    if signature == "hand":
+        hands[:] = ""
     there = np.isfinite(values)
     return {each: values[there & (hands == each)] for each in sorted({*hands[there]})}
 

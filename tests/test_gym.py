@@ -156,8 +156,8 @@ def test_what_is_refused():
     several = [partial(TaskEnv, name) for name in ("ascending", "descending")]
     for error, words, call in (
         (ValueError, "ahead is -1; it must be", lambda: TaskEnv("ascending", ahead=-1)),
-        (ValueError, "are for families", lambda: TaskEnv("ascending", count=3)),
-        (ValueError, "no options {'tasks': 1}", lambda: env.reset(options={"tasks": 1})),
+        (ValueError, "are options of families", lambda: TaskEnv("ascending", count=3)),
+        (ValueError, "options {'tasks': 1} are unknown", lambda: env.reset(options={"tasks": 1})),
         (ValueError, "finite, of shape", lambda: env.step(missing)),
         (ValueError, "not a row for each", lambda: score(env, lambda seen: np.zeros((2, 6)))),
         (TypeError, "vector environment of coartic", lambda: score(gymnasium.make("CartPole-v1"))),

@@ -105,7 +105,7 @@ def test_a_damaged_source_is_named_and_nothing_is_copied(parts, left, tmp_path, 
     content = (left / RUNS_FILE).read_bytes()
     for end in (b"", bytes(lost)):
         (left / RUNS_FILE).write_bytes(content[:-lost] + end)
-        with pytest.raises(CoarticError, match=f"cannot use {left / RUNS_FILE}: it is damaged"):
+        with pytest.raises(CoarticError, match=f"{left / RUNS_FILE}.*: it is damaged"):
             joined([parts[1], left], tmp_path / "whole")
         assert not (tmp_path / "whole").exists()
 

@@ -246,7 +246,7 @@ def test_a_budget_counts_the_trials_with_which_hands_are_chosen():
     with pytest.raises(BudgetError):
         problem(problem.x0)
     few = "budget is 15; it takes 16 trials to choose among the hand sequences .* raise the budget"
-    for budget, words in ((0, "budget is 0; it must be a whole number from 1"), (15, few)):
+    for budget, words in ((0, "budget is 0; it must be an integer from 1"), (15, few)):
         with pytest.raises(ValueError, match=words):
             objective(FOUR, budget=budget)
     assert objective(FOUR, "RLRR", budget=5).trials_left == 4

@@ -134,7 +134,7 @@ def test_a_run_that_waits_twice_is_stored_as_timed_out(tmp_path):
     said = [str(perform(plan, tmp_path / "out", executor=executor)) for plan in plans[:2]]
     runs = load(tmp_path / "out").runs
     assert runs.status.tolist() == ["ok", "timeout"]
-    assert runs.reason[1] == "wall time limit of 5 s exceeded twice: it waited"
+    assert runs.reason[1] == "wall time limit of 5 s exceeded twice: the job waited"
     assert said[0].startswith("2 runs in ")
     assert "1 failed" in said[0]
     assert said[1].startswith("2 runs (2 reused) in ")

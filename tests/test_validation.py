@@ -93,13 +93,13 @@ SUITES = [
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
     (SUITE + "grid = {noise_sd = [nan]}", "grid.noise_sd[0] is nan: "),
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5: "),
-    (SUITE + "move = {goal = 4, by = [[0, 1]]}", "has no goal 4"),
+    (SUITE + "move = {goal = 4, by = [[0, 1]]}", "asks for goal 4"),
 ]
 METHODS = [
     ("import nothing_like_this", "ModuleNotFoundError"),
-    ("x = 1", "defines no subclass of coartic.Method"),
+    ("x = 1", "must define a subclass of coartic.Method"),
     (method("def solve", "def solves"), "A has no solve"),
-    (method('"a"', '"cma-es/bandit"'), "'cma-es/bandit' is already taken"),
+    (method('"a"', '"cma-es/bandit"'), "method id 'cma-es/bandit' exists already"),
     (method("frozenset()", '"goals"'), "information must be"),
 ]
 

@@ -322,8 +322,10 @@ def draw(
             raise CoarticError("--run needs one results folder: coartic draw FOLDER --run ID")
         film = out or Path("film.gif")
         return _film(folder_named(tasks[0]), run, film, initial, width or 800, replace)
-    if initial or width is not None:
-        raise CoarticError("--initial and --width have no effect without --run")
+    without = ["--initial"] * initial + ["--width"] * (width is not None)
+    if without:
+        has = "have" if without[1:] else "has"
+        raise CoarticError(f"{' and '.join(without)} {has} no effect without --run")
     from coartic import builtin_tasks, load_task
     from coartic.internal.files import check_ending, check_output, publish, write_output
     from coartic.runs.plan import tasks_by_name

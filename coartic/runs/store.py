@@ -322,7 +322,7 @@ class Store:
         """Raise CoarticError if pages of the file, or JSON in table ``results``, are damaged."""
         broken = "SELECT 1 FROM results WHERE NOT (json_valid(details) AND json_valid(movements))"
         if self._rows("PRAGMA quick_check(1)") != [("ok",)] or self._rows(f"{broken} LIMIT 1"):
-            raise CoarticError(f"cannot use {plain(str(self.folder / RUNS_FILE))}: {_DAMAGED}")
+            raise CoarticError(f"{plain(str(self.folder / RUNS_FILE))} cannot be used: {_DAMAGED}")
 
     def include(self, other: Store) -> None:
         """Copy runs of the plan that this folder lacks from another folder."""

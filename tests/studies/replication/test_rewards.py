@@ -105,5 +105,5 @@ def test_interval_is_welchs_and_against_an_exact_value_students():
     assert ends(None, 20) == ends(3.0, 1) == pytest.approx((students.low, students.high))
     assert REWARDS.difference_to_published(ours, 0.0, 1.0, 15).n == (20, 15)
     assert math.isnan(REWARDS.difference_to_published([1.0], 2.0, 1.0, 3).low)
-    point = REWARDS.difference_to_published(np.ones(4), 3.0, 0.0, 4)
+    point = REWARDS.difference_to_published(np.ones(5), 3.0, 0.0, 5)
     assert (point.low, point.high) == (-2.0, -2.0)
