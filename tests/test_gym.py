@@ -159,7 +159,7 @@ def test_what_is_refused():
         (ValueError, "are options of families", lambda: TaskEnv("ascending", count=3)),
         (ValueError, "options {'tasks': 1} are unknown", lambda: env.reset(options={"tasks": 1})),
         (ValueError, "finite, of shape", lambda: env.step(missing)),
-        (ValueError, "not a row for each", lambda: score(env, lambda seen: np.zeros((2, 6)))),
+        (ValueError, "a row for each", lambda: score(env, lambda seen: np.zeros((2, 6)))),
         (TypeError, "vector environment of coartic", lambda: score(gymnasium.make("CartPole-v1"))),
         (TypeError, "different options", lambda: score(gymnasium.vector.SyncVectorEnv(several))),
     ):
