@@ -32,14 +32,14 @@ also makes a step of the postures. The objective decides which posture hits the 
 The controller was tuned only on thirty development instances (``d000`` to ``d009`` of families
 one-armed, two-armed and aligned): 12 settings of the controller, tabled here, and before that some
 50 settings of a prototype. The table has the mean gap of ``goals-ahead`` to the best known path,
-with one setting changed at a time. The value used is marked with *:
+with one setting changed at a time. A star marks the value that is used:
 
 =========================  ====================================================================
-least speed of the hand    0: 2.2 %, 0.03*: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
+least speed of the hand    0: 2.2 %, 0.03 ★: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
 (share of even speed)      1: 6.9 %
-weight of paths to come    0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1*: 2.3 %, 1.2: 2.6 %
+weight of paths to come    0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1 ★: 2.3 %, 1.2: 2.6 %
 (speed of 0.1)
-goals ahead                none: 20.1 %, 1: 5.6 %, 2*: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
+goals ahead                none: 20.1 %, 1: 5.6 %, 2 ★: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
 (speed of 0.1)
 =========================  ====================================================================
 
