@@ -1,4 +1,4 @@
-"""Citations of the software, the paper, and the works behind methods, solvers and analysis.
+"""Cite the software, the paper, and the works on which methods, solvers and analysis are based.
 
 The works are entries of ``references.bib``.
 """
@@ -36,23 +36,23 @@ def bibliography(
     environment: Mapping[str, Any] | None = None,
     imports: Mapping[str, Sequence[str]] | None = None,
 ) -> str:
-    """Return BibTeX for the software, the paper and the methods, each cited work of
-    ``references.bib`` once.
+    """Return BibTeX for the software, the paper and the methods; each work has one entry.
+
+    A comment before an entry says which methods, or what else, the work is cited for.
 
     Parameters
     ----------
     methods : mapping of str to MethodInfo
-        Methods by id. A comment before an entry names the methods that use the work, or what else
-        does. A method from
-        a file is cited as its author declares; a comment alone names it if its author does not.
+        Methods by id. A method from a file is cited as its author declares. If the author declares
+        nothing, there is only a comment.
     analysis : bool
-        Add the works behind statistics and signatures.
+        True to add the works on which statistics and signatures are based.
     environment : mapping, optional
         Environment of a results folder (:attr:`.Study.made_with`), whose version and commit are
         cited; by default the version of this program.
     imports : mapping, optional
         Names and versions of the packages that a method's file imports, by the id of the method
-        (:attr:`.Study.imports`): a comment names these packages.
+        (:attr:`.Study.imports`). They are named in a comment.
     """
     made_with = environment or {}
     note = f"Version {made_with.get('coartic') or __version__}"
@@ -93,11 +93,11 @@ def bibliography(
 
 
 def _misc(key: str, **fields: str) -> str:
-    """Return an entry ``@misc`` of BibTeX with this key and these fields, a line for each."""
+    """Return an entry ``@misc`` of BibTeX, with a line for each field."""
     lines = [f"  {name} = {{{value}}}," for name, value in fields.items()]
     return "\n".join([f"@misc{{{key},", *lines, "}"])
 
 
 def _comment(text: str) -> str:
-    """Return text as a line of comment in BibTeX, with (at) for @, which would begin an entry."""
+    """Return text as a comment line for BibTeX; (at) replaces @, which would begin an entry."""
     return f"% {one_line(text)}".replace("@", "(at)")

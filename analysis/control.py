@@ -1,18 +1,19 @@
-"""Comparisons of signatures of coarticulation with random search, their control.
+"""Compare signatures of coarticulation with those of random search, their control.
 
-Selection by reward alone produces signatures of coarticulation. So the signatures of a method that
-selects its solution from trials are compared with the signatures of random search
-(:mod:`coartic.baselines.random_search`), which is the paper's learner without its memory. Like is
-compared with like:
+Selection by reward alone produces signatures of coarticulation. Therefore the signatures of a
+method that selects its solution from trials are compared with those of random search
+(:mod:`coartic.baselines.random_search`), which is the paper's learner without its memory. The
+compared runs have
 
-- runs with the same hand sequence. The choice of hands itself, signature ``hand``, is compared with
-  random search that tries every hand sequence, whatever the hands;
-- the idle arm has noise in random search if it has noise under the learner's condition
-  (``modify_other``: not under EC1 and EC3), or if there is no random search without this noise;
-- as many trials;
-- solved runs of both: a run that does not improve counts with what it shows, often 0.
+- the same hand sequence. Signature ``hand``, the choice of hands itself, is compared with random
+  search that tries all hand sequences, and all its runs count;
+- the same noise of the idle arm, if possible: it has noise under a learner's condition with
+  ``modify_other`` (not EC1 and EC3). If there is no random search without this noise, random search
+  with it is used;
+- the same number of trials;
+- a solution. A solved run that does not improve counts with its value, often 0.
 
-The test is the one-tailed test of the difference of means over runs by exchange of labels.
+The test is the one-tailed exchange test of the difference of means over runs.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
 
 LEAST_SHARE = 0.1
-"""Least share of a method's runs on a task that a compared hand sequence has."""
+"""Smallest share of a method's solved runs on a task that a compared hand sequence must have."""
 
 
 def with_control(
@@ -44,7 +45,7 @@ def with_control(
     Parameters
     ----------
     study : Study
-        Results that have both.
+        Results with runs of both.
     signature : str
         Name in ``coartic.analysis.SIGNATURES``.
     task, label : str
@@ -53,12 +54,15 @@ def with_control(
     Returns
     -------
     dict
-        For each hand sequence with which at least a tenth of the method's solved runs end and have
-        the signature, the commonest first: the values of these runs and of the runs of random
-        search (:func:`control_of`) with these hands and as many trials, shape ``(n,)`` each,
-        without runs that lack the signature; the second empty if there is no such random search.
-        For signature ``hand`` at most one entry, ``""``, whatever the hands. Of each method only
-        the first 500 solved runs count.
+        For each hand sequence, the values of the method's runs and of the runs of random search
+        (:func:`control_of`) with these hands and the same number of trials, shape ``(n,)`` each.
+
+        - A hand sequence is included if at least a tenth of the method's solved runs have these
+          hands and the signature. The most frequent sequence comes first.
+        - Runs without the signature are left out.
+        - The second array is empty if there is no such random search.
+        - For signature ``hand`` there is at most one entry, ``""``, for all hands.
+        - Only the first 500 solved runs of each method count.
 
     Examples
     --------
@@ -78,27 +82,30 @@ def with_control(
 
 @lru_cache(maxsize=4_096)
 def signature_by_hands(study: Study, signature: str, task: str, label: str) -> dict[str, Array]:
-    """Return a signature, a number for each run, of a method's runs on a task, by their hand
-    sequence in alphabetical order.
+    """Return a signature of a method's runs on a task, by hand sequence in alphabetical order.
 
-    Arrays have shape ``(n,)``, of the first 500 solved runs on the task; runs without the signature
-    are left out. Signature ``hand``, a measure of the choice of hands itself, has one entry ``""``
-    for all hand sequences together, or none if no run has it. It is cached: do not change it.
+    Arrays have shape ``(n,)``, with a number for each of the first 500 solved runs that has the
+    signature. Signature ``hand``, which measures the choice of hands itself, has one entry ``""``
+    for all hand sequences together, or none if no run has it. The result is cached: do not change
+    it.
     """
     values = study.signature(signature, task, label).to_numpy(np.float64)
     hands = np.array(study.cells[task, label].hands.tolist(), dtype=object)
     if signature == "hand":
         hands[:] = ""
-    there = np.isfinite(values)
-    return {each: values[there & (hands == each)] for each in sorted({*hands[there]})}
+    has_value = np.isfinite(values)
+    sequences = sorted({*hands[has_value]})
+    return {sequence: values[has_value & (hands == sequence)] for sequence in sequences}
 
 
 def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:
-    """Return the label of the control of a method on a task: random search with the hand sequence
-    ``hands`` (empty: with every hand sequence) and as many trials. Empty without such runs.
+    """Return the label of the random search that is the control of a method on a task.
 
-    Random search that explores the idle arm as the method does comes before random search that
-    explores both arms; with ``alike`` only the former is a control.
+    It has the hand sequence ``hands`` (if ``hands`` is empty, it tries all hand sequences) and the
+    same number of trials. The result is empty if there are no such runs.
+
+    Random search that treats the idle arm as the method does is preferred. If there is none, random
+    search that explores both arms is used, unless ``alike`` is True.
     """
     controls, trials = _controls(study, task), _most_trials(study, task, label)
     explored = explores_idle_arm(study, task, label)
@@ -108,9 +115,12 @@ def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool =
 
 @lru_cache(maxsize=4_096)
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
-    """Return True if a method adds exploration noise to the arm that is not to hit: the learner by
-    its condition, others, such as random search, by their parameter ``idle_arm``, True without it.
-    Always True on tasks for one arm."""
+    """Return True if a method adds exploration noise to the idle arm.
+
+    - On tasks for one arm it is always True.
+    - For the learner, its condition decides.
+    - For other methods, such as random search, parameter ``idle_arm`` decides; True without it.
+    """
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
         return True
@@ -123,10 +133,13 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
 
 @lru_cache(maxsize=4_096)
 def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
-    """Return the labels of forms of random search on a task, by hand sequence of all solved runs
-    (empty if every hand sequence is tried), number of trials, and True if the idle arm is explored,
-    too; of forms alike in these the first. Left out are random search in several ``stages``, with
-    several given hand sequences, and without a solved run."""
+    """Return the labels of the forms of random search on a task.
+
+    The keys are the hand sequence (empty if all hand sequences are tried), the number of trials,
+    and whether the idle arm is explored. If forms have the same key, the first is used. A form is
+    left out if it has several ``stages``, its solved runs have different hand sequences although it
+    does not try all, or it has no solved run.
+    """
     labels = dict[tuple[str, float, bool], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
     for label in map(str, of_search.index):
@@ -134,43 +147,53 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
         if cell is None or cell.iloc[0].get("stages", 1) > 1:
             continue
         hands = {*solved(cell).hands}
-        every = {""} if hands and of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
-        if len(every) == 1:
+        sequences = {""} if hands and of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
+        if len(sequences) == 1:
             explored = explores_idle_arm(study, task, label)
-            labels.setdefault((every.pop(), _most_trials(study, task, label), explored), label)
+            key = sequences.pop(), _most_trials(study, task, label), explored
+            labels.setdefault(key, label)
     return labels
 
 
 @lru_cache(maxsize=4_096)
 def _most_trials(study: Study, task: str, label: str) -> float:
-    """Return the most trials that a run of a method on a task made, 0 if no run made trials."""
+    """Return the largest number of trials that a run of a method on a task made, or 0."""
     return float(study.cells[task, label].trials.fillna(0).max())
 
 
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
-    """Return by how much a method's signature exceeds the mean signature of random search with the
-    same hands (``hand``: with any), in the unit of the signature: a mean over the runs for which
-    :func:`with_control` has random search; NaN without such runs."""
+    """Return how much larger a method's signature is than that of random search, a mean over runs.
+
+    Each run is compared with the mean of random search with the same hands (for signature ``hand``,
+    with any hands), in the unit of the signature. Only runs count for which :func:`with_control`
+    has random search; NaN if there are none.
+    """
     pairs = with_control(study, signature, task, label).values()
     excess = [values - control.mean() for values, control in pairs if len(control)]
     return float(np.concatenate(excess).mean()) if excess else math.nan
 
 
 def selects(study: Study, label: str) -> bool:
-    """Return True if a method, ``label``, declares that it gets the reward of each trial, by which
-    it can select its solution, and is not random search."""
+    """Return True if a method can select its solution from trials, and is not random search.
+
+    It can if it declares that it uses the reward of each trial.
+    """
     method = study.methods.loc[label]
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
 
 
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
-    """Return the runs of random search, the control of ``contexts``, on the same two tasks (the
-    first 500 solved on each) for the same goal and hand; runs with the other hand do not count.
+    """Return the runs of random search that are the control of ``contexts``, or None.
 
-    Random search makes as many trials as the method, with the commonest hand sequence of the
-    method's runs on each task. None for random search itself, for a method that does not select its
-    solution by rewards of trials, and if there is no such random search on both tasks, or none of
-    its runs on one of them hits the goal with the hand.
+    They are runs on the same two tasks, for the same goal and hand, with the same number of trials
+    as the method and, on each task, the most frequent hand sequence of the method's runs. Only the
+    first 500 solved runs on each task count.
+
+    The result is None if
+
+    - the method is random search, or does not select its solution from trials (:func:`selects`);
+    - there is no such random search on both tasks;
+    - none of its runs on one of the tasks hits the goal with the hand.
     """
     if not selects(study, contexts.method):
         return None
@@ -190,8 +213,11 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 
 def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
-    """Yield the first 500 solved runs of a method (label) on two tasks at each first goal that the
-    tasks share (:func:`.context_pairs`), for each hand that hits this goal on both tasks."""
+    """Yield the runs of a method on two tasks at each first goal that these tasks share.
+
+    There is an item for each pair of tasks (:func:`.context_pairs`), shared goal, and hand that
+    hits this goal on both tasks. Only the first 500 solved runs on each task count.
+    """
     for first, second, shared in context_pairs(study.individual_tasks):
         keys = (first, label), (second, label)
         if study.cells.keys() >= {*keys}:
@@ -205,14 +231,13 @@ def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
 
 @lru_cache(maxsize=4)
 def shared_goal(study: Study) -> TwoContexts | None:
-    """Return the runs at the first goal that two tasks share and that runs on both hit with the
-    same hand, of the first method with such runs, in this order: the paper's learner, methods from
-    files, methods that represent their algorithms, other methods.
+    """Return the first item of :func:`shared_goals` of the first method that has one, or None.
 
-    None if no method has such runs.
+    Methods are tried in this order: the paper's learner, methods from files, methods that represent
+    their algorithms, other methods.
     """
     rows = study.methods
     subjects = rows.index[rows.is_learner], rows.index[~rows.built_in]
     order = [*LEARNERS, *itertools.chain(*subjects), *headline_methods(rows), *rows.index]
-    every = (shared_goals(study, label) for label in dict.fromkeys(order))
-    return next(itertools.chain.from_iterable(every), None)
+    of_methods = (shared_goals(study, label) for label in dict.fromkeys(order))
+    return next(itertools.chain.from_iterable(of_methods), None)

@@ -1,10 +1,16 @@
-"""Gaps, shares of the possible gain, rankings and running times of plain frames of results.
+"""Compute gaps, shares of the possible gain, means and rankings from plain frames of results.
 
-A frame, also one of your own, has a row for each run, with columns ``method``, ``task``, ``reward``
-(ticks, NaN for a failed run) and ``best_known``, the best known reward of the task;
-``load(folder).runs`` is such a frame. Shares need ``corrective_best``, too: the reward of the
-corrective process alone with its best hands. Rewards are negative ticks; the costs of an
-``Objective`` are their negatives. Frames with other contents are refused.
+``load(folder).runs`` is such a frame; you can also make your own. It has a row for each run, with
+the columns
+
+- ``method`` and ``task``;
+- ``reward``: negative ticks, NaN for a failed run;
+- ``best_known``: the best known reward of the task, negative ticks;
+- ``corrective_best``, only for shares: the reward of the corrective process alone with its best
+  hands, negative ticks.
+
+The costs of an ``Objective`` are the negatives of rewards. Frames with wrong values raise
+CoarticError.
 """
 
 from __future__ import annotations
@@ -28,11 +34,11 @@ SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
 DUPLICATE = (
-    "a run is there twice (runs of two sources that count alike need a column seed, folder or "
-    "run_id; number the draws of a bootstrap in a column run)"
+    "a run must not occur twice (if runs of two sources have the same numbers, add a column seed, "
+    "folder or run_id; number the draws of a bootstrap in a column run)"
 )
 _SOURCES = ("folder", "seed", "run_id", "run")
-"""Columns by which runs of a method on a task differ: all of them that a frame has."""
+"""Columns that tell runs of a method on a task apart, as far as a frame has them."""
 
 
 def checked(
@@ -42,16 +48,33 @@ def checked(
     names: Sequence[str] = (),
     others: Sequence[str] = (),
 ) -> pd.DataFrame:
-    """Return a copy of a user's frame with these columns alone: ``numbers`` as float64 with NaN for
-    missing numbers, ``names`` and ``others`` as they are. With number ``reward``, a column
-    ``status`` is kept and has to agree: all runs with a reward, and no others, are ``ok``.
+    """Check a user's frame, and return a copy of the columns that are needed.
 
-    The index loses its names, which could be names of columns. Raises CoarticError for an object
-    that is no frame, a missing column, no rows, a missing value in ``names``, and values of
-    ``numbers`` that are infinite or not numbers.
+    If ``numbers`` has ``reward`` and the frame has ``status``, this column is checked and returned
+    as well: a run has a reward if, and only if, its status is ``ok``.
+
+    Parameters
+    ----------
+    frame : DataFrame
+    numbers : sequence of str
+        Columns of numbers. They are returned as float64, with NaN for missing numbers.
+    names : sequence of str
+        Columns without missing values. They are returned as they are.
+    others : sequence of str
+        Other columns. They are returned as they are.
+
+    Returns
+    -------
+    DataFrame
+        Its index has no names, because they could be names of columns.
+
+    Raises
+    ------
+    CoarticError
+        The object is not a DataFrame, it has no rows, a column is missing, or a value is wrong.
     """
     if not isinstance(frame, pd.DataFrame):
-        raise CoarticError(f"needed is a pandas.DataFrame, not a {type(frame).__name__}")
+        raise CoarticError(f"the frame must be a pandas.DataFrame, not a {type(frame).__name__}")
     status = ["status"] if "reward" in numbers and "status" in frame else []
     wanted = [*dict.fromkeys((*names, *others, *status, *numbers))]
     if missing := [name for name in wanted if name not in {*frame.columns}]:
@@ -60,7 +83,7 @@ def checked(
         raise CoarticError("the frame has no rows")
     columns = frame[wanted].copy()
     columns.index = columns.index.set_names([None] * columns.index.nlevels)
-    not_na = "needed is a name; read_csv makes NA of some names, unless keep_default_na=False"
+    not_na = "it must be a name; read_csv reads some names as NA, unless keep_default_na=False"
     for name in names:
         refuse_rows(columns, name, columns[name].isna(), not_na)
     for name in numbers:
@@ -68,12 +91,12 @@ def checked(
             of_name = columns[name].astype("Float64")
             values = of_name.to_numpy(np.float64, na_value=np.nan)
         except (TypeError, ValueError) as error:
-            raise CoarticError(f"column {inline(name)}: needed are numbers ({error})") from None
-        refuse_rows(columns, name, np.isinf(values), "needed are finite numbers")
+            raise CoarticError(f"column {inline(name)} must have numbers ({error})") from None
+        refuse_rows(columns, name, np.isinf(values), "it must be a finite number")
         columns[name] = values
     if status:
         is_ok = columns.status.astype(object) == "ok"
-        rule = "a run has a reward if its status is ok, and NaN otherwise"
+        rule = "a run must have a reward if its status is ok, and NaN otherwise"
         refuse_rows(columns, "status", is_ok != columns.reward.notna(), rule)
     return columns
 
@@ -84,18 +107,22 @@ def inline(name: object) -> str:
 
 
 def _names_given(what: str, names: str | Sequence[str]) -> list[str]:
-    """Return a list of the names of columns in ``names``, an argument called ``what``; a string is
-    one name."""
+    """Return the names of columns in an argument as a list; a string is one name.
+
+    ``what`` is the name of the argument, for the message of CoarticError.
+    """
     if isinstance(names, str):
         return [names]
     if not isinstance(names, Iterable) or not all(map(is_hashable, listed := list(names))):
-        raise CoarticError(f"{what} is {brief_value(names)}: needed are names of columns")
+        raise CoarticError(f"{what} is {brief_value(names)}; it must have names of columns")
     return listed
 
 
 def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str) -> None:
-    """Raise CoarticError if rows are True in ``wrong``, with the value of the first of them in
-    ``column``, and the words ``needed``."""
+    """Raise CoarticError if ``wrong`` is True in at least one row.
+
+    The message has the first wrong row's value in ``column``, and ``needed``: what would be right.
+    """
     if (rows := np.flatnonzero(np.asarray(wrong, dtype=bool))).size:
         (value,), (row,) = frame[column].iloc[rows[:1]].tolist(), frame.index[rows[:1]].tolist()
         raise CoarticError(
@@ -104,22 +131,29 @@ def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str)
 
 
 def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
-    """Return a copy of checked columns with ``gap``, (best known - reward) / |best known|, and, of
-    frames with :data:`ZERO`, ``share``, (reward - zero) / (best known - zero): 1 at the best known
-    reward, 0 at :data:`ZERO`, below 0 if worse. Both are NaN without a reward or a best known
-    reward, ``share`` also where zero is NaN or the best known reward.
+    """Return a copy of checked columns with ``gap``, and with ``share`` if they have :data:`ZERO`.
 
-    Raises CoarticError for a reward or a best known reward above 0, for a best known reward of 0,
-    and for a reward (beyond rounding, :data:`NEGLIGIBLE`) or :data:`ZERO` (at all) above the best
-    known.
+    gap = (best known - reward) / |best known|
+    share = (reward - zero) / (best known - zero)
+
+    Both are NaN if the reward or the best known reward is NaN; ``share`` is also NaN if zero is NaN
+    or equals the best known reward.
+
+    Raises
+    ------
+    CoarticError
+        - A reward or a best known reward is above 0.
+        - A best known reward is 0.
+        - A reward is above the best known reward by more than rounding (:data:`NEGLIGIBLE`), or
+          :data:`ZERO` is above it at all.
     """
     for name in ("reward", "best_known"):
-        sign = "a reward is minus the ticks; of a cost, such as best_cost, give the negative"
+        sign = "a reward must be minus the ticks; for a cost, such as best_cost, use the negative"
         refuse_rows(columns, name, columns[name] > 0, sign)
-    share = "a gap is a share of the best known reward, which has to be below 0"
+    share = "a gap is a share of the best known reward, which must be below 0"
     refuse_rows(columns, "best_known", columns.best_known == 0, share)
     excess = columns.reward - columns.best_known
-    highest = "it is above best_known, which is to be the highest reward of the task"
+    highest = "it is above best_known, which must be the highest reward of the task"
     refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
     columns = columns.assign(gap=gap_share(columns.reward, columns.best_known))
     if ZERO not in columns:
@@ -130,41 +164,58 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
 
 
 def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """Return a user's frame of methods on tasks, checked, with the ``gap`` of each row, and its
-    ``share`` where the frame has ``corrective_best``.
+    """Check a user's frame of methods on tasks, and return it with gaps and shares.
 
-    ``method`` includes the setting if the method has several settings in the frame; ``task`` is the
-    number of the task, from 0, in the order of names; ``key`` is the same number in all rows of a
-    run (:data:`_SOURCES`). ``more``: names of other columns of numbers to keep. Raises CoarticError
-    as :func:`checked` and :func:`_with_gaps` do, and for a task with several ``best_known`` or
-    :data:`ZERO`.
+    Parameters
+    ----------
+    frame : DataFrame
+    *more : str
+        Further columns of numbers to return.
+
+    Returns
+    -------
+    DataFrame
+        The columns that are needed, with
+
+        - ``gap``, and ``share`` if the frame has ``corrective_best``;
+        - ``method``, which includes the setting if the method has several settings in the frame;
+        - ``task``, the number of the task in the order of names, from 0;
+        - ``key``, a number for each run, the same in all rows of the run (:data:`_SOURCES`).
+
+    Raises
+    ------
+    CoarticError
+        As :func:`checked` and :func:`_with_gaps`, and if a task has more than one ``best_known`` or
+        :data:`ZERO`.
     """
-    there = [*getattr(frame, "columns", ())]
-    numbers = (*SCORES, *[ZERO] * (ZERO in there), *more)
-    others = [name for name in ("setting", *_SOURCES) if name in there]
+    existing = [*getattr(frame, "columns", ())]
+    numbers = (*SCORES, *[ZERO] * (ZERO in existing), *more)
+    others = [name for name in ("setting", *_SOURCES) if name in existing]
     columns = _with_gaps(checked(frame, names=("method", "task"), numbers=numbers, others=others))
     number, tasks = pd.factorize(columns.task)
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     for name in {"best_known", ZERO} & {*columns}:
-        several = columns[name].groupby(task).transform("nunique") > 1
-        refuse_rows(columns, "task", several, f"the task has several {name}; needed is one")
+        is_ambiguous = columns[name].groupby(task).transform("nunique") > 1
+        refuse_rows(columns, "task", is_ambiguous, f"the task must have one {name}, not several")
     names = columns.method.to_numpy(object)
-    if "setting" in there:
+    if "setting" in existing:
         settings = columns.setting.astype(object).where(columns.setting.notna(), "").astype(str)
-        several = settings.groupby(pd.factorize(names)[0]).transform("nunique") > 1
+        is_varied = settings.groupby(pd.factorize(names)[0]).transform("nunique") > 1
         labels = np.array([*map(label_of, map(str, names), settings)], dtype=object)
-        names = np.where(several, labels, names)
+        names = np.where(is_varied, labels, names)
     frame = columns.assign(task=task, method=pd.Series(names, columns.index, dtype=object))
-    keys = [name for name in _SOURCES if name in there]
+    keys = [name for name in _SOURCES if name in existing]
     run = frame.groupby(["method", "task", *keys], dropna=False, sort=False).ngroup()
     return frame.assign(key=run if keys else np.arange(len(frame)))
 
 
 def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """Return a user's frame of runs, checked, with the gap of each (:func:`scored`). Raises
-    CoarticError as :func:`scored` does, and for two rows of a run."""
+    """Return :func:`scored` for a frame in which each run must have one row.
+
+    Raises CoarticError as :func:`scored`, and if a run has two rows.
+    """
     runs = scored(frame, *more)
-    refuse_rows(runs, "method", runs.duplicated("key"), f"{DUPLICATE}; needed is a row for a run")
+    refuse_rows(runs, "method", runs.duplicated("key"), f"{DUPLICATE}; each run must have one row")
     return runs
 
 
@@ -174,8 +225,8 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     Parameters
     ----------
     frame : DataFrame
-        With columns ``reward`` and ``best_known``, negative ticks; NaN for a failed run, and for a
-        task without a best known reward.
+        With columns ``reward`` (NaN for a failed run) and ``best_known`` (NaN if the task has no
+        best known reward), negative ticks.
 
     Returns
     -------
@@ -186,8 +237,9 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text, rewards above 0 (costs are positive,
-        rewards negative), rewards above the best known reward, or a best known reward of 0.
+        - The frame has no rows, or a column is missing.
+        - A value is not a number, or a reward is above 0 (rewards are negative, costs positive).
+        - A reward is above the best known reward, or a best known reward is 0.
 
     Examples
     --------
@@ -204,16 +256,16 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Parameters
     ----------
     frame : DataFrame
-        With columns ``reward``, ``best_known`` and ``corrective_best``, negative ticks: the last is
-        the reward of the corrective process alone with its best hands, or with the task's initial
-        hands where there are over 4,096 hand sequences.
+        With columns ``reward``, ``best_known`` and ``corrective_best``, negative ticks. The last is
+        the reward of the corrective process alone with its best hands. If the task has more than
+        4,096 hand sequences, it is the reward with the task's initial hands.
 
     Returns
     -------
     Series
-        (reward - corrective_best) / (best_known - corrective_best) by the frame's index; negative
-        where the corrective process does better. NaN where nothing can be gained, or a reward is
-        NaN.
+        (reward - corrective_best) / (best_known - corrective_best) by the frame's index. It is
+        negative if the corrective process does better, and NaN if nothing can be gained or a
+        reward is NaN.
 
     Raises
     ------
@@ -242,9 +294,9 @@ def means(
     frame : DataFrame
         A row for each task, or each run.
     by : str or sequence of str
-        Columns whose values make groups; NaN is a value, too.
+        Columns whose values define the groups. NaN is a value like others.
     columns : str or sequence of str
-        Columns of numbers; NaN does not count.
+        Columns of numbers. NaN is left out of means.
 
     Returns
     -------
@@ -256,8 +308,8 @@ def means(
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text or infinite numbers in ``columns``; or
-        ``by`` is empty.
+        The frame has no rows, a column is missing, a value of ``columns`` is not a finite number,
+        or ``by`` is empty.
 
     Examples
     --------
@@ -269,13 +321,13 @@ def means(
     """
     by, columns = _names_given("by", by), _names_given("columns", columns)
     if not by:
-        raise CoarticError("by is empty: needed are names of columns")
+        raise CoarticError("by is empty; it must have names of columns")
     values, rows = checked(frame, numbers=columns, others=by), []
     for key, group in values.groupby(by, sort=False, dropna=False, observed=True):
         row = {**dict(zip(by, key, strict=True)), "rows": len(group)}
         for name in columns:
-            there = group[name].dropna().to_numpy(dtype=np.float64)
-            row |= (mean(there) if len(there) else Estimate(np.nan)).columns(name)
+            numbers = group[name].dropna().to_numpy(dtype=np.float64)
+            row |= (mean(numbers) if len(numbers) else Estimate(np.nan)).columns(name)
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -287,15 +339,15 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     ----------
     frame : DataFrame
         With columns ``method``, ``task``, ``reward`` and ``best_known`` (negative ticks), and
-        perhaps ``setting`` and ``corrective_best`` (:func:`ranking`).
+        optionally ``setting`` and ``corrective_best`` (:func:`ranking`).
 
     Returns
     -------
     DataFrame
         A row for each pair of ``task`` and ``method`` (with the setting, as in :func:`ranking`), in
-        the order of first appearance: mean ``reward`` (negative ticks) of ``n`` solved runs,
-        ``gap``, and ``share`` where the frame has ``corrective_best``; NaN where no run has such a
-        number.
+        the order of first appearance. ``reward`` (negative ticks), ``gap`` and, if the frame has
+        ``corrective_best``, ``share`` are means over the runs that have such a number, NaN if no
+        run has one. ``n`` is the number of solved runs.
 
     Raises
     ------
@@ -329,8 +381,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
 
         - ``setting``: a method with several settings has a row for each setting,
           ``"cma-es/bandit noise=0.1"``;
-        - ``ranked_as``: names of rows, in place of ``method`` and ``setting``;
-        - ``corrective_best``: for shares;
+        - ``ranked_as``: names of rows, used instead of ``method`` and ``setting``;
+        - ``corrective_best``: needed for shares (:func:`shares`);
         - ``budget``: the number of trials that was asked for, missing for a method without trials;
         - ``noisy_ticks``: mean ticks of the run's solution with motor noise, missing if executions
           fail.
@@ -343,27 +395,27 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         A row for each method, by its name: first the ranked methods, the smallest gap first, then
         the others.
 
-        - ``gap``: mean over tasks of the mean over runs, with its 95 % interval ``gap_low`` to
-          ``gap_high`` for other runs on the same tasks (NaN with fewer than five runs on a task);
-          NaN for a method that is not ranked;
+        - ``gap``: mean over tasks of the mean over runs. It is NaN for a method that is not ranked.
+          ``gap_low`` to ``gap_high`` is its 95 % interval for other runs on the same tasks (NaN
+          with fewer than five runs on a task).
         - ``share``, ``share_low``, ``share_high``: share of the possible gain (:func:`shares`), a
-          mean over the tasks on which something can be gained, and ``without_gain``, the number of
-          other tasks; only for a frame with ``corrective_best``;
+          mean over the tasks on which something can be gained. ``without_gain`` is the number of
+          other tasks. Only for a frame with ``corrective_best``.
         - ``noisy_gap``, ``noisy_gap_low``, ``noisy_gap_high``: the gap of ``noisy_ticks`` to the
-          best known reward *without* noise, a mean like ``gap``; NaN if a run has none; only for a
-          frame with ``noisy_ticks``;
-        - ``tasks``: number of tasks that it solved in every run; ``runs`` and ``failed``: numbers
-          of runs and of failed runs;
-        - ``why``: why it is not ranked, ``"1 of 2 tasks"`` or ``"6 of 9 runs failed"``; empty for a
-          ranked method.
+          best known reward *without* noise, a mean like ``gap``; NaN if a run has no
+          ``noisy_ticks``. Only for a frame with ``noisy_ticks``.
+        - ``tasks``: number of tasks that the method solved in all runs.
+        - ``runs`` and ``failed``: numbers of runs and of failed runs.
+        - ``why``: why the method is not ranked, such as ``"1 of 2 tasks"`` or ``"6 of 9 runs
+          failed"``; empty for a ranked method.
 
-        Tasks without a best known reward do not count.
+        Tasks without a best known reward are left out of gaps and shares.
 
     Raises
     ------
     CoarticError
-        A column or a name is missing, a reward is wrong (:func:`gaps`), a task has several best
-        known rewards, a run has two rows, or methods have different budgets.
+        A column or a name is missing, a reward is wrong (:func:`gaps`), a task has more than one
+        best known reward, a run has two rows, or methods have different budgets.
 
     Examples
     --------
@@ -377,18 +429,18 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     mine     0.04       0
     yours     NaN       0  1 of 2 tasks
     """
-    there = {*getattr(frame, "columns", ())}
-    if "ranked_as" in there:
+    existing = {*getattr(frame, "columns", ())}
+    if "ranked_as" in existing:
         frame = frame.drop(columns=["method", "setting"], errors="ignore")
         frame = frame.rename(columns={"ranked_as": "method"})
-    runs = _scored_runs(frame, *(name for name in ("budget", "noisy_ticks") if name in there))
+    runs = _scored_runs(frame, *(name for name in ("budget", "noisy_ticks") if name in existing))
     if "noisy_ticks" in runs:
         runs["noisy_gap"] = gap_share(-runs.noisy_ticks, runs.best_known)
-    asked = sorted(runs.budget.dropna().unique()) if "budget" in there else []
+    asked = sorted(runs.budget.dropna().unique()) if "budget" in existing else []
     if len(asked) > 1:
         budgets = [f"{budget:.0f}" for budget in asked]
         raise CoarticError(
-            f"column budget has {' and '.join(budgets)} trials: methods are only ranked with equal "
+            f"column budget has {' and '.join(budgets)} trials; methods are only ranked with equal "
             "numbers of trials. Rank those with one number, and methods without trials: "
             f"frame[frame.budget.isna() | (frame.budget == {budgets[0]})]"
         )

@@ -1,5 +1,7 @@
-"""Methods: names and facts about the built-in ones, which ``methods.toml`` has, and a frame of the
-methods of a study (:func:`methods_of`)."""
+"""Describe methods: facts about built-in ones, and a frame of a study's methods.
+
+The facts are in ``methods.toml``. :func:`methods_of` returns the frame.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +24,13 @@ if TYPE_CHECKING:
     from coartic.runs.method_info import MethodInfo
 
 CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in EVERY_CONDITION}
-"""Ids of conditions of the learner, informed ones and ablations too, by the id of the method."""
+"""Ids of the learner's conditions, including informed ones and ablations, by id of the method."""
 LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
-"""Ids of the learner under EC1 (for one arm) to EC4, which explore more and more."""
+"""Ids of the learner under EC1 (for one arm) to EC4; each explores more than the previous one."""
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
-"""Ids of the informed learner, for one arm and for two."""
+"""Ids of the informed learner, for one arm and for two arms."""
 RANDOM_SEARCH = "random-search"
-"""Id of random search: the best of random targets around postures of the corrective process."""
+"""Id of random search, which selects the best of random targets around corrective postures."""
 
 
 COLORS = {
@@ -43,7 +45,7 @@ COLORS = {
     "rose": "#dc9fc3",
     "amber": "#eba717",
 }
-"""Colours of methods by name, from dark to light. On a dark page ``page.css`` has lighter ones."""
+"""Colours of methods by name, from dark to light. ``page.css`` has lighter ones for a dark page."""
 MARKS: dict[str, Any] = {
     "star": ("*", "-"),
     "circle": ("o", (0, (1, 1.2))),
@@ -55,7 +57,7 @@ MARKS: dict[str, Any] = {
     "plus": ("P", (0, (5, 1.2, 1, 1.2))),
     "cross": ("X", (0, (7, 1, 3, 1))),
 }
-"""Marks of methods in Matplotlib's terms, each with the dash of lines."""
+"""Markers of methods as Matplotlib names them, each with the dash of the method's lines."""
 
 
 class _KnownMethod(NamedTuple):
@@ -75,9 +77,9 @@ KNOWN_METHODS = {
     name: _KnownMethod(**row)
     for name, row in tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items()
 }
-"""Rows of the built-in methods by id, in the order of lists and figures."""
+"""Facts about the built-in methods by id, in the order of lists and figures."""
 SEARCHES = ("optimum/search",)
-"""Ids of the searches for the optimum: references rather than methods to compare."""
+"""Ids of the searches for the optimum, which are references and not compared with methods."""
 _WORDS = {
     "other_arm": "other arm ",
     "noise_sd": "σ ",
@@ -86,15 +88,23 @@ _WORDS = {
     "sigma": "σ ",
     "stop": "stop ",
 }
-"""Words for parameters, before their values."""
+"""Words that stand before the values of parameters."""
 
 
 def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False) -> str:
-    """Return the name of a method with its setting in words: ``learner EC4``, ``CMA-ES (other
-    arm still)``. ``setting`` has the form ``sigma=0.1, stop=1``, empty for none.
-    The name of a method from a file is the title in its declaration, or its id if ``method`` is
-    the id. ``short``: the short name of a built-in method, if it has one; the id of a method from a
-    file."""
+    """Return the name of a method with its setting, such as ``CMA-ES (other arm still)``.
+
+    Parameters
+    ----------
+    method : str or MethodInfo
+        Id or declaration. For a method from a file, the name is the title in its declaration; if
+        only the id is passed, the name is the id.
+    setting : str
+        Such as ``sigma=0.1, stop=1``; may be empty.
+    short : bool
+        True for the short name of a built-in method, if it has one, and for the id of a method from
+        a file.
+    """
     name, title = (method, method) if isinstance(method, str) else (method.name, method.title)
     if known := KNOWN_METHODS.get(name):
         name = (short and known.short) or known.name
@@ -114,19 +124,20 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
 )
 """Groups of methods by their use of the reward."""
 OWN_COLOR, OWN_MARK = "walnut", "star"
-"""Colour of the first nine methods from files, and mark of the very first: no built-in method has
-this colour or this mark."""
+"""Colour of the first nine methods from files, and marker of the first one. No built-in method has
+this colour or this marker."""
 MARK = " ‡"
-"""Mark behind the title of a method against which something was found (:attr:`.Study.marks`)."""
+"""Mark after the title of a method for which there are warnings (:attr:`.Study.marks`)."""
 
 
 def methods_of(
     runs: pd.DataFrame, declared: Mapping[str, MethodInfo], marked: Collection[str] = ()
 ) -> pd.DataFrame:
-    """Return a row for each method with its setting, and for two conditions of the learner that
-    are ranked as one (:func:`ranked_as`): built-in methods in the order of ``methods.toml``, then
-    methods from files in the order of the suite. Most columns of two conditions are those of the
-    second.
+    """Return a frame of the methods that have runs, with a row for each setting.
+
+    Built-in methods come first, in the order of ``methods.toml``, then methods from files, in the
+    order of the suite. If two conditions of the learner are ranked as one (:func:`ranked_as`), they
+    have a further row, with most columns of the second condition.
 
     Parameters
     ----------
@@ -142,21 +153,21 @@ def methods_of(
     DataFrame
         By the label of the method, with the columns of :attr:`.Study.methods`.
     """
-    import pandas as pd  # names of methods are read without it
+    import pandas as pd  # other parts of this module are used without pandas
 
     rows, by_label = dict[str, dict[str, Any]](), dict([*runs.groupby("label", sort=False)])
     varied, values = parameter_varied(runs)
-    shown = Counter(map(title_of, declared.values()))
+    titles = Counter(map(title_of, declared.values()))
     for label, of_method in by_label.items():
         base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
         named = setting
         if label in values:
-            which = ", the paper's" if base in LEARNERS else ", default"
-            named = in_words({varied: values[label]}) + which * (not setting)
+            default_note = ", the paper's" if base in LEARNERS else ", default"
+            named = in_words({varied: values[label]}) + default_note * (not setting)
         info = declared[base]
         facts = KNOWN_METHODS.get(base) if info.is_ours else None
         default = base if setting else facts.ablation_of if facts else ""
-        called = info if shown[title_of(info)] == 1 else base  # of two names alike: the ids
+        called = info if titles[title_of(info)] == 1 else base  # ids, if titles are the same
         under = default if default in by_label and label not in values else ""
         rows[label] = {
             "base": base,
@@ -182,47 +193,61 @@ def methods_of(
         rows[str(label)] = second | names
     for label, look in _looks_of(rows):
         rows[label]["look"] = look
-    place = {name: number for number, name in enumerate(KNOWN_METHODS)}
-    ordered = sorted(rows, key=lambda label: place.get(rows[label]["base"], len(place)))
+    position = {name: number for number, name in enumerate(KNOWN_METHODS)}
+    ordered = sorted(rows, key=lambda label: position.get(rows[label]["base"], len(position)))
     return pd.DataFrame([rows[label] for label in ordered], ordered).rename_axis("method")
 
 
 def parameter_varied(runs: pd.DataFrame) -> tuple[str, dict[str, Any]]:
-    """Return the name of a parameter and its values by label, from low to high if all are numbers,
-    if all runs except searches for the optimum are of one method, with two or more values of this
-    parameter, each on all their tasks, and equal others; or else an empty name and no value.
-    ``runs`` are as in :func:`methods_of`."""
+    """Return the parameter that a study varies, and its values by label.
+
+    A study varies a parameter if, apart from searches for the optimum,
+
+    - all runs are of one method;
+    - this parameter has at least two values, and each value was run on all tasks;
+    - all other parameters are equal.
+
+    Otherwise name and values are empty. Values that are all numbers are in ascending order.
+    ``runs`` are as in :func:`methods_of`.
+    """
     runs = runs[~runs.method.isin(SEARCHES)]
     tasks = runs.groupby("label", sort=False).task.nunique()
     texts = runs.drop_duplicates("label").set_index("label").parameters
     by_label = {str(label): json.loads(text) for label, text in texts.items()}
-    names = {name for each in by_label.values() for name in each}
-    differ = [n for n in names if len({repr(each.get(n)) for each in by_label.values()}) > 1]
+    names = {name for parameters in by_label.values() for name in parameters}
+    differ = [
+        name
+        for name in names
+        if len({repr(parameters.get(name)) for parameters in by_label.values()}) > 1
+    ]
     if len({*runs.method}) != 1 or len(differ) != 1 or (tasks < runs.task.nunique()).any():
         return "", {}
-    values = {label: each.get(differ[0]) for label, each in by_label.items()}
+    values = {label: parameters.get(differ[0]) for label, parameters in by_label.items()}
     if all(type(value) in (int, float) for value in values.values()):
-        values = dict(sorted(values.items(), key=lambda each: each[1]))
+        values = dict(sorted(values.items(), key=lambda item: item[1]))
     return differ[0], values
 
 
 def _group_of(runs: pd.DataFrame) -> str:
     """Return the group of a method, one of :data:`GROUPS`, from its runs.
 
-    ``using the reward of each trial`` if the method declares this reward and a run made more than
-    one trial; or else ``using the reward as a formula`` if it declares the formula; or else ``not
-    using the reward``.
+    - ``using the reward of each trial``, if the method declares this and a run made more than one
+      trial;
+    - otherwise ``using the reward as a formula``, if the method declares this;
+    - otherwise ``not using the reward``.
     """
-    information = {each for text in runs.information.unique() for each in text.split(", ")}
+    information = {kind for text in runs.information.unique() for kind in text.split(", ")}
     if (runs.trials > 1).any() and Information.REWARD_BY_TRIAL.value in information:
         return BY_TRIAL
     return BY_FORMULA if Information.REWARD_FORMULA.value in information else WITHOUT_REWARD
 
 
 def ranked_as(runs: pd.DataFrame) -> pd.Series:
-    """Return the name of the row of the ranking in which each run counts: its label, except that
-    two conditions of the learner are one row, :func:`joined_label`, if one ran on tasks for one arm
-    and the other on tasks for two. Column ``label`` of ``runs`` has labels."""
+    """Return the name of the row of the ranking in which each run counts.
+
+    It is the run's label (column ``label``). But if one condition of the learner ran on tasks for
+    one arm, and another one on tasks for two arms, both share the row :func:`joined_label`.
+    """
     tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
     names = runs.label
     for one, others in ((EC1, (EC4, EC3)), (INFORMED_LEARNERS[0], INFORMED_LEARNERS[1:])):
@@ -234,15 +259,18 @@ def ranked_as(runs: pd.DataFrame) -> pd.Series:
 
 
 def joined_label(one: str, two: str) -> str:
-    """Return the label of the row that joins the methods ``one`` and ``two`` (ids) of the learner,
-    such as ``dual-process (EC1, EC4)``."""
+    """Return the label of the row of two learners (ids), such as ``dual-process (EC1, EC4)``."""
     return f"{METHOD_PREFIX.rstrip('/')} ({CONDITION_OF[one]}, {CONDITION_OF[two]})"
 
 
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the label of each row with its names of colour and mark: its ``look``, if it has one;
-    for the first methods from files :data:`OWN_COLOR` and a mark; for others the next, after the
-    last again the first, of the pairs that are in no ``look``, unused colours before others."""
+    """Yield the label of each row with the names of its colour and marker.
+
+    - A row with a ``look`` keeps it.
+    - The first nine methods from files have :data:`OWN_COLOR` and a marker.
+    - Other rows have the next free pair, those with unused colours first. After the last pair, the
+      first is used again.
+    """
     fixed = {row["look"] for row in rows.values()}
     taken = {look[0] for look in fixed if look}
     colors = [color for color in COLORS if color not in (OWN_COLOR, "ink")]
@@ -258,17 +286,20 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return ``rows``, some rows of :attr:`.Study.methods`, without settings and ablations of
-    methods that are in ``rows``, too (column ``under``): values of a varied parameter stay."""
+    """Return rows without the settings and ablations of methods that are also in these rows.
+
+    ``rows`` are rows of :attr:`.Study.methods`, whose column ``under`` is used. Values of a varied
+    parameter are not left out.
+    """
     return rows[~rows.under.isin(rows.index)]
 
 
 def headline_methods(rows: pd.DataFrame) -> list[str]:
-    """Return the labels of the rows that represent their algorithms (column ``headline``), among
-    ``rows``, some rows of :attr:`.Study.methods`; all labels if no row does.
+    """Return the labels of the rows that represent their algorithms, or all labels if none does.
 
-    Settings count as in :func:`without_settings`.
+    ``rows`` are rows of :attr:`.Study.methods`, whose column ``headline`` is used. Settings and
+    ablations are left out as in :func:`without_settings`.
     """
-    kept = without_settings(rows)
-    kept = kept[kept.headline]
-    return [*(kept if len(kept) else rows).index]
+    headlines = without_settings(rows)
+    headlines = headlines[headlines.headline]
+    return [*(headlines if len(headlines) else rows).index]

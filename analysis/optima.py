@@ -1,4 +1,4 @@
-"""Best known rewards of tasks, to which gaps are taken, and proven bounds."""
+"""Find the best known rewards of tasks, from which gaps are measured, and proven bounds."""
 
 from __future__ import annotations
 
@@ -22,22 +22,29 @@ class BestKnown(KnownOptimum):
     """The best known reward of a task, and its source."""
 
     source: str = "shipped"
-    """``shipped``; label of the method of the best run, if its reward exceeds all that is shipped;
-    or ``corrective process alone``, if the reward of this process exceeds both."""
+    """Where the reward comes from:
+
+    - ``shipped``;
+    - the label of a method, if its best run has a higher reward than the shipped one;
+    - ``corrective process alone``, if the reward of this process is higher than both.
+    """
     run_id: str = ""
-    """Id of the best run; empty if the source is no run."""
+    """Id of the best run; empty if the source is not a run."""
     only_here: bool = False
-    """True if no reward is shipped and no search for the optimum (with the task's own base) has a
+    """True if no reward is shipped, and no search for the optimum (with the task's own base) has a
     solution."""
 
 
 def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown]:
-    """Return the best known reward of each task, from shipped rewards and the runs of a study.
+    """Return the best known reward of each task, from shipped rewards and runs.
 
-    All solved runs count, including searches and runs copied from other folders, except runs with
-    another base, which solve another task. A task is not in the result if its best reward is 0,
-    which leaves no gap, if nothing is known of it, or if only runs of one method with one setting,
-    no search, are known, which would be compared with themselves.
+    All solved runs count, including searches and runs copied from other folders. Runs with another
+    base do not count, because they solve another task. A task is left out if
+
+    - its best reward is 0, because a gap could not be computed;
+    - no reward is known;
+    - only runs of one method with one setting are known, and this method is not a search. These
+      runs would be compared with themselves.
 
     Parameters
     ----------
@@ -53,7 +60,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     """
     solved = runs[(runs.status == "ok") & (restrictions(runs).base == BASE)]
     is_search = solved.method.isin(SEARCHES)
-    solved = pd.concat([solved[is_search], solved[~is_search]])  # of equal runs a search counts
+    solved = pd.concat([solved[is_search], solved[~is_search]])  # in a tie, a search comes first
     by_task, rewards = dict([*solved.groupby("task")]), {}
     for task in tasks:
         here, shipped = by_task.get(task.name, solved[:0]), best_shipped(task)
@@ -75,9 +82,11 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
 
 
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the parameters ``base`` and ``other_arm`` of each run, with which searches for the
-    optimum restrict movements, as columns by the index of ``runs``; ``task`` and ``free`` for other
-    methods, whose parameters may have the same names."""
+    """Return the parameters with which searches for the optimum restrict movements, for each run.
+
+    Columns are ``base`` and ``other_arm``, by the index of ``runs``. For other methods, whose
+    parameters may have the same names, they are ``task`` and ``free``.
+    """
     default = {"base": BASE, "other_arm": "free"}
     pairs = [*zip(runs.method, runs.parameters, strict=True)]
     asked = {
@@ -90,5 +99,5 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def gap_share(rewards: ArrayLike, optimum: ArrayLike) -> Array:
-    """Return (optimum − reward) / |optimum|: 0 at the optimum, 0.01 for 1 % more ticks."""
+    """Return (optimum − reward) / |optimum|, which is 0.01 for 1 % more ticks."""
     return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))

@@ -1,9 +1,10 @@
-"""Recorded trials, of people for instance: read them, see whether they fit the task, draw them.
+"""Read recorded trials of people, check whether they fit the task, and draw them.
 
-A recording is a table with a row for each hit, or with a row for each sample of markers, in which
-hits are found. A table that cannot be read is refused with its first wrong row. What can be read is
-not diagnosed: :func:`consistency` gives two numbers for each hit, and :func:`draw_recording` shows
-all hits over the goals, where wrong units, axes, columns, clocks and sensors can be seen.
+A recording is a table with a row for each hit, or a table with a row for each sample of markers, in
+which hits are found. A table that cannot be read raises CoarticError, with its first wrong row.
+Faults of a recording that can be read are not diagnosed, but they can be seen:
+:func:`consistency` gives two numbers for each hit, and :func:`draw_recording` shows all hits over
+the goals. There wrong units, axes, columns, clocks and sensors become visible.
 """
 
 from __future__ import annotations
@@ -36,11 +37,11 @@ from coartic.robot import HANDS, Array, Hand
 FAR = 2.0
 """Distance from the centre of a goal, radii, beyond which a hit does not fit the task."""
 _KEY = ["subject", "trial", "goal"]
-_LONGEST_GAP = 0.05  # of a marker, s, that is bridged
-_LONGEST_STEP = 0.04  # between samples, s: with fewer samples hands pass goals unseen
-_OTHER_ARM = 0.1  # difference of a link's length from the task's, as a share
-_AT_REST = 0.05  # speed of a hand, as a share of the trial's fast movements
-_OF_CALLER = 6  # level in the stack of who called a function with checked arguments
+_LONGEST_GAP = 0.05  # longest gap of a marker that is bridged, s
+_LONGEST_STEP = 0.04  # longest time between samples, s; with fewer samples hits are missed
+_OTHER_ARM = 0.1  # largest difference of a link's length from the task's, as a share
+_AT_REST = 0.05  # speed below which a hand rests, as a share of the trial's fast movements
+_OF_CALLER = 6  # level in the stack of the caller of a function with checked arguments
 _COLUMNS = 4  # panels side by side in the figure
 
 
@@ -52,8 +53,7 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
     ----------
     path : str or pathlib.Path
         A CSV file in UTF-8 with the columns of :func:`check_hits`. Lines that begin with ``#``,
-        empty lines and other columns are ignored. A column ``duration`` may stand in place of
-        ``ticks``.
+        empty lines and other columns are ignored. A column ``duration`` can replace ``ticks``.
     task : Task
         The task that was practised.
     ticks_per_unit : float
@@ -89,8 +89,8 @@ def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
         - ``ticks``: the time since the previous hit of the trial, or since its start
         - the posture at the hit: a column for each of ``task.robot.joint_names`` (length unit, rad)
 
-        Hits may be missing. So may the columns of a locked base, and of an arm that is not among
-        ``task.hands``: the base and such an arm are taken to be as at the start of the task.
+        Hits may be missing. The columns of a locked base, and of an arm that is not among
+        ``task.hands``, may also be missing: their values are then those at the start of the task.
     task : Task
         The task that was practised.
 
@@ -132,8 +132,8 @@ def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
 
         - ``x``, ``y``: the position of the hand by forward kinematics from the posture, length unit
         - ``off``: its distance from the centre of the goal, in radii of the goal
-        - ``pace``: the ticks of the movement over those of a straight movement of the model from
-          the previous hit, or from the start; NaN where the previous hit is missing
+        - ``pace``: the ticks of the movement divided by those of a straight movement of the model
+          from the previous hit, or from the start; NaN if the previous hit is missing
 
     Raises
     ------
@@ -221,9 +221,9 @@ def hits_from_markers(
 
 @checked_arguments
 def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
-    """Return recorded trials as solutions, of which signatures can be computed.
+    """Return recorded trials as solutions, so that their signatures can be computed.
 
-    Nothing is executed: postures and ticks (rounded) are those of the recording.
+    Nothing is executed: postures and (rounded) ticks are those of the recording.
 
     Parameters
     ----------
@@ -306,7 +306,7 @@ def draw_recording(
     trials = [] if samples is None else _trials_of(samples, task, None)[1]
     if hits is None:
         if samples is None:
-            raise CoarticError("hits and samples are both None: draw_recording needs one of them")
+            raise CoarticError("hits and samples are both None; draw_recording needs one of them")
         shown = _rows_of(trials, task, ticks_per_unit or 100.0)
     elif isinstance(hits, pd.DataFrame):
         shown = _readable(hits, task, "the frame")
@@ -329,7 +329,7 @@ def _hits_in_file(path: str | Path, task: Task, ticks_per_unit: float) -> pd.Dat
     frame, source = _table(path), str(path)
     if "ticks" in frame and ("duration" in frame or ticks_per_unit != 1):
         raise CoarticError(
-            f"{source} has a column ticks, on which ticks_per_unit has no effect: leave out "
+            f"{source} has a column ticks, so ticks_per_unit has no effect; leave out "
             "ticks_per_unit and the column duration, or the column ticks"
         )
     if "duration" in frame:
@@ -358,26 +358,29 @@ def _table(path: str | Path) -> pd.DataFrame:
 
 
 def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
-    """Raise CoarticError if a column is missing or occurs twice, or if there are no rows."""
+    """Raise CoarticError if a column is missing or duplicate, or if there are no rows."""
     if missing := [name for name in columns if name not in frame]:
         found = ", ".join(map(str, frame.columns)) or "none"
         raise CoarticError(
             f"{source} has no column {missing[0]}; it needs {', '.join(columns)}, separated by "
-            f"commas (duration may stand in place of ticks in a file of hits), and has {found}"
+            f"commas (in a file of hits, duration can replace ticks), and has {found}"
         )
-    if twice := [name for name in columns if [*frame.columns].count(name) > 1]:
-        raise CoarticError(f"{source} has two columns {twice[0]!r}: leave one of them out")
+    if duplicates := [name for name in columns if [*frame.columns].count(name) > 1]:
+        raise CoarticError(f"{source} has two columns {duplicates[0]!r}; leave out one of them")
     if frame.empty:
-        raise CoarticError(f"{source} has no rows: a recording has a row for each hit or sample")
+        raise CoarticError(f"{source} has no rows; it must have one for each hit or sample")
 
 
 def _numbers(frame: pd.DataFrame, columns: list[str], source: str, gaps: bool = False) -> Array:
-    """Return columns as numbers, shape ``(rows, columns)``, with ``gaps`` NaN for empty values.
-    Raises CoarticError for any other value that is not a real number of at most 1e5 in size."""
+    """Return columns as numbers, shape ``(rows, columns)``.
+
+    Values must be real numbers from -1e5 to 1e5 (CoarticError for others). With ``gaps`` they can
+    also be empty, and are then NaN.
+    """
     numbers = np.empty((len(frame), len(columns)))
     for k, name in enumerate(columns):
         values = frame[name]
-        if values.dtype.kind not in "iuf":  # True, False and complex numbers would pass
+        if values.dtype.kind not in "iuf":  # otherwise booleans and complex numbers would pass
             values = values.astype(object)
             odd = values.map(lambda value: isinstance(value, bool | np.bool_ | complex))
             values = values.mask(odd.astype(bool), "not a real number")
@@ -391,7 +394,7 @@ def _numbers(frame: pd.DataFrame, columns: list[str], source: str, gaps: bool = 
 
 
 def _refuse(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str, source: str) -> None:
-    """Raise CoarticError if rows are ``wrong``, with the first of them and the number of others."""
+    """Raise CoarticError if rows are ``wrong``, with the first wrong row and their number."""
     if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():
         (value,) = frame[column].iloc[rows[:1]].tolist()
         shown = f"{value:g}" if isinstance(value, float) else brief_value(value)
@@ -403,7 +406,7 @@ def _refuse(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str, sou
 
 
 def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
-    """Return recorded hits as :func:`check_hits` does, without a judgement of postures."""
+    """Return recorded hits as :func:`check_hits` does, without checking whether postures fit."""
     joints = [*task.robot.joint_names]
     is_used = np.zeros(len(joints), dtype=bool)
     for hand in task.hands:
@@ -424,9 +427,9 @@ def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
     goals = range(1, len(task.goals) + 1)
     _refuse(hits, "goal", ~hits.goal.isin(goals), f"an integer from 1 to {len(goals)}", source)
     _refuse(hits, "ticks", hits.ticks < 1e-6, "more than 0, since the previous hit", source)
-    once = "another goal than in the rows above of this subject and trial; number the trials of a "
-    once += "subject through all sessions"
-    _refuse(hits, "goal", hits.duplicated(_KEY), once, source)
+    no_duplicate = "another goal than in the rows above of this subject and trial; number the "
+    no_duplicate += "trials of a subject through all sessions"
+    _refuse(hits, "goal", hits.duplicated(_KEY), no_duplicate, source)
     order = np.lexsort((hits.goal.array, hits.trial.array, pd.factorize(hits.subject)[0]))
     unused = {name: value for name, value in at_start.items() if name not in used}
     hits = hits.iloc[order].reset_index(drop=True).assign(**unused)
@@ -438,7 +441,7 @@ def _readable(frame: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
 
 
 def _fit(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
-    """Return :func:`consistency` of hits of :func:`_readable`."""
+    """Return :func:`consistency` for hits that :func:`_readable` returns."""
     joints = [*task.robot.joint_names]
     q, goal = hits[joints].to_numpy(), hits.goal.to_numpy(np.int64)
     hand_positions = np.empty((len(q), 2))
@@ -456,16 +459,19 @@ def _fit(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
 
 
 def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
-    """Return hits of :func:`_readable` unchanged. Warns, and if they are most hits of a subject
-    raises CoarticError, for hits beyond two radii; warns of times that are not of the model's
-    order of magnitude."""
+    """Return hits of :func:`_readable` unchanged, after checking whether they fit the task.
+
+    - Warns if hits of a subject are more than two radii from the centres of their goals. Raises
+      CoarticError if these are more than half of the subject's hits.
+    - Warns if the median movement takes less than a tenth or more than ten times the model's time.
+    """
     for subject, fit in _fit(hits, task).groupby("subject", sort=False):
         far, pace = fit.off > FAR, fit.pace.median()
         words = f"{source}: {far.sum()} of {len(far)} hits of {subject} are more than 2 radii off"
         if far.mean() > 0.5:
             raise CoarticError(
                 f"{words}. Joint angles must be in rad, anticlockwise, from the direction of the "
-                "link before, positions in the length unit of the task; draw_recording shows "
+                "previous link, and positions in the length unit of the task; draw_recording shows "
                 "where the hand is"
             )
         if far.any():
@@ -473,8 +479,8 @@ def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
         if not 0.1 <= pace <= 10:
             warnings.warn(
                 f"{source}: the median movement of {subject} takes {pace:.2g} times as long as the "
-                "model's; draw_recording shows the paces, ticks_per_unit sets the unit of a column "
-                "duration",
+                "model's; draw_recording shows the paces, and ticks_per_unit sets the unit of a "
+                "column duration",
                 stacklevel=_OF_CALLER,
             )
     return hits
@@ -492,20 +498,20 @@ class _Trial:
     time: Array
     """Shape ``(n,)``, s."""
     tips: dict[Hand, Array]
-    """Positions of each hand with markers, ``(n, 2)``, length unit."""
+    """Positions of each hand with markers, shape ``(n, 2)``, length unit."""
     q: Array
-    """Postures, ``(n, dof)``, unwrapped."""
+    """Postures with unwrapped angles, shape ``(n, dof)``."""
     hits: list[tuple[float, Hand]]
-    """For each goal up to the first that is missed, where it is hit, counted in samples, and the
-    hand."""
+    """For each goal up to the first missed one: the sample at which it is hit (not an integer if it
+    is hit between samples), and the hand."""
     fault: str
-    """What makes the hits of the trial wrong, as a sentence; empty without a fault."""
+    """Why the hits of the trial may be wrong, as a sentence; empty if there is no fault."""
 
     def at(self, sample: float, values: Array) -> Array:
         """Return ``values``, shape ``(n, ...)``, at a sample, linearly interpolated."""
         before = min(int(sample), len(values) - 2)
-        there: Array = values[before] + (sample - before) * (values[before + 1] - values[before])
-        return there
+        value: Array = values[before] + (sample - before) * (values[before + 1] - values[before])
+        return value
 
 
 def _trials_of(
@@ -513,8 +519,10 @@ def _trials_of(
     task: Task,
     side: Literal["left", "right", "both"] | None,
 ) -> tuple[str, list[_Trial]]:
-    """Return the name, for messages, and the trials of a recording of markers. Raises CoarticError
-    if it cannot be read."""
+    """Return the name (for messages) and the trials of a recording of markers.
+
+    Raises CoarticError if it cannot be read.
+    """
     if isinstance(recording, pd.DataFrame):
         source, frame = "the frame", recording
     else:
@@ -535,27 +543,31 @@ def _trials_of(
     _refuse(frame, "subject", frame.subject.isna(), "a name", source)
     trials, times = _numbers(frame, ["trial", "time"], source).T
     _refuse(frame, "trial", (trials % 1 != 0) | (trials < 1), "an integer from 1", source)
-    places = {hand: _numbers(frame, names[hand], source, gaps=True) for hand in hands}
+    positions = {hand: _numbers(frame, names[hand], source, gaps=True) for hand in hands}
     keys = pd.DataFrame({"subject": frame.subject.astype(str).to_numpy(), "trial": trials})
     found = []
     for key, rows in keys.groupby(["subject", "trial"], sort=False).indices.items():
         subject, number = cast("tuple[str, float]", key)
         later = np.append(True, np.diff(times[rows]) > 0)
-        increasing = "later than in the row before: give each sample once, and each trial a number"
+        increasing = "later than in the row before; each sample must occur once, and each trial "
+        increasing += "must have its own number"
         _refuse(frame.iloc[rows], "time", ~later, increasing, source)
-        of_trial = {hand: places[hand][rows].reshape(len(rows), -1, 2) for hand in hands}
+        of_trial = {hand: positions[hand][rows].reshape(len(rows), -1, 2) for hand in hands}
         if len(rows) > 1:
             found.append(_trial(subject, float(number), times[rows], of_trial, task))
     if not found:
-        raise CoarticError(f"{source} has one sample in each trial: a trial needs at least two")
+        raise CoarticError(f"{source} has one sample in each trial; a trial needs at least two")
     return source, found
 
 
 def _trial(
     subject: str, number: float, time: Array, places: dict[Hand, Array], task: Task
 ) -> _Trial:
-    """Return a trial with its postures and hits, from positions of markers of each hand, shape
-    ``(n, markers, 2)``, with NaN for gaps."""
+    """Return a trial with its postures and hits.
+
+    ``places`` has the positions of the markers of each arm, shape ``(n, markers, 2)``, with NaN for
+    gaps.
+    """
     robot, faults, first_gap = task.robot, [], len(time)
     if (step := float(np.median(np.diff(time)))) > _LONGEST_STEP + 1e-9:
         faults.append(f"samples are {step:g} s apart; hits need at least 25 samples a second")
@@ -575,7 +587,8 @@ def _trial(
         link, expected = np.diff(arm, axis=1), np.array(robot.arm(hand).links)
         lengths = np.median(np.linalg.norm(link, axis=2), axis=0)
         if not (np.abs(lengths / expected - 1) <= _OTHER_ARM).all():
-            listed = (", ".join(f"{length:.3g}" for length in each) for each in (lengths, expected))
+            listed = (", ".join(f"{length:.3g}" for length in arm_lengths)
+                      for arm_lengths in (lengths, expected))  # fmt: skip
             faults.append("the links of the {} arm are {} long, those of the task {}".format(
                 hand, *listed))  # fmt: skip
         q[:, robot.joints(hand)] = np.diff(np.arctan2(link[..., 1], link[..., 0]), prepend=0.0)
@@ -592,20 +605,23 @@ def _trial(
 
 
 def _bridge(values: Array, time: Array, step: float) -> int:
-    """Fill gaps (NaN) by straight lines in place; return the last sample before the first gap of
-    more than 50 ms, or the number of samples."""
-    there = np.flatnonzero(np.isfinite(values))
-    if not len(there):
+    """Fill the gaps (NaN) of a marker's coordinate by straight lines, in place.
+
+    Returns the last sample before the first gap of more than 50 ms, or the number of samples if
+    there is no such gap.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    if not len(known):
         return 0
-    values[:] = np.interp(time, time[there], values[there])
-    around = np.concatenate([[time[0] - step], time[there], [time[-1] + step]])
+    values[:] = np.interp(time, time[known], values[known])
+    around = np.concatenate([[time[0] - step], time[known], [time[-1] + step]])
     is_long = np.diff(around) - step > _LONGEST_GAP + 1e-9
-    before = np.concatenate([[0], there])
+    before = np.concatenate([[0], known])
     return int(before[is_long][0]) if is_long.any() else len(values)
 
 
 def _hits_of(tips: dict[Hand, Array], task: Task) -> list[tuple[float, Hand]]:
-    """Return the hits of a trial, as :attr:`_Trial.hits`, from positions ``(n, 2)`` of hands."""
+    """Return :attr:`_Trial.hits` from the positions of hands, shape ``(n, 2)``."""
     hits: list[tuple[float, Hand]] = []
     for goal in task.goal_array:
         first = int(hits[-1][0]) + 1 if hits else 0
@@ -618,8 +634,11 @@ def _hits_of(tips: dict[Hand, Array], task: Task) -> list[tuple[float, Hand]]:
 
 
 def _entry(path: Array, radius: float) -> float | None:
-    """Return where a path of straight lines through points ``(n, 2)`` enters a circle around 0, in
-    samples, or None."""
+    """Return the sample at which a path enters a circle around 0, or None.
+
+    The path leads through points, shape ``(n, 2)``, in straight lines. The sample is not an integer
+    if the path enters the circle between samples.
+    """
     start, move = path[:-1], np.diff(path, axis=0)
     square = np.maximum((move**2).sum(axis=1), 1e-18)
     middle = -(start * move).sum(axis=1) / square  # where the line is closest to the centre
@@ -631,7 +650,7 @@ def _entry(path: Array, radius: float) -> float | None:
 
 
 def _rows_of(trials: list[_Trial], task: Task, ticks_per_unit: float) -> pd.DataFrame:
-    """Return a row for each hit of trials, as :func:`_readable` does."""
+    """Return a frame with a row for each hit of trials, as :func:`_readable` does."""
     check_limits("ticks_per_unit", ticks_per_unit, 1e-9, 1e9)
     rows: list[list[Any]] = []
     for trial in trials:
@@ -652,7 +671,7 @@ def _rows_of(trials: list[_Trial], task: Task, ticks_per_unit: float) -> pd.Data
 
 @style.styled
 def _drawn(hits: pd.DataFrame, trials: list[_Trial], task: Task) -> Figure:
-    """Return the figure of :func:`draw_recording`; a colour stands for a goal in all panels."""
+    """Return the figure of :func:`draw_recording`. A goal has the same colour in all panels."""
     postures = np.vstack([task.q0, hits[[*task.robot.joint_names]].to_numpy(np.float64)])
     corners = [*box(task, postures, 0.2)]
     corners += [tip for trial in trials for tip in trial.tips.values()]
@@ -686,7 +705,7 @@ def _color_of(goal: int) -> str:
 def _draw_postures(
     axes: Axes, goal: int, hits: pd.DataFrame, trials: list[_Trial], task: Task
 ) -> None:
-    """Draw the postures in which a goal, from 1, was hit, and the paths of hands to it."""
+    """Draw the postures in which a goal was hit, and the hands' paths to it."""
     color, joints = _color_of(goal), [*task.robot.joint_names]
     last = max([*hits.trial, *(trial.number for trial in trials)], default=1)
     axes.set_title(f"goal {goal}", color=color)
@@ -709,7 +728,7 @@ def _draw_postures(
 
 
 def _draw_fit(panels: Any, hits: pd.DataFrame, task: Task) -> None:
-    """Draw ``off`` and ``pace`` by trial, subject after subject, in two panels."""
+    """Draw ``off`` and ``pace`` by trial in two panels, one subject after the other."""
     fit = _fit(hits, task) if len(hits) else hits.assign(off=[], pace=[])
     lasts = fit.groupby("subject", sort=False).trial.max() + 1
     begins = lasts.cumsum() - lasts
@@ -753,8 +772,8 @@ def _draw_times(axes: Axes, trials: list[_Trial]) -> None:
         for goal, (sample, _) in enumerate(trial.hits, 1):
             axes.plot(trial.at(sample, time), row, ".", color=_color_of(goal), markersize=4)
     shown = range(0, len(trials), -(-len(trials) // 12))
-    several = len({trial.subject for trial in trials}) > 1
-    names = [f"{trials[k].subject}, " * several + f"{trials[k].number:g}" for k in shown]
+    has_subjects = len({trial.subject for trial in trials}) > 1
+    names = [f"{trials[k].subject}, " * has_subjects + f"{trials[k].number:g}" for k in shown]
     axes.set_yticks(shown, names)
-    axes.set(ylim=(len(trials) - 0.4, -0.6), ylabel="subject, trial" if several else "trial")
+    axes.set(ylim=(len(trials) - 0.4, -0.6), ylabel="subject, trial" if has_subjects else "trial")
     axes.set_xlabel("time since the start of the trial (s), with hits of goals; rests are shaded")

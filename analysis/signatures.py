@@ -3,14 +3,18 @@
 A signature is a number for each run of a method on a task (:data:`SIGNATURES`). At a goal that two
 tasks share, :class:`TwoContexts` compares the postures of their runs.
 
-Notation: run i hits goal g = 1..G at configuration q(i, g) with hand h(i, g), t(i, g) ticks after
-the goal before; q(i, 0) is the start of the task. The corrective process alone, with the hands of
-run i, takes c(i, g) ticks for goal g. r(q, g, h) are the ticks of a reach by the corrective process
-from q to goal g with hand h, and R(q, g, h) is the configuration at its end. A signature has shape
-``(n,)`` for n runs, and is NaN for a run without this signature.
+Notation, for run i and goal g = 1..G:
+
+- The run hits the goal at configuration q(i, g) with hand h(i, g), t(i, g) ticks after the previous
+  goal. q(i, 0) is the start of the task.
+- The corrective process alone, with the hands of run i, takes c(i, g) ticks for goal g.
+- A reach by the corrective process from q to goal g with hand h takes r(q, g, h) ticks, and ends at
+  configuration R(q, g, h).
+
+A signature has shape ``(n,)`` for n runs, and is NaN for a run without this signature.
 
 Configurations mix length unit (base) and rad (joints), as the joint-space distance of the model
-does. Permutation tests exchange whole runs, which are exchangeable if the context has no effect;
+does. Permutation tests exchange whole runs. Runs are exchangeable if the context has no effect, and
 the tests assume no distribution.
 """
 
@@ -59,16 +63,16 @@ class Solutions:
     runs: tuple[Execution, ...]
     """Executions of the solutions, one for each run."""
     run_ids: tuple[str, ...] = ()
-    """Ids of the runs, in the order of ``runs``; empty without ids."""
+    """Ids of the runs, in the order of ``runs``; empty if the runs have no ids."""
     unfinished: int = 0
-    """Number of recorded trials, not among ``runs``, in which a goal was never reached, as counted
-    by :func:`.hits_from_markers`; 0 for others."""
+    """Number of recorded trials in which not all goals were hit. They are not among ``runs``. It is
+    0 if the runs are not recorded."""
     deterministic: bool = False
     """True if all runs of the method on this task are equal by construction."""
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
-        """Hands chosen for the goals, shape ``(n, G)``: 0 for left, 1 for right, as in HANDS."""
+        """Hands that hit the goals, shape ``(n, G)``: 0 for left, 1 for right, as in HANDS."""
         hands = [[HANDS.index(hand) for hand in hands_of(run.hands)] for run in self.runs]
         return np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals))
 
@@ -80,18 +84,23 @@ class Solutions:
 
     @cached_property
     def starts(self) -> Array:
-        """Configurations at the start of each subtask, shape ``(n, G, dof)``: the hit of the goal
-        before, or the start of the task."""
+        """Configurations at the start of each subtask, shape ``(n, G, dof)``.
+
+        A subtask starts at the hit of the previous goal, the first at the start of the task.
+        """
         starts = np.empty_like(self.configurations)
         starts[:, 0], starts[:, 1:] = self.task.q0, self.configurations[:, :-1]
         return starts
 
     @cached_property
     def against_same_hands(self) -> Array:
-        """Ticks of each subtask less its ticks by the corrective process alone with the hands of
-        the run, shape ``(n, G)``; NaN if this process does not complete the task."""
-        every = {run.hands for run in self.runs}
-        references = {hands: corrective_trial(self.task, hands) for hands in every}
+        """Ticks of each subtask less those of the corrective process alone, shape ``(n, G)``.
+
+        The corrective process uses the hands of the run. Values are NaN if it does not complete the
+        task with them.
+        """
+        hand_sequences = {run.hands for run in self.runs}
+        references = {hands: corrective_trial(self.task, hands) for hands in hand_sequences}
         changes = np.full((len(self.runs), len(self.task.goals)), np.nan)
         for row, run in zip(changes, self.runs, strict=True):
             if (reference := references[run.hands]).completed:
@@ -102,9 +111,9 @@ class Solutions:
 def initial_solution(task: Task) -> Execution | None:
     """Return the execution of the corrective process alone with the initial hands of a task.
 
-    None if the corrective process does not complete the task with these hands, or if the task does
-    not name them and no hand sequence of its policy completes it or over 4,096 would have to be
-    tried.
+    Returns None if the corrective process does not complete the task with these hands, or if no
+    initial hands are found: the task does not name them, and either no hand sequence of its policy
+    completes the task, or there are more than 4,096 to try.
     """
     try:
         execution = corrective_trial(task, initial_hands(task))
@@ -121,8 +130,9 @@ def _other(hand: Hand) -> Hand:
 def isolated_reaches(
     task: Task, q: Array, goals: ArrayLike, hands: ArrayLike
 ) -> tuple[Array, Array]:
-    """Return the ticks r(q, g, h) of reaches by the corrective process from configuration q to goal
-    g with hand h, and the configurations R(q, g, h) at their ends.
+    """Reach single goals by the corrective process, and return ticks and final configurations.
+
+    These are r(q, g, h) and R(q, g, h) of the notation above.
 
     Parameters
     ----------
@@ -130,13 +140,18 @@ def isolated_reaches(
     q : ndarray, shape (..., dof)
         Configurations at the start, length unit and rad.
     goals, hands : array_like of int, shapes that broadcast to (...)
-        Numbers of goals, from 1 (ValueError for others), and places of hands in HANDS.
+        Numbers of goals, from 1, and indices of hands in HANDS.
 
     Returns
     -------
     (ndarray, shape (...), ndarray, shape (..., dof))
-        Ticks, 0 if the hand is within the goal at the start, NaN if the reach ends without a hit;
-        and configurations at the end.
+        Ticks, and configurations at the end. Ticks are 0 if the hand is within the goal at the
+        start, and NaN if the reach ends without a hit.
+
+    Raises
+    ------
+    ValueError
+        A goal's number is out of range, or shapes do not fit.
     """
     q, numbers = np.asarray(q), 1 + np.arange(len(task.goals))
     shape = q.shape[:-1]
@@ -145,7 +160,10 @@ def isolated_reaches(
     except ValueError:
         fit = False
     if not fit or not np.isin(goals, numbers).all():
-        raise ValueError(f"needed are goals from 1 to {len(numbers)} and hands for q of {q.shape}")
+        raise ValueError(
+            f"goals must be from 1 to {len(numbers)}, and the shapes of goals and hands must "
+            f"broadcast to {shape}: q has shape {q.shape}"
+        )
     reached = reach_goals(
         task.robot,
         q.reshape(-1, q.shape[-1]),
@@ -159,37 +177,42 @@ def isolated_reaches(
 
 
 def gain_at_next(runs: Solutions) -> Array:
-    """Return the ticks that the posture at each goal saves on the way to the next goal, shape
-    ``(n, G − 1)``: positive where the movement to the next goal is shorter.
+    """Return the ticks that the posture at each goal saves for the next goal, shape ``(n, G − 1)``.
 
     r(q', g + 1, h(i, g + 1)) − r(q'', g + 1, h(i, g + 1)),
 
-    where q' = R(q(i, g − 1), g, h(i, g)) is the posture in which the corrective process would have
-    hit goal g, and q'' is q(i, g) with the joints of the idle arm as in q', so that movements of
-    the idle arm do not count. NaN if a reach ends without a hit.
+    where
+
+    - q' = R(q(i, g − 1), g, h(i, g)) is the posture in which the corrective process would have hit
+      goal g;
+    - q'' is q(i, g) with the joints of the idle arm as in q', so that movements of the idle arm do
+      not count.
+
+    It is positive if the movement to the next goal is shorter from q'', and NaN if a reach ends
+    without a hit.
     """
     task, hands = runs.task, runs.hands
     goals = 1 + np.arange(len(task.goals))
     now, following = np.s_[:, :-1], np.s_[:, 1:]
-    alone, there = isolated_reaches(task, runs.starts[now], goals[:-1], hands[now])
+    alone, corrective = isolated_reaches(task, runs.starts[now], goals[:-1], hands[now])
     idle = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
     for number, hand in enumerate(HANDS):
         idle[number, task.robot.joints(_other(hand))] = True
-    hit = np.where(idle[hands[now]], there, runs.configurations[now])
+    hit = np.where(idle[hands[now]], corrective, runs.configurations[now])
     after, nearer = (
-        isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (there, hit)
+        isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (corrective, hit)
     )
     return np.where(np.isnan(alone), np.nan, after - nearer)
 
 
 def ticks_slower(runs: Solutions) -> Array:
-    """Return the ticks by which each chosen hand is slower for its goal alone, shape ``(n, G)`` for
-    n runs and G goals.
+    """Return how many ticks slower than the fastest hand each chosen hand is, shape ``(n, G)``.
 
-    r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h): the ticks of the
-    corrective process with the hand h(i, g) from the configuration at the hit before, less the
-    ticks with the fastest hand; more than 0 for a hand that is not the fastest for this goal alone.
-    Infinite if the reach with the chosen hand ends without a hit.
+    r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h)
+
+    These are the ticks of the corrective process from the previous hit, with the chosen hand less
+    those with the fastest hand. The value is above 0 if the chosen hand is not the fastest for this
+    goal alone. It is infinite if the reach with the chosen hand ends without a hit.
     """
     goals = 1 + np.arange(len(runs.task.goals))
     alone = np.full((len(HANDS), *runs.hands.shape), np.inf)
@@ -203,17 +226,29 @@ def ticks_slower(runs: Solutions) -> Array:
 
 
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
-    """Return the share of the way to its next goal that the idle hand covers, shape ``(G,)``, for a
-    completed ``run``.
+    """Return the share of the path to its next goal that the idle hand covers, shape ``(G,)``.
 
     (d_held(g) − d(g)) / d_initial(g),
 
-    where d(g) is the distance of the idle hand to the next goal of this hand at the hit of goal g;
-    d_held(g) is this distance if the idle arm had kept its joints since its own last hit (or the
-    start); and d_initial(g) is the distance of the same hand to the same goal at the hit of goal g
-    in ``initial``, a completed run of the corrective process alone with the task's initial hands.
-    NaN if the idle hand hits no later goal (always under exploration condition 1), or d_initial(g)
-    is 0; else 0 if the idle arm keeps still, whatever the base does (always under condition 3).
+    where
+
+    - d(g) is the distance of the idle hand to this hand's next goal, at the hit of goal g;
+    - d_held(g) is this distance if the idle arm had not moved its joints since its own last hit (or
+      the start);
+    - d_initial(g) is the distance of the same hand to the same goal at the hit of goal g in
+      ``initial``.
+
+    It is NaN if the idle hand hits no later goal (always under exploration condition 1), or
+    d_initial(g) is 0. Otherwise it is 0 if the joints of the idle arm do not move, even if the base
+    moves (always under condition 3).
+
+    Parameters
+    ----------
+    task : Task
+    run : Execution
+        A completed run.
+    initial : Execution
+        A completed run of the corrective process alone with the task's initial hands.
     """
     now, hands = run.configurations, hands_of(run.hands)
     held = np.array(now)
@@ -242,20 +277,23 @@ class Signature:
     each: Callable[[Solutions], Array]
     """Function that returns the signature of each run, shape ``(n,)``, NaN for runs without it."""
     words: str
-    """The quantity that the signature measures, in words with its unit."""
+    """What the signature measures, in words with its unit."""
 
 
 def hand(runs: Solutions) -> Array:
-    """Return for each run, shape ``(n,)``, the share of goals before the last whose hand is not the
-    fastest for that goal alone: 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`. NaN on
-    a task for one hand or with one goal."""
+    """Return the share of goals whose hand is not the fastest for that goal alone, shape ``(n,)``.
+
+    It is 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`: the last goal does not count.
+    NaN on a task for one hand or with one goal.
+    """
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
 
 
 def as_in_isolation(runs: Solutions) -> Array:
-    """Return a(i, g) for run i and goal g, shape ``(n, G)``: 1 if the chosen hand is the fastest
-    for goal g alone, or else 0; NaN on a task for one hand.
+    """Return 1 where the chosen hand is the fastest for the goal alone, otherwise 0.
+
+    The shape is ``(n, G)``. Values are NaN on a task for one hand.
 
     a(i, g) = [r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h)].
     """
@@ -265,25 +303,28 @@ def as_in_isolation(runs: Solutions) -> Array:
 
 
 def other_arm(runs: Solutions) -> Array:
-    """Return for each run, shape ``(n,)``, the share of the way to its next goal that the idle hand
-    covers, a mean of :func:`preshaping` over the goals where that is not NaN.
+    """Return the share of the path to its next goal that the idle hand covers, shape ``(n,)``.
 
-    Negative if on the whole the idle hand moves away. NaN on a task for one hand, without an
-    initial solution, and for a run without such a goal.
+    It is the mean of :func:`preshaping` over the goals for which this is not NaN, and negative if
+    the idle hand moves away on average. It is NaN on a task for one hand or without an initial
+    solution (:func:`initial_solution`), and for a run in which :func:`preshaping` is NaN for all
+    goals.
     """
     initial = initial_solution(runs.task)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:
         return np.full(len(runs.runs), np.nan)
     values = np.array([preshaping(runs.task, run, initial) for run in runs.runs])
-    means, some = np.full(len(values), np.nan), ~np.isnan(values).all(axis=1)
-    means[some] = np.nanmean(values[some], axis=1)
+    means, has_value = np.full(len(values), np.nan), ~np.isnan(values).all(axis=1)
+    means[has_value] = np.nanmean(values[has_value], axis=1)
     return means
 
 
 def arm(runs: Solutions) -> Array:
-    """Return for each run, shape ``(n,)``, the ticks that the postures of base and chosen arm save
-    on the way to the next goal: the mean of :func:`gain_at_next` over goals g < G; NaN if a gain of
-    the run is NaN, and on a task with one goal."""
+    """Return the ticks that postures of base and chosen arm save for the next goal, shape ``(n,)``.
+
+    It is the mean of :func:`gain_at_next` over goals g < G. It is NaN on a task with one goal, and
+    if one of these gains is NaN.
+    """
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
     return np.asarray(gain_at_next(runs).mean(axis=1))
@@ -314,43 +355,48 @@ SIGNATURES = {
         "ticks by which the whole task is shorter than the corrective process's",
     ),
 }
-"""Signatures by their names in claims: ``first`` is t(i, 1) − c(i, 1), and ``whole`` is
-Σ_g c(i, g) − t(i, g); NaN if the corrective process does not complete the task with the hands of
-the run."""
+"""Signatures by name. ``first`` is t(i, 1) − c(i, 1), and ``whole`` is Σ_g c(i, g) − t(i, g). Both
+are NaN if the corrective process does not complete the task with the hands of the run."""
 
 
 IN_MEMORY = 500
-"""Most permutations or resamples of runs in memory at once."""
+"""Largest number of permutations or resamples of runs in memory at once."""
 
 
 def _groups(*groups: Numbers) -> list[Array]:
-    """Return groups of runs as arrays of float64. Raises ValueError unless all have shape ``(runs,
-    dof)``, with the same ``dof`` and a run at least."""
+    """Return groups of runs as arrays of float64.
+
+    Raises ValueError unless all have shape ``(runs, dof)``, the same ``dof``, and at least one run.
+    """
     shapes = [np.shape(group) for group in groups]
     if any(len(shape) != 2 or shape[1:] != shapes[0][1:] or 0 in shape for shape in shapes):
-        raise ValueError(f"runs have shapes {shapes}; needed is (runs, dof) of each")
+        raise ValueError(
+            f"groups of runs have shapes {shapes}; each must be (runs, dof) with the same dof and "
+            "at least one run"
+        )
     return [np.asarray(group, np.float64) for group in groups]
 
 
 def distance_of_means(first: Array, second: Array) -> float:
-    """Return ‖mean(first) − mean(second)‖, the distance of mean configurations of two contexts.
+    """Return the distance ‖mean(first) − mean(second)‖ of the mean configurations of two contexts.
 
-    ``first`` and ``second`` have shape ``(runs, dof)`` (ValueError for others); length unit and rad
-    mixed.
+    ``first`` and ``second`` have shape ``(runs, dof)`` (ValueError for others). The distance mixes
+    length unit and rad.
     """
     first, second = _groups(first, second)
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
 
 
 def standardised_posture_difference(first: Array, second: Array) -> float:
-    """Return the distance of the mean configurations of two contexts, ``(runs, dof)`` each, in
-    pooled standard deviations within contexts, 0 to ∞.
+    """Return the distance of mean configurations in pooled standard deviations within contexts.
 
     d = ‖m₁ − m₂‖ / s, s² = (Σ‖x − m₁‖² + Σ‖x − m₂‖²) / (n₁ + n₂ − 2),
 
-    a multivariate form of Cohen's d (Cohen 1988). Without an effect of the context the expectation
-    of d² is about 1/n₁ + 1/n₂, not 0. NaN if no context has two runs, or if s = 0. Raises
-    ValueError for other shapes.
+    for the n₁ runs of the first and the n₂ runs of the second context with means m₁ and m₂. It is a
+    multivariate form of Cohen's d (Cohen 1988), from 0 to ∞. If the context has no effect, d² is
+    about 1/n₁ + 1/n₂ on average, not 0. d is NaN if no context has two runs, or s = 0.
+
+    ``first`` and ``second`` have shape ``(runs, dof)`` (ValueError for others).
     """
     first, second = _groups(first, second)
     freedom = len(first) + len(second) - 2
@@ -372,11 +418,32 @@ def posture_difference_below(
 ) -> float:
     """Test that the posture difference is below a bound, by the bootstrap.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, the share of bootstrap samples,
-    with runs drawn within each context, whose :func:`standardised_posture_difference` is at least
-    ``bound`` (in SDs; NaN counts), or if not ``standardised`` whose :func:`distance_of_means` is;
-    one such sample is added. Noise adds to distances, so that p is rather too large. NaN if a
-    context has a single run. Raises ValueError for other shapes.
+    Bootstrap samples draw runs within each context. p = (1 + samples whose posture difference is at
+    least ``bound``) / (1 + resamples). Noise makes distances larger, so p tends to be too large.
+
+    Parameters
+    ----------
+    first, second : array_like, shape (runs, dof)
+        Configurations in the two contexts, length unit and rad.
+    bound : float
+        In the unit of the posture difference.
+    rng : numpy.random.Generator
+        Generator of the bootstrap samples.
+    standardised : bool
+        True if the posture difference is :func:`standardised_posture_difference`, in SDs, False if
+        it is :func:`distance_of_means`. A sample without spread counts as at least ``bound``.
+    resamples : int
+        Number of bootstrap samples.
+
+    Returns
+    -------
+    float
+        p; NaN if a context has a single run.
+
+    Raises
+    ------
+    ValueError
+        An array has another shape.
     """
     groups = _groups(first, second)
     if min(map(len, groups)) < 2:
@@ -396,12 +463,29 @@ def posture_difference_below(
 def permutation_p(
     first: Array, second: Array, rng: np.random.Generator, *, resamples: Resamples = RESAMPLES
 ) -> float:
-    """Test that the distance of the mean configurations of two contexts exceeds chance, by a
-    one-tailed permutation test of runs.
+    """Test that mean configurations of two contexts differ by more than chance, by permutation.
 
-    ``first`` and ``second`` have shape ``(runs, dof)``. Returns p, 0 < p ≤ 1: exact if the runs can
-    be divided in no more than ``resamples`` ways, 1 if all runs are equal, NaN if a context has a
-    single run. Raises ValueError for other shapes.
+    The statistic is :func:`distance_of_means`, and the test is one-tailed. It is exact if there are
+    at most ``resamples`` ways to divide the runs.
+
+    Parameters
+    ----------
+    first, second : ndarray, shape (runs, dof)
+        Configurations in the two contexts, length unit and rad.
+    rng : numpy.random.Generator
+        Generator of the permutations.
+    resamples : int
+        Largest number of permutations.
+
+    Returns
+    -------
+    float
+        p, 0 < p ≤ 1. It is 1 if all runs are equal, and NaN if a context has a single run.
+
+    Raises
+    ------
+    ValueError
+        An array has another shape.
     """
     first, second = _groups(first, second)
     if min(len(first), len(second)) < 2:
@@ -409,11 +493,11 @@ def permutation_p(
     n, m, pool = len(first), len(second), centred(np.concatenate([first, second]))
     ways = math.comb(n + m, n)
     exact = ways <= resamples
-    every = places(n + m, n, ways if exact else resamples, exact, rng)
-    null = [_distances(*_means_of(pool, rows)) for _, rows in every]
+    chunks = places(n + m, n, ways if exact else resamples, exact, rng)
+    null = [_distances(*_means_of(pool, rows)) for _, rows in chunks]
     (observed,) = _distances(*_means_of(pool, np.arange(n)[None]))
     reached = int((np.concatenate(null) >= observed * (1 - 1e-9)).sum())
-    # Where divisions are drawn, the observed one counts as one more (Davison & Hinkley 1997).
+    # If divisions are random, the observed one is counted as well (Davison & Hinkley 1997).
     return reached / ways if exact else (1 + reached) / (1 + resamples)
 
 
@@ -424,13 +508,11 @@ def beyond_p(
     *,
     resamples: Resamples = RESAMPLES,
 ) -> float:
-    """Test that a method's posture difference between contexts exceeds another method's, by
-    permutation.
+    """Test that a method's posture difference exceeds another method's, by permutation.
 
-    The posture difference is the distance of the mean configurations in the two contexts. The
-    statistic is the difference of the two methods' posture differences. Permutations exchange the
-    runs of both methods within each context. Raises ValueError for other numbers of contexts than
-    two, and for other shapes.
+    The posture difference is the distance of the mean configurations in two contexts. The statistic
+    is the difference of the two methods' posture differences. Permutations exchange the runs of
+    both methods within each context.
 
     Parameters
     ----------
@@ -444,8 +526,13 @@ def beyond_p(
     Returns
     -------
     float
-        p, 0 < p ≤ 1: twice the upper tail, 1 at most. NaN if a method has a single run in a
+        p, 0 < p ≤ 1: twice the upper tail, but at most 1. NaN if a method has a single run in a
         context.
+
+    Raises
+    ------
+    ValueError
+        A method does not have two contexts, or an array has another shape.
 
     Examples
     --------
@@ -456,7 +543,10 @@ def beyond_p(
     True
     """
     if len(method) != 2 or len(other) != 2:
-        raise ValueError("needed are the runs of each method in two contexts")
+        raise ValueError(
+            f"method has {len(method)} and other {len(other)} contexts; each must have the runs of "
+            "two contexts"
+        )
     groups = _groups(*method, *other)
     if min(map(len, groups)) < 2:
         return math.nan
@@ -477,8 +567,10 @@ def beyond_p(
 
 
 def _means_of(pool: Array, rows: NDArray[Any]) -> tuple[Array, Array]:
-    """Return, for each of ``rows`` of indices in ``pool``, the mean of the configurations that the
-    row names, and the mean of the others, shapes ``(rows, dof)``."""
+    """Return the mean of the configurations that each row picks, and the mean of the others.
+
+    ``rows`` are rows of indices in ``pool``. Both means have shape ``(rows, dof)``.
+    """
     total, chosen = pool[rows].sum(axis=1), rows.shape[1]
     return total / chosen, (pool.sum(axis=0) - total) / (len(pool) - chosen)
 
@@ -489,25 +581,25 @@ def _distances(first: Array, second: Array) -> Array:
 
 
 NEXT_APART = 0.1
-"""Least distance of the mean next postures of two contexts for a lean, length unit and rad."""
+"""Smallest distance of the mean next postures of two contexts for a lean, length unit and rad."""
 STANDARD_ERRORS = 3
-"""Least distance of these means in their standard errors."""
+"""Smallest distance of these means in their standard errors."""
 FEWEST_RUNS = 5
-"""Least number of runs in each context for the interval of a lean or of a posture difference."""
+"""Smallest number of runs in each context for the interval of a lean or posture difference."""
 
 
 class Lean(NamedTuple):
-    """Lean of postures at a shared goal towards the next posture: shares of the way to it."""
+    """Lean of postures at a shared goal towards the next posture, as shares of the path to it."""
 
     more: Estimate
-    """Lean at the goal less lean at the start, with its interval over runs; ``n``: runs of each
-    context. This is what is interpreted."""
+    """Lean at the goal less lean at the start, with its interval for other runs. ``n`` are the
+    numbers of runs in the two contexts. Interpret this number, not the two leans."""
     at_goal: float
     """Lean of the postures at the shared goal."""
     at_start: float
     """Lean of the postures from which the movements to the shared goal start: the control."""
     apart: float
-    """Distance of the mean next postures of the two contexts, length unit and rad mixed."""
+    """Distance of the mean next postures of the two contexts; it mixes length unit and rad."""
 
 
 def lean(
@@ -519,22 +611,26 @@ def lean(
     deterministic: bool = False,
     resamples: Resamples = FEWER_RESAMPLES,
 ) -> Lean:
-    """Return the share of the way to the next posture that is already made at a shared goal.
+    """Return the share of the path to the next posture that is already covered at a shared goal.
 
     The lean of contexts A and B is
 
     (p_A − p_B)·(n_A − n_B) / ‖n_A − n_B‖²,
 
     where p are mean postures at the shared goal, and n mean postures in which the next goal is
-    hit. It is 0 if the posture at the shared goal does not depend on the next goal, 1 if it is
-    already the posture for the next goal, and negative if it is away from there. The unit of the
-    postures cancels out. The same projection of the start postures is its control: what was there
-    before the movement is not a lean.
+    hit. The lean is
 
-    p and n of one run share the noise of that run, which would look like a lean. So p is the mean
-    of the odd runs and n the mean of the even runs, or the other way round; the lean is the mean
-    of both. Noise in n_A − n_B makes a lean smaller: by a ninth where a lean of four coordinates
-    just applies, by less elsewhere.
+    - 0 if the posture at the shared goal does not depend on the next goal;
+    - 1 if it is already the posture for the next goal;
+    - negative if it is on the side away from the posture for the next goal.
+
+    The unit of the postures cancels out. The same projection of the start postures is the control:
+    a difference that existed before the movement is not a lean.
+
+    p and n of one run share the noise of that run, which would look like a lean. Therefore p is the
+    mean of the odd runs and n the mean of the even runs, or the other way round; the lean is the
+    mean of both. Noise in n_A − n_B makes a lean smaller: with four coordinates by a ninth if the
+    lean is just applicable, otherwise by less.
 
     All numbers but ``apart`` are NaN if the lean is not applicable:
 
@@ -546,35 +642,35 @@ def lean(
     Parameters
     ----------
     first, second : array_like, shape (runs, 3, k)
-        Postures of each run of context A and of context B: at the start of the movement to the
-        shared goal, at the shared goal, and at the next goal. The k coordinates are those that
-        move the hand which hits the shared goal, in length units and rad.
+        Three postures of each run in context A and in context B: at the start of the movement to
+        the shared goal, at the shared goal, and at the next goal. The k coordinates are those that
+        move the hand that hits the shared goal, in length units and rad.
     rng : numpy.random.Generator
         Generator of the resamples.
     toward : array_like, shape (m, k), optional
-        Values of n_A − n_B from other sources, such as other people: their mean replaces n_A −
-        n_B, and p is the mean of all runs.
+        Values of n_A − n_B from other sources, such as other people. Their mean then replaces
+        n_A − n_B, and p is the mean of all runs.
     deterministic : bool
-        True if all runs of a context are equal by construction, so that one is enough.
+        True if all runs of a context are equal by construction, so that one run is enough.
     resamples : int
-        Number of bootstrap samples of the interval.
+        Number of bootstrap samples for the interval.
 
     Returns
     -------
     Lean
-        The interval is of percentiles. Runs are resampled within the odd and within the even runs
-        of each context, with deviations from their mean times √(m / (m − 1)) for m runs; with
-        ``toward`` within each context. There is none for fewer than five runs in a context, or if
-        ``deterministic``.
+        The interval has percentiles of bootstrap samples. Runs are resampled within the odd and
+        within the even runs of each context (with ``toward``, within each context); deviations from
+        the mean of m runs are multiplied by √(m / (m − 1)). There is no interval if a context has
+        fewer than five runs, or if ``deterministic``.
 
     Raises
     ------
     ValueError
-        If an array has another shape, or is empty or not finite.
+        An array has another shape, or is empty or not finite.
 
     Examples
     --------
-    Each run makes a third of the way from its own start to the next posture:
+    Each run covers a third of the path from its own start to the next posture:
 
     >>> rng = np.random.default_rng(0)
     >>> up, down = ([[[0.0], [end / 3], [end]]] * 5 for end in (1.0, -0.5))
@@ -583,19 +679,23 @@ def lean(
     """
     contexts = [_postures(runs) for runs in (first, second)]
     if contexts[0].shape[1:] != contexts[1].shape[1:]:
-        raise ValueError("the contexts have postures of different numbers of coordinates")
+        numbers = [runs.shape[2] for runs in contexts]
+        raise ValueError(
+            "postures must have the same number of coordinates in both contexts, not "
+            f"{numbers[0]} and {numbers[1]}"
+        )
     n = (len(contexts[0]), len(contexts[1]))
     if toward is not None:
         parts = [[runs] for runs in contexts]
         ways = np.asarray(toward, np.float64)
         if ways.ndim != 2 or ways.shape[1:] != contexts[0].shape[2:] or not ways.size:
             raise ValueError(
-                f"toward has shape {ways.shape}; it needs a row for each source and "
+                f"toward has shape {ways.shape}; it must have a row for each source, with "
                 f"{contexts[0].shape[2]} coordinates"
             )
         way, variance = ways.mean(axis=0), _variance_of_mean(ways)
     else:
-        # One run alone is in both halves, which only a deterministic method may have.
+        # Only a deterministic method may have a single run; it is then in both halves.
         halves = (slice(0, None, 2), slice(1, None, 2))
         parts = [[runs[half] for half in halves] if len(runs) > 1 else [runs] * 2
                  for runs in contexts]  # fmt: skip
@@ -607,48 +707,61 @@ def lean(
         return Lean(Estimate(math.nan, n=n), math.nan, math.nan, apart)
 
     def shares(means: Sequence[Sequence[Array]]) -> Array:
-        """Return the leans of start and goal, shape (..., 2), of means, shape (..., 3, k), of the
-        parts of both contexts."""
+        """Return the leans at start and goal, shape (..., 2).
+
+        ``means`` has the mean postures, shape (..., 3, k), of the parts of both contexts.
+        """
         differences = [one - other for one, other in zip(*means, strict=True)]
-        ways = [way] if toward is not None else [each[..., 2, :] for each in differences[::-1]]
+        ways = [way]
+        if toward is None:
+            ways = [difference[..., 2, :] for difference in differences[::-1]]
         values = [
-            np.einsum("...pk,...k->...p", each[..., :2, :], to) / (to**2).sum(axis=-1)[..., None]
-            for each, to in zip(differences, ways, strict=True)
+            np.einsum("...pk,...k->...p", difference[..., :2, :], to)
+            / (to**2).sum(axis=-1)[..., None]
+            for difference, to in zip(differences, ways, strict=True)
         ]
         return np.asarray(np.mean(values, axis=0))
 
-    start, goal = shares([[part.mean(axis=0) for part in of] for of in parts]).tolist()
+    start, goal = shares([[half.mean(axis=0) for half in halves] for halves in parts]).tolist()
     more = Estimate(goal - start, n=n)
     if min(n) >= FEWEST_RUNS and not deterministic:
-        drawn = shares([[_means_drawn(part, rng, resamples) for part in of] for of in parts])
+        drawn = shares(
+            [[_means_drawn(half, rng, resamples) for half in halves] for halves in parts]
+        )
         low, high = np.quantile(drawn[:, 1] - drawn[:, 0], TAILS).tolist()
         more = Estimate(more.value, low, high, n=n)
     return Lean(more, goal, start, apart)
 
 
 def _postures(runs: Numbers) -> Array:
-    """Return the postures of runs as an array of shape ``(runs, 3, k)``. Raises ValueError."""
+    """Return the postures of runs as an array of shape ``(runs, 3, k)``.
+
+    Raises ValueError for another shape, and for values that are not finite.
+    """
     postures = np.asarray(runs, np.float64)
     if postures.ndim != 3 or postures.shape[1] != 3 or not postures.size:
         raise ValueError(
-            f"the postures of a context have shape {postures.shape}; they need a row for each run "
-            "with three postures: at the start, at the shared goal, and at the next goal"
+            f"the postures of a context have shape {postures.shape}; they must have a row for each "
+            "run, with three postures: at the start, at the shared goal, and at the next goal"
         )
     if not np.isfinite(postures).all():
-        raise ValueError("the postures of a context have values that are not finite numbers")
+        raise ValueError("the postures of a context have numbers that are not finite")
     return postures
 
 
 def _variance_of_mean(values: Array) -> float:
-    """Return the summed variances of the means of ``(n, k)`` values; 0 for a single row."""
+    """Return the sum of the variances of the k means of values, shape ``(n, k)``; 0 if n is 1."""
     if len(values) < 2:
         return 0.0
     return float(centred(values).var(axis=0, ddof=1).sum()) / len(values)
 
 
 def _means_drawn(runs: Array, rng: np.random.Generator, resamples: int) -> Array:
-    """Return means of runs ``(m, ...)`` drawn with replacement, shape ``(resamples, ...)``, with
-    deviations times √(m / (m − 1)): so their variance is that of a mean without bias."""
+    """Return means of runs that are drawn with replacement, shape ``(resamples, ...)``.
+
+    ``runs`` has shape ``(m, ...)``. Deviations from the mean are multiplied by √(m / (m − 1)), so
+    that the variance of the means has no bias.
+    """
     mean, m = runs.mean(axis=0), len(runs)
     shares = rng.multinomial(m, np.full(m, 1 / m), size=resamples) / m
     deviations = np.tensordot(shares, runs - mean, axes=1)
@@ -656,14 +769,21 @@ def _means_drawn(runs: Array, rng: np.random.Generator, resamples: int) -> Array
 
 
 SAME = 0.01
-"""Posture difference, length unit and rad mixed, below which postures are the same: the robot's
-step."""
+"""Posture difference below which postures count as the same: the robot's step.
+
+It mixes length unit and rad."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
-    """Return ``(name, name, n)`` for each pair of tasks that differ only after their first goals: n
-    is the number of shared first goals that a further goal follows in both tasks. Pairs with n = 0,
-    with equal goals, and with different robots, starts, radii, hands or locked bases are left out.
+    """Return the pairs of tasks that share their first goals, and the number n of these goals.
+
+    n counts the shared first goals that are followed by another goal in both tasks. A pair is left
+    out if n is 0, if all goals are equal, or if robot, start, radius, hands or locked base differ.
+
+    Returns
+    -------
+    list of (str, str, int)
+        Names of both tasks, and n.
     """
     pairs = []
     for (a, first), (b, second) in combinations(tasks.items(), 2):
@@ -676,8 +796,10 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
 
 
 def movable(task: Task, hand: Hand) -> Array:
-    """Return the indices of the entries of a configuration that move a hand, shape ``(k,)``: base
-    coordinates that are not locked, and joints of its arm."""
+    """Return the indices of the coordinates that move a hand, shape ``(k,)``.
+
+    These are the base coordinates that are not locked, and the joints of its arm.
+    """
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
@@ -685,21 +807,40 @@ def movable(task: Task, hand: Hand) -> Array:
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
     """Return the motor-equivalent part and the other part of a difference of configurations Δq.
 
-    ‖Nᵀ Δq‖ / √dim N and ‖Rᵀ Δq‖ / √dim R, for orthonormal bases N of the null space of the Jacobian
-    J and R of the row space. ``difference`` Δq has shape ``(k,)``, length unit and rad mixed,
-    ``jacobian`` J shape ``(2, k)``, for the k joints that can move. In a random direction the
-    squares of the parts have equal expectations. A difference between contexts is motor-equivalent
-    if the first part exceeds the second: another posture with the same position of the hand.
-    Caveat: for small differences the radius of the goal bounds the second part; nothing bounds
-    the first. NaN for a
-    space of dimension 0. Raises ValueError for other shapes.
+    They are ‖Nᵀ Δq‖ / √dim N and ‖Rᵀ Δq‖ / √dim R, for an orthonormal basis N of the null space of
+    the Jacobian J, and R of its row space. For a random direction the squares of both parts have
+    the same expectation. A difference between contexts is motor-equivalent if the first part is
+    larger than the second: the posture differs, and the hand has the same position.
+
+    Caveat: for small differences the radius of the goal bounds the second part; nothing bounds the
+    first.
+
+    Parameters
+    ----------
+    difference : ndarray, shape (k,)
+        Δq of the k coordinates that can move, length unit and rad.
+    jacobian : ndarray, shape (2, k)
+        J.
+
+    Returns
+    -------
+    (float, float)
+        Both parts; NaN if the space has dimension 0.
+
+    Raises
+    ------
+    ValueError
+        An array has another shape.
+
+    Notes
+    -----
     Source: Mattos, Latash and colleagues, Experimental Brain Research
     (doi:10.1007/s00221-015-4327-4, 10.1007/s00221-018-5215-5).
     """
     if np.ndim(difference) != 1 or np.shape(jacobian) != (2, len(difference)):
         raise ValueError(
             f"difference has shape {np.shape(difference)} and jacobian {np.shape(jacobian)}; "
-            "needed are (k,) and (2, k)"
+            "these must be (k,) and (2, k)"
         )
     equivalent, other = (
         float(np.linalg.norm(basis.T @ difference)) / math.sqrt(basis.shape[1] or math.nan)
@@ -710,8 +851,9 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
 
 @dataclass(frozen=True)
 class TwoContexts:
-    """Runs of a method that hit the same goal with the same hand, on tasks with different later
-    goals.
+    """Compare the runs of a method at a goal that two tasks share.
+
+    The tasks have different later goals. Runs are compared that hit the goal with the same hand.
 
     Parameters
     ----------
@@ -740,8 +882,10 @@ class TwoContexts:
 
     @cached_property
     def configurations(self) -> tuple[Array, Array]:
-        """Configurations of the runs with this hand at the goal in each context, ``(runs, dof)``,
-        length unit and rad."""
+        """Configurations at the goal of the runs with this hand, for each context.
+
+        Each has shape ``(runs, dof)``, length unit and rad.
+        """
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         first, second = (
             runs.configurations[runs.hands[:, goal] == hand, goal]
@@ -751,13 +895,15 @@ class TwoContexts:
 
     @property
     def in_both(self) -> bool:
-        """True if each context has a run that hits ``goal`` with ``hand``; if False, posture
-        differences and p raise ValueError."""
+        """True if each context has a run that hits ``goal`` with ``hand``.
+
+        If it is False, posture differences and p raise ValueError.
+        """
         return all(map(len, self.configurations))
 
     @property
     def n(self) -> int:
-        """Number of runs with this hand in the two contexts together."""
+        """Total number of runs with this hand in the two contexts."""
         return sum(map(len, self.configurations))
 
     @property
@@ -767,14 +913,17 @@ class TwoContexts:
 
     @property
     def posture_difference(self) -> float:
-        """Distance between the mean postures of the two contexts, length unit and rad mixed."""
+        """Distance between the mean postures of the two contexts; it mixes length unit and rad."""
         return distance_of_means(*self.configurations)
 
     @cached_property
     def difference(self) -> Estimate:
-        """The posture difference with its interval: percentiles of bootstrap samples of runs within
-        each context. No interval for fewer than five runs in a context. Noise adds to distances,
-        so that an interval of a small difference lies rather too high."""
+        """The posture difference with its interval.
+
+        The interval has percentiles of bootstrap samples of runs within each context. There is none
+        if a context has fewer than five runs, or the method is deterministic. Noise makes distances
+        larger, so the interval of a small difference tends to be too high.
+        """
         value, n = self.posture_difference, tuple(map(len, self.configurations))
         if min(n) < FEWEST_RUNS or self.first.deterministic:
             return Estimate(value, n=n)
@@ -785,32 +934,39 @@ class TwoContexts:
 
     @cached_property
     def lean(self) -> Lean:
-        """Share of the way to the next posture that is already made at the goal
-        (:func:`.lean`), over the coordinates that move the hand. Runs count that hit the next goal
-        with the commonest hand for it in their context."""
+        """Share of the path to the next posture that is already covered at the goal.
+
+        It is :func:`.lean` over the coordinates that move the hand. Of each context, only the runs
+        count that hit the next goal with the hand that most of the runs use for it.
+        """
         joints = movable(self.first.task, self.hand)
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         contexts = []
         for runs in (self.first, self.second):
-            here, following = runs.hands[:, goal] == hand, runs.hands[:, goal + 1]
-            here &= following == np.bincount(following[here]).argmax()
+            is_compared, next_hand = runs.hands[:, goal] == hand, runs.hands[:, goal + 1]
+            is_compared &= next_hand == np.bincount(next_hand[is_compared]).argmax()
             hits = runs.configurations
             postures = np.stack([runs.starts[:, goal], hits[:, goal], hits[:, goal + 1]], axis=1)
-            contexts.append(postures[here][..., joints])
+            contexts.append(postures[is_compared][..., joints])
         deterministic = self.first.deterministic and self.second.deterministic
         first, second = contexts
         return lean(first, second, self._rng("lean"), deterministic=deterministic)
 
     @property
     def standardised_posture_difference(self) -> float:
-        """Posture difference in pooled SDs within contexts; NaN if runs within contexts do not
-        differ, and if each context has a single run."""
+        """Posture difference in pooled SDs within contexts.
+
+        NaN if the runs of a context do not differ in either context, or if each context has a
+        single run.
+        """
         return standardised_posture_difference(*self.configurations)
 
     @cached_property
     def parts(self) -> tuple[float, float]:
-        """Motor-equivalent part of the posture difference, which leaves the hand where it is, and
-        the other part, each per dimension (:func:`motor_equivalence`)."""
+        """Motor-equivalent part of the posture difference, and the other part.
+
+        The first part does not move the hand. Both are per dimension (:func:`motor_equivalence`).
+        """
         task, joints = self.first.task, movable(self.first.task, self.hand)
         posture = np.concatenate(self.configurations).mean(axis=0)
         first, second = (configurations.mean(axis=0) for configurations in self.configurations)
@@ -819,31 +975,40 @@ class TwoContexts:
 
     @cached_property
     def p(self) -> float:
-        """P-value of the one-tailed permutation test that the posture difference exceeds chance
-        (:func:`.permutation_p`); NaN if a context has fewer than five runs."""
+        """p of the permutation test that the posture difference exceeds chance.
+
+        The test is one-tailed (:func:`.permutation_p`). NaN if a context has fewer than five runs.
+        """
         if not self.can_test:
             return math.nan
         return permutation_p(*self.configurations, self._rng("context dependence"))
 
     @cached_property
     def p_same(self) -> float:
-        """P-value of the bootstrap test that the posture difference is below :data:`SAME`
-        (:func:`.posture_difference_below`); NaN if a context has fewer than five runs."""
+        """p of the bootstrap test that the posture difference is below :data:`SAME`.
+
+        See :func:`.posture_difference_below`. NaN if a context has fewer than five runs.
+        """
         if not self.can_test:
             return math.nan
         rng = self._rng("sameness")
         return posture_difference_below(*self.configurations, SAME, rng, standardised=False)
 
     def p_beyond(self, other: TwoContexts) -> float:
-        """Return the p-value of the permutation test that the posture difference exceeds the
-        posture difference of ``other``, another method at the same goal: twice the upper tail
-        (:func:`.beyond_p`); NaN if a context has fewer than five runs."""
+        """Return p of the permutation test that the posture difference exceeds that of ``other``.
+
+        ``other`` has the runs of another method at the same goal. p is twice the upper tail
+        (:func:`.beyond_p`), and NaN if a context has fewer than five runs.
+        """
         if not (self.can_test and other.can_test):
             return math.nan
         return beyond_p(self.configurations, other.configurations, self._rng("beyond"))
 
     def _rng(self, test: str) -> np.random.Generator:
-        """Return a new random generator for a test, seeded by the test, the goal, the hand and the
-        second task: the same in every folder and for every method."""
+        """Return a new random generator for a test.
+
+        The seed depends on the test, the goal, the hand and the second task, but not on the folder
+        or the method.
+        """
         where = f"goal {self.goal}, {self.hand} hand, against {self.second.task.name}"
         return np.random.default_rng([SEED, zlib.crc32(f"{test} {where}".encode())])

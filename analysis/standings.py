@@ -18,12 +18,17 @@ from coartic.internal.text import counted
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
-    """Return a name for the best known rewards of these tasks: ``optimum`` if all are proven, or
-    without tasks, else ``best known reward``. Unproven rewards of methods of this folder alone do
-    not count there, and add ``or best of this folder``; if all are such, the name is ``best of this
-    folder``. Raises KeyError for a task without a best known reward."""
+    """Return a name for the best known rewards of tasks, such as ``optimum``.
+
+    - ``optimum`` if all rewards are proven, or if there are no tasks;
+    - ``best known reward`` if some are not proven;
+    - ``best of this folder`` if all are known only from methods of this folder, and none is proven.
+
+    If only some are known only from this folder, and not proven, the name is the one for the other
+    rewards with ``or best of this folder``. Raises KeyError for a task without a best known reward.
+    """
     best = [study.optima[task] for task in tasks]
-    others = [each.proven for each in best if each.proven or not each.only_here]
+    others = [known.proven for known in best if known.proven or not known.only_here]
     known = "optimum" if all(others) else "best known reward"
     names = [known] if others or not best else []
     if len(others) < len(best):
@@ -32,54 +37,68 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
 
 _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "parameters", "information"]
-"""Columns of runs on which no ranking rests: without them a large folder takes less memory."""
+"""Columns of runs that no ranking uses. Dropping them saves memory for a large folder."""
 
 
 @lru_cache(maxsize=4)
 def compared_runs(study: Study) -> pd.DataFrame:
-    """Return the runs that are ranked, failed ones too: of every method except searches for the
-    optimum, on tasks with a best known reward, without :data:`_OF_RECORD`."""
+    """Return the runs that the ranking uses, including failed runs.
+
+    These are the runs of all methods except searches for the optimum, on tasks with a best known
+    reward. The columns :data:`_OF_RECORD` are left out. The frame is cached: do not change it.
+    """
     runs = study.runs[study.runs.best_known.notna()].drop(columns=_OF_RECORD, errors="ignore")
-    runs.attrs = {}  # which pandas copies with every selection
+    runs.attrs = {}  # pandas would copy attrs with every selection
     return runs[~runs.label.map(study.methods.is_search).astype(bool)]
 
 
 @lru_cache(maxsize=4)
 def runs_by_method(study: Study) -> dict[str, pd.DataFrame]:
-    """Return :func:`compared_runs` by the label of their row in the ranking (``ranked_as``), in the
-    order of :attr:`.Study.methods`."""
+    """Return :func:`compared_runs` by their row in the ranking (column ``ranked_as``).
+
+    Rows are in the order of :attr:`.Study.methods`.
+    """
     by_method = dict([*compared_runs(study).groupby("ranked_as", sort=False)])
     return {label: by_method[label] for label in study.methods.index if label in by_method}
 
 
 def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
-    """Return the runs of a method (a label, also of a row of the ranking) on some tasks, failed
-    runs too; no rows if the method has no run on one of the tasks."""
+    """Return the runs of a method on tasks, including failed runs.
+
+    ``method`` is its label, or the label of a row of the ranking. The frame is empty if the method
+    has no run on one of the tasks.
+    """
     runs, tasks = compared_runs(study), {*tasks}
     runs = runs[runs.task.isin(tasks) & ((runs.ranked_as == method) | (runs.label == method))]
     return runs if {*runs.task} == tasks else runs[:0]
 
 
 def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return the different pairs of task and method (label) in some runs, in order."""
+    """Return the pairs of task and method (label) that occur in runs, in order."""
     return [*dict.fromkeys(zip(runs.task, runs.label, strict=True))]
 
 
 @lru_cache(maxsize=4)
 def ranked_tasks(study: Study) -> tuple[str, ...]:
-    """Return the names of the tasks over which methods are ranked: all that the command asked for
-    and that have a best known reward, in the order of the study."""
+    """Return the names of the tasks on which methods are ranked, in the order of the study.
+
+    These are all tasks that have a best known reward and on which runs were asked for.
+    """
     tasks = {*compared_runs(study).task}
     return tuple(task for task in study.tasks if task in tasks)
 
 
 @lru_cache(maxsize=4)
 def ranking_budget(study: Study) -> int | None:
-    """Return the number of trials of a run with which methods are ranked (column ``budget``).
+    """Return the number of trials with which methods are ranked (column ``budget``).
 
-    It is the number in the suite's file if the command asked for another one and a method has it,
-    or else the number that most algorithms have, of equals the least. None if no method has trials,
-    and if a method has several numbers, because the study compares them.
+    It is
+
+    - None, if no method has trials, or a method has several numbers, because the study then
+      compares these numbers;
+    - otherwise the number in the suite's file, if the command asked for another number and a
+      method has the suite's number;
+    - otherwise the number that most algorithms have; the smallest of them if there is a tie.
     """
     runs = compared_runs(study).dropna(subset="budget")
     if runs[["method", "budget"]].drop_duplicates().duplicated("method").any():
@@ -93,14 +112,21 @@ def ranking_budget(study: Study) -> int | None:
 
 @lru_cache(maxsize=4)
 def standings(study: Study) -> pd.DataFrame:
-    """Return a row for each method of :func:`runs_by_method`, by label: the columns of
-    :func:`.ranking`, ``note``, and the columns of :attr:`.Study.methods`.
+    """Rank the methods of a study by their gap.
 
-    Ranked are the methods that solved all of :func:`ranked_tasks` with :func:`ranking_budget`, the
-    smallest gap first. The others follow, with the reason in ``why``; one with another number of
-    trials has a gap if it solved all tasks. ``note`` says how many trials a method from a file made
-    if these are not as many as it was asked for, and of how many runs the solution can fail with
-    motor noise.
+    A method is ranked if it solved all of :func:`ranked_tasks` with :func:`ranking_budget` trials.
+    Ranked methods come first, the smallest gap first. The others follow. A method that solved all
+    tasks with another number of trials has a gap, but is not ranked.
+
+    Returns
+    -------
+    DataFrame
+        A row for each method of :func:`runs_by_method`, by label. It has the columns of
+        :func:`.ranking` and of :attr:`.Study.methods`; ``why`` says why a method is not ranked, and
+        is empty for ranked methods. Column ``note`` says
+
+        - how many trials a method from a file made, if it was asked for another number;
+        - how many of a method's solutions can fail with motor noise.
     """
     runs, budget = compared_runs(study), ranking_budget(study)
     if not len(runs):
@@ -125,13 +151,17 @@ def standings(study: Study) -> pd.DataFrame:
         ]
         notes.append("; ".join(filter(None, note)))
     rows = rows.assign(why=reasons, note=notes)
-    return rows.sort_values(["why", "gap"], key=lambda of: of != "" if of.name == "why" else of)
+    return rows.sort_values(
+        ["why", "gap"], key=lambda column: column != "" if column.name == "why" else column
+    )
 
 
 @lru_cache(maxsize=1_024)
 def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
-    """Return the names of the tasks on which a method (a label, also of a row of the ranking)
-    solved every run."""
+    """Return the names of the tasks that a method solved in all runs.
+
+    ``method`` is its label, or the label of a row of the ranking.
+    """
     runs = compared_runs(study)
     runs = runs[(runs.ranked_as == method) | (runs.label == method)]
     failed = {*runs.task[runs.reward.isna()]}

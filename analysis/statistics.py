@@ -1,20 +1,26 @@
 """Tests of hypotheses on runs, and means over tasks with their intervals.
 
-Two means have tests by exchange, a mean against a number the bootstrap, shares exact binomial
-tests. Samples and seeds are as in :mod:`coartic.estimates`.
+Tests:
 
-Sources: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 16;
-A. C. Davison & D. V. Hinkley (1997), Bootstrap Methods and their Application, chapter 4
-(p-values that count the observed sample); S. Holm (1979), Scandinavian Journal of Statistics 6.
+- Two means are compared by exchanging the labels of their values (:func:`exchange_test`).
+- A mean is compared with a number by the bootstrap (:func:`bootstrap_test`).
+- A share is compared with a number by the exact binomial test (:func:`share_test`).
 
-For other runs on the same tasks, all tasks have the same weight, whatever their number of runs, and
-the bootstrap resamples runs within tasks.
+Samples and seeds are as in :mod:`coartic.estimates`. Sources: B. Efron & R. J. Tibshirani (1993),
+An Introduction to the Bootstrap, chapter 16; A. C. Davison & D. V. Hinkley (1997), Bootstrap
+Methods and their Application, chapter 4 (p-values that count the observed sample); S. Holm (1979),
+Scandinavian Journal of Statistics 6.
 
-For other tasks, the sample has runs within instances within families. The bootstrap is hierarchical
-(A. C. Davison & D. V. Hinkley 1997, Bootstrap Methods and their Application, section 3.8): it
-resamples instances within families, then runs within instances. Families are fixed and have the
-same weight. A mixed model does not fit: gaps to an optimum are skewed and bounded by 0, and their
-spread over runs differs between methods and tasks.
+Intervals:
+
+- For other runs on the same tasks (:func:`task_mean`), the bootstrap resamples runs within tasks.
+  All tasks have the same weight, whatever their number of runs.
+- For other tasks (:func:`other_tasks`), the sample has runs within instances within families. The
+  bootstrap is hierarchical (Davison & Hinkley 1997, section 3.8): it resamples instances within
+  families, then runs within instances. Families are fixed and have the same weight.
+
+A mixed model does not fit: gaps to an optimum are skewed and bounded by 0, and their spread over
+runs differs between methods and tasks.
 """
 
 from __future__ import annotations
@@ -51,7 +57,7 @@ from coartic.internal.limits import MOST_RUNS
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
-_MOST_PLACES = 2_000_000  # places in resamples that are kept at once
+_MOST_PLACES = 2_000_000  # most indices of resamples that are cached together
 _Count = Annotated[int, Field(ge=0, le=MOST_RUNS)]
 _Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -63,19 +69,37 @@ def bootstrap_test(
     *,
     resamples: Resamples = RESAMPLES,
 ) -> Estimate:
-    """Test the difference of a mean and a number by the bootstrap. The value of the estimate, which
-    has no interval, is the mean of ``values`` less ``bound``. Raises ValueError for an empty
-    sample, and for NaN or infinity.
+    """Test the difference of a mean and a number by the bootstrap.
 
-    Efron & Tibshirani (1993), section 16.4: the sample is shifted to the mean 0 and resampled, and
-    the statistic is the mean over its standard error. Unlike in the book, p = (1 + resamples at
-    least as extreme) / (1 + resamples), never 0 (Davison & Hinkley 1997): the smallest p is 0.0001
-    by default. ``"greater"``: one-tailed, the mean of ``values`` is higher.
+    The sample is shifted to the mean 0 and resampled; the statistic is the mean divided by its
+    standard error (Efron & Tibshirani 1993, section 16.4). Unlike in the book, p = (1 + resamples
+    at least as extreme) / (1 + resamples), which is never 0 (Davison & Hinkley 1997).
 
-    ``least_p`` is the smallest p of the sign test of as many values, or of these resamples if that
-    is larger; without spread, p is ``least_p``, or 1 if one-tailed for the other side. The test
-    can give a smaller p than ``least_p``, for few values. p is NaN with fewer than two values, or
-    without spread and difference.
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+    bound : float
+        The number with which the mean is compared.
+    alternative : {"greater", "less", "two-sided"}
+        ``"greater"``: the mean of ``values`` is above ``bound``.
+    resamples : int
+        By default 9,999, so that the smallest p is 0.0001.
+
+    Returns
+    -------
+    Estimate
+        ``value`` is the mean less ``bound``; there is no interval.
+
+        - ``least_p`` is the smallest p of the sign test of n values, or of this number of
+          resamples, whichever is larger. With few values p can be smaller than ``least_p``.
+        - If all values are equal, p is ``least_p``, or 1 if the difference has the other sign than
+          a one-tailed alternative.
+        - p is NaN with fewer than two values, and if all values are equal to ``bound``.
+
+    Raises
+    ------
+    ValueError
+        The sample is empty, or a number is NaN or infinite.
     """
     sample = vector(values) - vector([bound])[0]
     difference, n = float(sample.mean()), len(sample)
@@ -100,17 +124,33 @@ def exchange_test(
     *,
     resamples: Resamples = RESAMPLES,
 ) -> Estimate:
-    """Test the difference of two means by exchange of the values' labels. The value of the
-    estimate, which has no interval, is the mean of ``first`` less the mean of ``second``. Raises
-    ValueError for an empty sample, and for NaN or infinity.
+    """Test the difference of two means by exchanging the labels of the values.
 
-    The statistic is the difference of means over its standard error, with a variance for each
-    sample, so that the test holds for samples of unequal spread, too (A. Janssen 1997, Statistics
-    & Probability Letters 36); without spread it is infinite or 0. p is exact where all exchanges
-    are no more than ``resamples``, or else (1 + exchanges at least as extreme) / (1 + resamples).
-    ``"greater"``: one-tailed, the mean of ``first`` is higher; two-sided by the absolute value.
+    The statistic is the difference of means divided by its standard error. Each sample has its own
+    variance, so the test also holds for samples of unequal spread (A. Janssen 1997, Statistics &
+    Probability Letters 36). If both variances are 0, the statistic is infinite, or 0 if the means
+    are equal.
 
-    p is NaN with fewer than five values in a sample, and if all values are equal.
+    Parameters
+    ----------
+    first, second : array_like, shapes (n,) and (m,)
+    alternative : {"greater", "less", "two-sided"}
+        ``"greater"``: the mean of ``first`` is higher. ``"two-sided"`` compares absolute values of
+        the statistic.
+    resamples : int
+        Number of random exchanges. If there are no more exchanges than this, all are made, and p is
+        exact; otherwise p = (1 + exchanges at least as extreme) / (1 + resamples).
+
+    Returns
+    -------
+    Estimate
+        ``value`` is the mean of ``first`` less the mean of ``second``; there is no interval. p is
+        NaN with fewer than five values in a sample, and if all values are equal.
+
+    Raises
+    ------
+    ValueError
+        A sample is empty, or a value is NaN or infinite.
     """
     samples = vector(first), vector(second)
     n, m = map(len, samples)
@@ -124,24 +164,41 @@ def exchange_test(
 
 
 def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool = True) -> float:
-    """Return the smallest p that a test by exchange can give, for samples of ``n`` and ``m`` values
-    or runs, two or more each; ``two_tailed``: if the test does not know which sample is which."""
+    """Return the smallest p that a test by exchange can give.
+
+    Parameters
+    ----------
+    n, m : int
+        Numbers of values or runs in the two samples, at least 2.
+    resamples : int
+        Number of random exchanges.
+    two_tailed : bool
+        True if the statistic is the same when the samples are swapped.
+    """
     ways = math.comb(n + m, n)
-    if ways > resamples:  # exchanges are drawn, perhaps none as far apart as the samples
+    if ways > resamples:  # exchanges are random, and perhaps none is as extreme as the samples
         return 1 / (1 + resamples)
-    return (2 if two_tailed and n == m else 1) / ways  # the exchange of both is as far apart
+    return (2 if two_tailed and n == m else 1) / ways  # swapping the samples is as extreme
 
 
 def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> float:
-    """Return the p-value, two-sided, of a difference of means that is itself a mean over strata,
-    such as tasks. A stratum is a pair of samples, shapes ``(n,)`` and ``(m,)``; an exact number can
-    stand for a sample.
+    """Return the two-sided p-value of a difference of means, averaged over strata such as tasks.
 
     In each stratum labels are exchanged, as in :func:`exchange_test`; a sample that is compared
-    with an exact number is resampled, as in :func:`bootstrap_test`. The statistic is the
-    sum of the differences over the root of the sum of their variances; p = (1 + resamples at least
-    as extreme) / (1 + resamples). p is NaN with fewer than five values in a sample, and without a
-    sample.
+    with an exact number is resampled, as in :func:`bootstrap_test`. The statistic is the sum of the
+    differences divided by the root of the sum of their variances. p = (1 + resamples at least as
+    extreme) / (1 + resamples).
+
+    Parameters
+    ----------
+    strata : sequence of pairs
+        For each stratum, two samples, shapes (n,) and (m,). A float instead of a sample is an exact
+        number.
+
+    Returns
+    -------
+    float
+        p; NaN with fewer than five values in a sample, and if there are only exact numbers.
 
     Examples
     --------
@@ -149,7 +206,7 @@ def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> fl
     >>> stratified_test([apart, apart])
     0.0001
     """
-    samples = [each for pair in strata for each in pair if not isinstance(each, float)]
+    samples = [sample for pair in strata for sample in pair if not isinstance(sample, float)]
     if not samples or min(map(len, samples)) < FEWEST:
         return math.nan
     return _p_of(strata, "two-sided", RESAMPLES)
@@ -162,8 +219,11 @@ def _p_of(
     *,
     exact: bool = False,
 ) -> float:
-    """Return the p-value of :func:`stratified_test` for an alternative, from ``resamples``; with
-    ``exact`` from all exchanges of the labels of the only stratum, two samples."""
+    """Return the p-value of :func:`stratified_test` for an alternative.
+
+    With ``exact``, all exchanges of labels are made instead of ``resamples`` random ones. There
+    must then be one stratum with two samples.
+    """
     if exact:
         resamples = math.comb(sum(map(np.size, strata[0])), np.size(strata[0][0]))
     rng = np.random.default_rng(SEED)
@@ -182,13 +242,13 @@ def _p_of(
             chosen = min(n, len(second))
             observed += _moments(pool, np.arange(n)[None], n)
         size += float(np.abs(pool).max())
-        is_kept = len(strata) == 1 and resamples * chosen <= _MOST_PLACES
-        every = (
+        is_cached = len(strata) == 1 and resamples * chosen <= _MOST_PLACES
+        chunks = (
             _kept_places(len(pool), chosen, resamples, exact)
-            if is_kept
+            if is_cached
             else places(len(pool), chosen, resamples, exact, rng)
         )
-        for part, rows in every:
+        for part, rows in chunks:
             null[:, part] += _moments(pool, rows, n)
     (statistic,) = _studentised(observed, size)
     extreme = _extreme(_studentised(null, size), statistic, alternative)
@@ -196,10 +256,25 @@ def _p_of(
 
 
 def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
-    """Return the difference of means (first less second sample) and the variance of the difference
-    for each of ``rows``, shapes ``(rows,)``. A row has the indices, in ``pool`` (the values of both
-    samples), of one sample: the first if a row has ``n`` indices, else the second. For a single
-    sample, whose values a row draws with replacement, return mean and variance of the mean."""
+    """Return the difference of means and its variance for each choice of a sample's values.
+
+    Parameters
+    ----------
+    pool : ndarray
+        The values of both samples, or of the only sample.
+    rows : ndarray of int, shape (rows, k)
+        For each choice, the indices in ``pool`` of one sample: of the first sample if k = n,
+        otherwise of the second. If k is the length of ``pool``, a row draws from the only sample
+        with replacement.
+    n : int
+        Number of values of the first sample.
+
+    Returns
+    -------
+    (ndarray, ndarray), shapes (rows,)
+        Mean of the first sample less that of the second, and the variance of this difference. For
+        only one sample, its mean and the variance of the mean.
+    """
     few, many = rows.shape[1], len(pool) - rows.shape[1]
     values = pool[rows]
     if not many:
@@ -214,14 +289,17 @@ def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
         )
     )
     size = float(np.abs(pool).max())
-    variances[variances < 1e-12 * size**2] = 0.0  # sums of squares round
+    variances[variances < 1e-12 * size**2] = 0.0  # rounding of sums of squares
     return (mean - other) * (1 if few == n else -1), variances
 
 
 def _studentised(moments: Array, size: float) -> Array:
-    """Return differences, the first row of ``moments``, over the square roots of their variances,
-    the second, 0 for no difference, and otherwise infinite without variance. Differences and
-    variances that are rounding of values of ``size`` count as 0."""
+    """Return differences divided by the square roots of their variances.
+
+    ``moments`` has the differences in its first row and the variances in its second. Differences
+    and variances within the rounding of values of ``size`` count as 0. The result is 0 if the
+    difference is 0, otherwise infinite if the variance is 0.
+    """
     differences = np.where(np.abs(moments[0]) < NEGLIGIBLE * size, 0.0, moments[0])
     variances = np.where(moments[1] < (NEGLIGIBLE * size) ** 2, 0.0, moments[1])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -229,9 +307,11 @@ def _studentised(moments: Array, size: float) -> Array:
 
 
 def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
-    """Return how many statistics in ``null``, ``(n,)``, are at least as extreme as ``observed``, up
-    to rounding: as high for ``"greater"``, as low for ``"less"``, as far from 0 for
-    ``"two-sided"``."""
+    """Count the statistics in ``null``, shape ``(n,)``, that are at least as extreme as observed.
+
+    Extreme is high for ``"greater"``, low for ``"less"``, and far from 0 for ``"two-sided"``.
+    Statistics that are equal up to rounding count.
+    """
     if alternative == "two-sided":
         null, observed = np.abs(null), abs(observed)
     extreme = null <= observed if alternative == "less" else null >= observed
@@ -239,24 +319,30 @@ def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
 
 
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.int32]:
-    """Return ``size`` draws of ``chosen`` of the indices 0 to ``runs`` - 1 without replacement,
-    shape ``(size, chosen)``."""
+    """Draw ``chosen`` of the indices 0 to ``runs`` - 1 without replacement, ``size`` times.
+
+    The result has shape ``(size, chosen)``.
+    """
     order = rng.random((size, runs)).argpartition(chosen - 1, axis=1)
-    return order[:, :chosen].astype(np.int32)  # no view, which would keep all of the order
+    return order[:, :chosen].astype(np.int32)  # a view would hold all of order in memory
 
 
 def places(
     runs: int, chosen: int, resamples: int, exact: bool, rng: np.random.Generator
 ) -> Iterator[tuple[slice, NDArray[np.int32]]]:
-    """Yield pairs that together cover all resamples: a slice of the resamples, and for each of them
-    a row of ``chosen`` of the indices 0 to ``runs`` - 1: all choices in turn if ``exact``
-    (``resamples`` is their number), or else random ones; with replacement if as many are chosen as
-    there are."""
-    every = combinations(range(runs), chosen)
+    """Yield resamples in chunks: a slice of the resamples, and their rows of indices.
+
+    A row has ``chosen`` of the indices 0 to ``runs`` - 1:
+
+    - with ``exact``, rows are all choices, one after the other; ``resamples`` must be their number;
+    - otherwise they are random, with replacement if ``chosen`` equals ``runs``, and without if it
+      is smaller.
+    """
+    choices = combinations(range(runs), chosen)
     for part in slices(resamples, max(1, IN_CACHE // runs)):
         size = part.stop - part.start
         if exact:
-            yield part, np.array([*islice(every, size)], np.int32)
+            yield part, np.array([*islice(choices, size)], np.int32)
         elif chosen == runs:
             yield part, rng.integers(runs, size=(size, runs)).astype(np.int32)
         else:
@@ -267,17 +353,18 @@ def places(
 def _kept_places(
     runs: int, chosen: int, resamples: int, exact: bool
 ) -> list[tuple[slice, NDArray[np.int32]]]:
-    """Return the pairs of :func:`places` for a new generator as a list, which is cached for further
-    samples of this size: do not change it."""
+    """Return the pairs of :func:`places` for a new generator as a list.
+
+    The list is cached for other samples of this size: do not change it.
+    """
     return [*places(runs, chosen, resamples, exact, np.random.default_rng(SEED))]
 
 
 def share_test(count: _Count, total: _Count, share: _Share, alternative: Alternative) -> Estimate:
     """Test ``count`` of ``total`` runs against a share (0 to 1) by the exact binomial test.
 
-    The value of the estimate is the difference ``count / total - share``; its ``p`` is one-tailed
-    for ``"greater"`` and ``"less"``. Raises ValueError if ``count`` exceeds ``total``, or ``total``
-    is 0.
+    The value of the estimate is the difference ``count / total - share``. Raises ValueError if
+    ``count`` exceeds ``total``, or ``total`` is 0.
     """
     p = float(scipy.stats.binomtest(count, total, share, alternative).pvalue)
     return Estimate(count / total - share, p=p, n=(total,))
@@ -286,16 +373,32 @@ def share_test(count: _Count, total: _Count, share: _Share, alternative: Alterna
 def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     """Return the p-values of a family of tests, adjusted by Holm (1979), in the same order.
 
-    Rejecting adjusted p-values at or below α has a family-wise error rate of α at most, whatever
-    the dependence. NaN, a missing test, stays NaN and does not count, unless ``family`` says the
-    number of planned tests: then missing tests count as p = 1. Raises ValueError for numbers that
-    are no p-values, and for more tests than ``family``.
+    If you reject at adjusted p-values up to α, the family-wise error rate is at most α, also for
+    dependent tests.
+
+    Parameters
+    ----------
+    p_values : array_like
+        p-values from 0 to 1. NaN stands for a missing test and stays NaN.
+    family : int, optional
+        Number of planned tests. Missing tests then count as p = 1; by default they do not count.
+
+    Returns
+    -------
+    list of float
+
+    Raises
+    ------
+    ValueError
+        A number is not a p-value, or there are more tests than ``family``.
     """
     p = np.reshape(p_values, -1)
-    made = int((~np.isnan(p)).sum())
-    planned = made if family is None else family
-    if made > planned or not ((p >= 0) & (p <= 1) | np.isnan(p)).all():
-        raise ValueError(f"needed are p-values, 0 to 1, of {planned} tests at most")
+    tests = int((~np.isnan(p)).sum())
+    planned = tests if family is None else family
+    if tests > planned or not ((p >= 0) & (p <= 1) | np.isnan(p)).all():
+        raise ValueError(
+            f"p_values must be p-values from 0 to 1, or NaN, of at most {planned} tests"
+        )
     order = np.argsort(p, kind="stable")  # NaN last
     steps = np.maximum.accumulate(p[order] * (planned - np.arange(len(p))))
     adjusted = np.empty_like(p)
@@ -304,13 +407,15 @@ def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
 
 
 Scores = Mapping[str, Sequence[Numbers]]
-"""Scores of the runs on each instance, shape ``(n,)``, by family."""
+"""For each family, the scores of the runs on each instance, shape ``(n,)``."""
 
 
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
-    """Return the mean over tasks of the mean over runs, with the interval of
-    :func:`.mean_of_means`, for ``values`` of shape ``(runs,)`` on each task. Raises ValueError
-    without tasks, and for a task without runs."""
+    """Return the mean over tasks of the mean over runs, with its interval for other runs.
+
+    ``values`` has the runs of each task, shape ``(runs,)``. The interval is that of
+    :func:`.mean_of_means`. Raises ValueError if there are no tasks, or a task has no runs.
+    """
     strata = [*map(vector, values)]
     return mean_of_means(strata, [1 / len(strata) for _ in strata])
 
@@ -326,12 +431,13 @@ def other_tasks(scores: Scores) -> Estimate:
     Returns
     -------
     Estimate
-        ``value``, ``low`` and ``high`` in the unit of the scores; ``n`` instances of each family.
+        ``value``, ``low`` and ``high`` in the unit of the scores; ``n`` is the number of instances
+        of each family. There is no interval (NaN) if a family has fewer than three instances.
 
     Raises
     ------
     ValueError
-        There is no family, a family has no instance, or an instance no run.
+        There is no family, a family has no instances, or an instance has no runs.
 
     Examples
     --------
@@ -342,14 +448,14 @@ def other_tasks(scores: Scores) -> Estimate:
 
     Notes
     -----
-    A percentile interval, widened by √(k / (k − 1)) for the k instances of a family, because the
-    bootstrap underestimates the spread of a mean by this factor. The interval is a little too wide
-    for few runs with much noise, which the means of instances contain already, and does not exceed
-    the means over families of the least and of the greatest score of a run. No interval (NaN) if a
-    family has fewer than three instances.
+    The interval has percentiles of bootstrap samples, widened by √(k / (k − 1)) for the k instances
+    of a family, because the bootstrap underestimates the spread of a mean by this factor. It is a
+    little too wide for few runs with much noise, because the means of instances already contain
+    this noise. It does not exceed the mean over families of the lowest and of the highest score of
+    a run.
     """
     if not scores or not all(scores.values()):
-        raise ValueError("a mean over instances needs one instance of each family")
+        raise ValueError("scores must have at least one family, and one instance of each family")
     samples = {family: [*map(vector, instances)] for family, instances in scores.items()}
     values = {
         family: np.array([runs.mean() for runs in instances])
@@ -360,8 +466,8 @@ def other_tasks(scores: Scores) -> Estimate:
     if min(n) < FEWEST_TASKS:
         return Estimate(mean, n=n)
     deviations = np.zeros(FEWER_RESAMPLES)
-    for place, (family, instances) in enumerate(samples.items()):
-        rng = np.random.default_rng([SEED, place])
+    for index, (family, instances) in enumerate(samples.items()):
+        rng = np.random.default_rng([SEED, index])
         count = len(instances)
         which = rng.integers(count, size=(FEWER_RESAMPLES, count))
         drawn = values[family][which]

@@ -1,7 +1,7 @@
-"""A results folder as data: its runs, methods, cells, tasks, movements and optima.
+"""Load a results folder as a study: its runs, methods, cells, tasks, movements and optima.
 
-``load("results/comparison")`` reads a folder. Other modules of the analysis have functions of a
-study.
+``load("results/comparison")`` reads a folder. The other modules of the analysis have functions that
+take the study.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from coartic.tasks.optima import BASE
 from coartic.tasks.task import address_of
 
 CellKey = tuple[str, str]
-"""Name of a task, and label of a method: its id with its setting, ``cma-es/bandit sigma=0.1``."""
+"""Name of a task, and label of a method: its id and setting, as in ``cma-es/bandit sigma=0.1``."""
 
 
 UNITS = {
@@ -52,18 +52,20 @@ UNITS = {
     "other_arm_travel": "rad",
     "process_peak_mb": "MiB",
 }
-"""Units of columns of :attr:`Study.runs`, also in its ``attrs["units"]``."""
+"""Units of columns of :attr:`Study.runs`. They are also in its ``attrs["units"]``."""
 
 
 def solved(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs with a solution, status ``ok``; the frame itself if all runs have one."""
-    have_one = runs.status.to_numpy() == "ok"
-    return runs if have_one.all() else runs[have_one]
+    """Return the runs with a solution (status ``ok``), or the frame itself if all have one."""
+    is_solved = runs.status.to_numpy() == "ok"
+    return runs if is_solved.all() else runs[is_solved]
 
 
 def typical_run(runs: pd.DataFrame) -> str:
-    """Return the id of the run with the reward nearest to the median, the first of several. All
-    runs must have a solution, status ``ok``."""
+    """Return the id of the run whose reward is nearest to the median.
+
+    If there is a tie, it is the first of these runs. All runs must have a solution (status ``ok``).
+    """
     rewards = runs.reward.to_numpy(dtype=np.float64)
     return str(runs.run_id.iloc[np.abs(rewards - np.median(rewards)).argmin()])
 
@@ -71,23 +73,38 @@ def typical_run(runs: pd.DataFrame) -> str:
 Part = Literal["solution", "replay"]
 """Part of a run that can be executed."""
 MOST_EXECUTED = 500
-"""Most runs of a method on a task that are executed again, and so have signatures."""
+"""Largest number of runs of a method on a task that are executed again and have signatures."""
 
 
 def check_study(study: object) -> None:
-    """Raise CoarticError for an object that is no study, such as the path of a folder."""
+    """Raise CoarticError if an object, such as the path of a folder, is not a study."""
     if not isinstance(study, Study):
-        needed = "needed is a study, as coartic.analysis.load(folder) returns it"
-        raise CoarticError(f"{needed}, not a {type(study).__name__}")
+        raise CoarticError(
+            "the study must be one that coartic.analysis.load(folder) returns, not a "
+            f"{type(study).__name__}"
+        )
 
 
 def load(folder: str | Path, *, against: str = "") -> Study:
-    """Read a results folder, or by the name ``"shipped"`` the shipped results of suite
-    ``comparison``. With ``against``, a method of the folder, by id, label or title, table
-    ``differences`` compares other methods with this one.
+    """Read a results folder.
 
-    Raises CoarticError if the folder is no results folder, or lacks runs of its suite, or has no
-    method ``against``, or several.
+    Parameters
+    ----------
+    folder : str or pathlib.Path
+        The folder, or ``"shipped"`` for the shipped results of suite ``comparison``.
+    against : str
+        Id, label or title of a method of the folder. Table ``differences`` compares the other
+        methods with it.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    CoarticError
+        The folder is not a results folder, runs of its suite are missing, or ``against`` does not
+        name exactly one method.
     """
     folder = folder_named(folder)
     with open_results(folder) as store:
@@ -96,25 +113,27 @@ def load(folder: str | Path, *, against: str = "") -> Study:
         if len(runs) < size_of(plan):
             raise CoarticError(
                 f"{folder} has {len(runs)} of {counted(size_of(plan), 'run')}: it was interrupted, "
-                "or has a part of the runs. Repeat the `coartic run` command, which does what is "
-                "missing, or --include all parts in another folder."
+                "or has only a part of the runs. Repeat the `coartic run` command, which makes the "
+                "missing runs, or --include all parts in another folder."
             )
         study = Study(folder, plan, store.made_with(), runs, store.marks(), imports=store.imports())
     return replace(study, against=_label_in(study, against)) if against else study
 
 
 def _label_in(study: Study, name: str) -> str:
-    """Return the label of the method that has this label, or else this id or short id such as
-    ``EC4``, or else this title in a study. Raises CoarticError if no method has it, or if several
-    methods or settings have this id or title, and none this label."""
+    """Return the label of the method that a name means.
+
+    Labels are compared first, then ids, then titles. Ids of the learner's conditions can be short,
+    such as ``EC4``. Raises CoarticError if no method, or more than one, has the name.
+    """
     methods = study.methods
     for names in (methods.index, methods.base, methods.title):
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
-            there = [str(label) for label in methods.index[names == wanted]]
-            if len(there) > 1:
-                raise CoarticError(f"{name} is several here; name one: {', '.join(there)}")
-            if there:
-                return there[0]
+            labels = [str(label) for label in methods.index[names == wanted]]
+            if len(labels) > 1:
+                raise CoarticError(f"{name} names several methods; use one of {', '.join(labels)}")
+            if labels:
+                return labels[0]
     raise CoarticError(unknown("method", name, [*methods.index]))
 
 
@@ -128,19 +147,18 @@ class Study:
     made_with: dict[str, Any]
     """Versions, platform, commit, command and date of the last ``coartic run``."""
     stored: pd.DataFrame
-    """Runs as stored, a row for each; :attr:`runs` has further columns."""
+    """Runs as stored, a row for each run. :attr:`runs` has further columns."""
     marks: dict[str, list[str]] = field(default_factory=dict)
-    """Sentences on what was found against methods, by the method's id: results that differ when a
-    run is made again, and other versions of packages."""
+    """Warnings about methods, by id: sentences on runs that do not reproduce, and on other versions
+    of packages."""
     against: str = ""
-    """Label of the method with which table ``differences`` compares others; empty if none was
-    named."""
+    """Label of the method with which table ``differences`` compares the others; may be empty."""
     imports: dict[str, list[str]] = field(default_factory=dict)
     """Names and versions of the packages that files of methods import, by the method's id."""
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for pickle: what was computed from them is left out."""
-        return {each.name: getattr(self, each.name) for each in fields(self)}
+        """Return the fields for pickle, without the values that are computed from them."""
+        return {stored.name: getattr(self, stored.name) for stored in fields(self)}
 
     @property
     def suite(self) -> str:
@@ -149,41 +167,49 @@ class Study:
 
     @property
     def folder_in_commands(self) -> str:
-        """The folder for commands on a page that others read, quoted for a shell: its path from the
-        working folder, or its name alone if it is not in there."""
+        """The folder as commands on a page should name it, quoted for a shell.
+
+        It is the path from the working folder, or only the folder's name if it is not below the
+        working folder.
+        """
         path = Path(os.path.abspath(self.folder))  # without ..
         return quote(str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name))
 
     @property
     def question(self) -> tuple[str, str]:
-        """Title and description of a suite of the user's own, run on its own tasks; else two empty
-        texts."""
+        """Title and description of a user's suite that was run on its own tasks.
+
+        For other suites, two empty strings.
+        """
         title, description = self.made_with.get("question", ("", ""))
         return title, description
 
     @cached_property
     def varied(self) -> tuple[str, dict[str, Any]]:
-        """Name of the only parameter in which runs, searches left out, differ, settings of one
-        method, and its values by label (:func:`.parameter_varied`); otherwise both empty."""
+        """Name of the parameter that the study varies, and its values by label.
+
+        Both are empty unless all runs, except searches, are of one method, and only this parameter
+        differs (:func:`.parameter_varied`).
+        """
         return parameter_varied(self.runs)
 
     @cached_property
     def tasks(self) -> dict[str, Task]:
-        """Tasks by name, with titles that differ (:func:`.titled_apart`)."""
+        """Tasks by name; no two have the same title (:func:`.titled_apart`)."""
         tasks = {job.cell.task.name: job.cell.task for job in self.plan}
         return {task.name: task for task in titled_apart(tasks.values())}
 
     @cached_property
     def declared(self) -> dict[str, MethodInfo]:
-        """Declarations of the methods by id without a setting."""
+        """Declarations of the methods, by id without a setting."""
         return {job.cell.method.name: job.cell.method for job in self.plan}
 
     @cached_property
     def optima(self) -> dict[str, BestKnown]:
-        """Best known rewards by name of the task, with bounds and sources; tasks without a best
-        known reward are left out (:func:`.best_known`).
+        """Best known rewards with bounds and sources, by name of the task.
 
-        On the tasks that are kept, a higher reward of :attr:`corrective_best` counts, too.
+        Tasks without a best known reward are left out (:func:`.best_known`). If the reward of
+        :attr:`corrective_best` is higher, it replaces the best known reward.
         """
         rewards = best_known(self.stored, self.tasks.values())
         for name, best in rewards.items():
@@ -195,11 +221,11 @@ class Study:
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:
-        """Reward, negative ticks, of the corrective process alone with its best hands, by name of
-        the task: the zero of gain, share and targets.
+        """Reward of the corrective process alone with its best hands, negative ticks, by task name.
 
-        With the task's initial hands where there are over 4,096 hand sequences; NaN if the
-        corrective process completes the task with none of these hands, or they cannot be found.
+        The gain, shares and targets start from this reward. If a task has more than 4,096 hand
+        sequences, it is the reward with the task's initial hands. It is NaN if the corrective
+        process does not complete the task with any of these hands, or no hands are found.
         """
         alone = {}
         for name, task in self.tasks.items():
@@ -213,14 +239,20 @@ class Study:
     def runs(self) -> pd.DataFrame:
         """A row for each run: rewards, hand sequences, costs (docs/results.md).
 
-        Further columns: ``label``, the method with its setting; ``ranked_as``, the name of its row
-        in the ranking, which differs from ``label`` where two conditions of the learner, for one
-        arm and for two, are one row; ``budget``, the number of trials that was asked for, missing
-        for methods that do not use the reward of each trial; ``family``, ``split``, number of
-        ``goals``, of ``arms`` (1 or 2), ``best_known`` reward of the task (missing without one, and
-        for a search with another base) and :attr:`corrective_best`; ``gap``, a share of the best
-        known reward; and a column for each parameter of methods, unless its name is taken:
-        ``trials`` is the number of trials made, ``hands`` the hands of the solution.
+        Further columns:
+
+        - ``label``: the method with its setting;
+        - ``ranked_as``: the name of its row in the ranking. It differs from ``label`` if two
+          conditions of the learner, for one arm and for two arms, share a row;
+        - ``budget``: the number of trials that was asked for, missing for methods that do not use
+          the reward of each trial;
+        - ``family``, ``split``, number of ``goals`` and number of ``arms`` (1 or 2) of the task;
+        - ``best_known``: best known reward of the task, missing if there is none, and for a search
+          with another base;
+        - ``corrective_best``: as in :attr:`corrective_best`;
+        - ``gap``: as a share of the best known reward;
+        - a column for each parameter of methods, unless there is a column of this name already:
+          ``trials`` is the number of trials made, ``hands`` the hands of the solution.
         """
         labels = [*map(label_of, self.stored.method, self.stored.setting)]
         runs, cells = self.stored.assign(label=labels), [job.cell for job in self.plan]
@@ -243,7 +275,7 @@ class Study:
         by_trial = runs.information.str.contains(Information.REWARD_BY_TRIAL.value, regex=False)
         runs["budget"] = runs.budget.where(by_trial).astype("Int64")
         as_it_is = restrictions(runs).base == BASE  # other runs solve another task
-        best = {name: each.reward for name, each in self.optima.items()}
+        best = {name: optimum.reward for name, optimum in self.optima.items()}
         runs["best_known"] = runs.task.map(best).where(as_it_is).astype("Int64")
         runs["corrective_best"] = runs.task.map(self.corrective_best).astype(np.float64)
         rewards = runs[["reward", "best_known"]].astype("Float64")
@@ -256,46 +288,55 @@ class Study:
         """A row for each method with its setting, by label, in the order of lists and figures.
 
         Two conditions of the learner that are ranked as one, such as EC1 on tasks for one arm and
-        EC4 on tasks for two, have a further row, with most columns of the second. Columns:
+        EC4 on tasks for two, have a further row, which copies most columns of the second condition.
+        Columns:
 
         - ``base``: id of the method without a setting;
-        - ``condition``: id of the learner's condition, such as ``EC4``, also of an informed one or
-          an ablation; empty for an own condition and other methods;
+        - ``condition``: id of the learner's condition, such as ``EC4``, also if informed or an
+          ablation; empty for a user's own condition and for other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
         - ``title``: name on the page, in tables and figures;
         - ``short``: name in figures of one column;
-        - ``algorithm``: algorithm that the method is a form of;
-        - ``is_learner``: True for the paper's learner under the paper's conditions, with whatever
+        - ``algorithm``: algorithm of which the method is a form;
+        - ``is_learner``: True for the paper's learner under the paper's conditions, with any
           setting;
         - ``is_search``: True for searches for the optimum;
         - ``information``: use of the reward: ``using the reward of each trial``, ``using the reward
           as a formula`` or ``not using the reward``;
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
-        - ``headline``: True if the method, with whatever setting, represents its algorithm;
-        - ``under``: of a setting or ablation that lists put under its method, the method's label;
-          or empty;
-        - ``look``: names of colour and mark in figures, a tuple of two texts.
+        - ``headline``: True if the method, with any setting, represents its algorithm;
+        - ``under``: label of the method of which this row is a setting or an ablation, if lists
+          show it under that method; otherwise empty;
+        - ``look``: names of colour and marker in figures, a tuple of two strings.
         """
         return methods_of(self.runs, self.declared, self.marks)
 
     @cached_property
     def cells(self) -> dict[CellKey, pd.DataFrame]:
-        """Runs, also failed, by task and label (method with its setting), in the plan's order."""
+        """Runs, including failed runs, by task and label, in the plan's order."""
         runs = self.runs.copy(deep=False)
-        runs.attrs = {}  # which pandas copies with every column that is taken
+        runs.attrs = {}  # pandas would copy attrs with each column
         cells = dict[Any, pd.DataFrame]()
         for key, rows in runs.groupby(["task", "label"], sort=False).indices.items():
-            in_turn = rows[-1] - rows[0] < len(rows)  # mostly: a slice shares memory with the runs
-            cells[key] = runs.iloc[slice(rows[0], rows[-1] + 1) if in_turn else rows]
+            is_slice = rows[-1] - rows[0] < len(rows)  # usual; a slice shares memory with the runs
+            cells[key] = runs.iloc[slice(rows[0], rows[-1] + 1) if is_slice else rows]
         return cells
 
     def sequences(self, task: str) -> pd.DataFrame:
         """Return the results of the corrective process alone on a task, by hand sequence.
 
-        A row for each sequence, the best first: ``hands``, ``reward`` (negative ticks, missing for
-        a failure) and ``reason`` of the failure. No rows if the task has over 4,096 sequences.
-        Raises CoarticError for a task that the study does not have. It is cached: do not change it.
+        Parameters
+        ----------
+        task : str
+            Name of a task of the study (CoarticError for others).
+
+        Returns
+        -------
+        DataFrame
+            A row for each sequence, the best first: ``hands``, ``reward`` (negative ticks, missing
+            if it failed) and ``reason`` of the failure. It has no rows if the task has more than
+            4,096 sequences. It is cached: do not change it.
         """
         if task not in self.tasks:
             raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
@@ -311,14 +352,20 @@ class Study:
 
     @cached_property
     def solutions(self) -> pd.DataFrame:
-        """A row for each movement of the solutions: ``run_id``, ``order``, ``goal``, ``hand``,
-        ``kind``, ``ticks``, ``path`` (docs/results.md); of all runs of the folder's plan."""
+        """A row for each movement of the solutions of all runs.
+
+        Columns: ``run_id``, ``order``, ``goal``, ``hand``, ``kind``, ``ticks``, ``path``
+        (docs/results.md).
+        """
         with open_results(self.folder) as store:
             return store.solutions()
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the id of each run with rewards of trials, with these rewards, negative
-        ticks, shape ``(trials,)``, NaN for a trial that failed or whose reward is not kept."""
+        """Yield the id and the rewards of the trials of each run that has stored them.
+
+        Rewards are negative ticks, shape ``(trials,)``. They are NaN for trials that failed, and
+        for trials whose reward is not stored.
+        """
         with open_results(self.folder) as store:
             yield from store.rewards()
 
@@ -328,24 +375,25 @@ class Study:
         Parameters
         ----------
         task, method : str
-            Name of the task, and label of the method, its id with its setting:
-            ``"random-search sigma=0.1"``; for conditions of the learner also ``"EC4"``.
+            Name of the task, and label of the method (its id and setting), such as
+            ``"random-search sigma=0.1"``. Conditions of the learner can be short: ``"EC4"``.
         replay : bool
-            Execute the replay, a noiseless trial after learning, in place of the solution, for runs
-            that have a replay.
+            True to execute the replay, a trial without noise after learning, instead of the
+            solution.
 
         Returns
         -------
         Solutions
-            Executions of the first 500 solved runs, for ``replay`` only of runs with a replay.
+            Executions of the first 500 solved runs. With ``replay``, runs without a replay are left
+            out.
 
         Raises
         ------
         CoarticError
             The folder has no runs of the method on the task, or the stored movements cannot be
-            executed or have other ticks than stored.
+            executed or take other ticks than are stored.
         """
-        condition = f"{METHOD_PREFIX}{method}"  # which goes by its own name as well
+        condition = f"{METHOD_PREFIX}{method}"  # conditions of the learner can be short: EC4
         if (task, method) not in self.cells and (task, condition) in self.cells:
             method = condition
         if (task, method) not in self.cells:
@@ -363,7 +411,7 @@ class Study:
             for (run_id, movements), run in zip(solutions.items(), runs, strict=True):
                 ticks = sum(movement.ticks or 0 for movement in movements)
                 if not (isinstance(run, Execution) and run.completed and run.ticks == ticks):
-                    raise ValueError(f"run {run_id} does not do what is stored of it")
+                    raise ValueError(f"run {run_id} does not reproduce its stored ticks")
                 executed.append(run)
         solved_runs = Solutions(
             self.tasks[task],
@@ -383,13 +431,13 @@ class Study:
         task, method : str
             Name of the task, and label of the method (:meth:`executed`).
         replay : bool
-            Take the noiseless trial after learning in place of the solution; runs without such a
-            trial are left out.
+            True to use the trial without noise after learning instead of the solution. Runs without
+            such a trial are left out.
 
         Returns
         -------
         ndarray, shape (runs, goals, dof)
-            Configurations, length unit (base) and rad (joints); of the first 500 solved runs.
+            Configurations of the first 500 solved runs, length unit (base) and rad (joints).
 
         Raises
         ------
@@ -406,22 +454,23 @@ class Study:
         *,
         replay: bool = False,
     ) -> pd.Series:
-        """Return a signature of coarticulation of every run, or of the runs of a method on a task.
+        """Return a signature of coarticulation for all runs, or those of a method on a task.
 
         Parameters
         ----------
         name : str
             One of ``coartic.analysis.SIGNATURES``: ``"first"``, ``"arm"``, ``"hand"``, ...
         task, method : str, optional
-            Name of the only task, and label of the only method, its id with its setting.
+            Name of a task, and label of a method (its id and setting). Unless both are given, all
+            runs are used.
         replay : bool
-            Take the noiseless trial after learning in place of the solution.
+            True to use the trial without noise after learning instead of the solution.
 
         Returns
         -------
         Series
-            By the index of :attr:`runs`; NaN for runs without the signature, failed runs, and runs
-            after the first 500 solved ones of a method on a task.
+            Values by the index of :attr:`runs`. They are NaN for runs without the signature, for
+            failed runs, and for all but the first 500 solved runs of a method on a task.
 
         Raises
         ------
@@ -442,12 +491,15 @@ class Study:
             parts.append(self._signatures[name, *key, replay])
         if len(parts) == 1:
             return parts[0]
-        every: pd.Series = pd.concat(parts)
-        return every.reindex(self.runs.index)
+        values_of_all: pd.Series = pd.concat(parts)
+        return values_of_all.reindex(self.runs.index)
 
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of the ``solution`` or ``replay`` by run id, of the first 500 solved
-        runs of each method on each task; for ``replay`` runs without a replay are left out."""
+        """Return the movements of solutions, or of replays, by run id.
+
+        Only the first 500 solved runs of each method on each task are included; for ``"replay"``,
+        only runs with a replay.
+        """
         if part not in self._movements:
             with open_results(self.folder) as store:
                 self._movements[part] = store.movements(part, MOST_EXECUTED)
@@ -471,9 +523,11 @@ class Study:
 
     @cached_property
     def individual_tasks(self) -> dict[str, Task]:
-        """Tasks that a report shows one by one, by name: all tasks, except that instances of
-        families, also changed ones such as ``two-armed/v1/i017.radius-0.2``, are left out if there
-        are more than eight instances."""
+        """Tasks that a report shows individually, by name.
+
+        If the study has more than eight instances of families, these are left out. Changed
+        instances, such as ``two-armed/v1/i017.radius-0.2``, count as instances.
+        """
         drawn = {name for name in self.tasks if address_of(name.partition(".")[0]) is not None}
         left_out = drawn if len(drawn) > 8 else ()
         return {name: task for name, task in self.tasks.items() if name not in left_out}

@@ -1,9 +1,12 @@
 """Tables of the report: functions of a study that return frames, by id in :data:`TABLES`.
 
-A table is made by the decorator :func:`table`, which has its columns, a line for each: the column's
-name, its heading, its format, and whether LaTeX has it. Rows come from a function that yields
-pairs of a row's name and its values by column. Each column needs a value (perhaps NaN) in some row,
-and each value a column.
+The decorator :func:`table` makes a table from its caption, its columns and a function:
+
+- Each column is a line with its name, its heading, its number of decimals, and whether LaTeX
+  includes it.
+- The function yields the rows as pairs of a row's name and its values by column name.
+- Each column must have a value (which may be NaN) in at least one row, and each value must belong
+  to a column.
 """
 
 from __future__ import annotations
@@ -97,11 +100,11 @@ from coartic.robot import Array
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
-"""Names of the rows of a table, each with its row: values by name of the column."""
+"""Pairs of a row's name and the row: its values by column name."""
 SHORT_ID = 8
-"""Characters of a run's id that people see: commands take its beginning."""
+"""Number of characters of a run's id that tables show; commands accept such a prefix."""
 _FORMULA = ("=", "+", "-", "@")
-"""Beginnings of text that spreadsheets take for formulas."""
+"""First characters of strings that spreadsheets treat as formulas."""
 _USES = {BY_TRIAL: "trial", BY_FORMULA: "formula", WITHOUT_REWARD: "none"}
 
 
@@ -109,25 +112,34 @@ class Column(NamedTuple):
     """A column of a table, with heading and format."""
 
     name: str
-    """Name in the CSV file; the beginning of names if ``ending`` has ``*``."""
+    """Name in the CSV file, or the prefix of several names if ``ending`` has ``*``."""
     ending: str = ""
-    """``[]``: the column has an interval (``gap_low``, ``gap_high``); ``±``: the column has a
-    standard deviation (``ours_sd``); ``*``: all columns that begin with the name; ``[*]``: all such
-    columns, each with an interval; empty: the column alone."""
+    """What the column consists of in the CSV file:
+
+    - empty: one column;
+    - ``[]``: the column and its interval (``gap_low``, ``gap_high``);
+    - ``±``: the column and its standard deviation (``ours_sd``);
+    - ``*``: all columns whose names start with ``name``;
+    - ``[*]``: all these columns, each with its interval.
+    """
     heading: str = ""
-    """Heading; ``{}`` is the rest of a name after its beginning, such as a task. Shares are in per
-    cent if the heading has ``(%)``. Empty: only the CSV file has the column."""
+    """Heading; ``{}`` stands for the part of a name after the prefix, such as a task. If the
+    heading has ``(%)``, shares are shown in per cent. If it is empty, only the CSV file has the
+    column."""
     digits: str = ""
-    """Decimals; ``p`` for a p-value; empty: as :func:`.number` chooses."""
+    """Number of decimals; ``p`` for a p-value; if empty, :func:`.number` chooses."""
     in_latex: bool = False
-    """True if LaTeX has the column, too."""
+    """True if LaTeX also has the column."""
 
 
 def _column_of(line: str) -> Column:
-    """Return a column from its line, ``name | heading | decimals | tex``, whose last parts can be
-    left out. The name ends with an ending of :class:`Column`: ``gap[] | gap (%) | 1 | tex``."""
+    """Return the column that a line describes, such as ``gap[] | gap (%) | 1 | tex``.
+
+    The parts are the name with its ending (:class:`Column`), heading, decimals and ``tex``. The
+    last parts can be left out.
+    """
     name, heading, digits, tex = (*map(str.strip, line.split("|")), "", "", "")[:4]
-    ending = next((each for each in ("[]", "±", "[*]", "*") if name.endswith(each)), "")
+    ending = next((ending for ending in ("[]", "±", "[*]", "*") if name.endswith(ending)), "")
     return Column(name.removesuffix(ending), ending, heading, digits, tex == "tex")
 
 
@@ -137,18 +149,21 @@ class Table:
 
     id: str
     caption: str
-    """Caption; ``{tasks}`` is the number of ranked tasks, ``{reference}`` the name of the rewards
-    to which gaps are taken."""
+    """Caption; ``{tasks}`` stands for the number of ranked tasks, ``{reference}`` for the name of
+    the rewards from which gaps are measured."""
     columns: tuple[Column, ...]
-    """Columns of the CSV file in their order; ``run_ids``, of the runs behind each row, is last."""
+    """Columns of the CSV file in order. The last is ``run_ids``: the runs behind each row."""
     rows: Callable[[Study], Rows]
-    """Function of a study that yields pairs of a row's name and its values by column."""
+    """Function of a study that yields pairs of a row's name and its values by column name."""
     with_settings: bool = False
-    """True if page and LaTeX show settings and ablations of methods that are there, too."""
+    """True if page and LaTeX also show settings and ablations of methods in the table."""
 
     def __call__(self, study: Study) -> pd.DataFrame:
-        """Return the table of a study, a row for each name, intervals and deviations written out as
-        ``_low``, ``_high`` and ``_sd``. It is cached: do not change it."""
+        """Return the table of a study, indexed by the names of the rows.
+
+        Intervals and deviations have columns that end in ``_low``, ``_high`` and ``_sd``. The frame
+        is cached: do not change it.
+        """
         check_study(study)
         return _frame_of(self, study)
 
@@ -156,42 +171,49 @@ class Table:
 def table(
     caption: str, columns: str, *, with_settings: bool = False
 ) -> Callable[[Callable[[Study], Rows]], Table]:
-    """Return a decorator that turns a function of a study that yields rows into a table.
+    """Return a decorator that makes a table from a function that yields its rows.
 
-    The id of the table is the name of the function without ``list_``, with dashes. ``columns`` has
-    a line for each column (:func:`_column_of`).
+    The id of the table is the function's name without ``list_``, with dashes for underscores.
+    ``columns`` has a line for each column (:func:`_column_of`).
     """
     parts = [_column_of(line) for line in columns.splitlines() if line.strip()]
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
-        every = *parts, Column("run_ids")
-        return Table(id_of(rows), caption, every, rows, with_settings)
+        with_ids = *parts, Column("run_ids")
+        return Table(id_of(rows), caption, with_ids, rows, with_settings)
 
     return as_table
 
 
 @lru_cache(maxsize=64)  # of two or three studies
 def _frame_of(table: Table, study: Study) -> pd.DataFrame:
-    """Return a table of a study. Raises KeyError for a value without a column, and for a column
-    without a value in any row."""
+    """Return a table of a study.
+
+    Raises KeyError if a value has no column, or a column has no value in any row.
+    """
     named = list(table.rows(study))
     rows = pd.DataFrame([row for _, row in named], [name for name, _ in named])
     endings = {"[]": ("", "_low", "_high"), "±": ("", "_sd"), "": ("",)}
     names: list[str] = []
     for name, ending, *_ in table.columns:
         if ending in ("*", "[*]"):
-            names += [each for each in rows.columns if each.startswith(name)]
+            names += [column for column in rows.columns if column.startswith(name)]
         else:
-            names += [name + each for each in endings[ending]]
+            names += [name + end for end in endings[ending]]
     if wrong := {*names} ^ {*rows.columns} if named else ():
-        raise KeyError(f"table {table.id}: only a row or only a column is called {sorted(wrong)}")
+        raise KeyError(
+            f"table {table.id}: the rows and the columns must have the same names; only one of "
+            f"them has {sorted(wrong)}"
+        )
     return rows.reindex(columns=names).rename_axis("row")
 
 
 def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
-    """Return for each row of a table True if its method is a setting or an ablation of a method
-    that is there, too (column ``under`` of :attr:`.Study.methods`). Methods are in column
-    ``against``, or else ``method``: "there" is in the same column."""
+    """Return True for rows whose method is a setting or an ablation of another row's method.
+
+    Methods are compared by column ``against`` if the table has it, otherwise by ``method``. Column
+    ``under`` of :attr:`.Study.methods` says of which method a method is a setting or an ablation.
+    """
     if "method" not in frame:
         return pd.Series(False, frame.index)
     label = frame["against" if "against" in frame else "method"]
@@ -199,14 +221,16 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
 
 
 def caption_of(table: Table, study: Study) -> str:
-    """Return the caption of a table of a study, filled in."""
+    """Return the caption of a table with the study's number of tasks and reference."""
     caption = table.caption.replace("{tasks}", counted(len(ranked_tasks(study)), "task"))
     return caption.replace("{reference}", reference(study, study.optima))
 
 
 def csv_of(frame: pd.DataFrame) -> str:
-    """Return a table as CSV, with an apostrophe before text that a spreadsheet would take for a
-    formula."""
+    """Return a table as CSV.
+
+    Strings that a spreadsheet would treat as formulas get an apostrophe in front.
+    """
 
     def guarded(value: Any) -> Any:
         return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
@@ -215,22 +239,23 @@ def csv_of(frame: pd.DataFrame) -> str:
 
 
 class ShownColumn(NamedTuple):
-    """A column of a table as people see it."""
+    """A column of a table as page and LaTeX show it."""
 
     heading: str
     texts: list[str]
-    """Values as text, with their SDs and intervals, row by row."""
+    """Values as strings, with their SDs and intervals, row by row."""
     is_number: bool
-    """True if the column has numbers, True and False alone, or no value at all."""
+    """True if all values are numbers or booleans, or all are missing."""
 
 
 def shown_columns(
     table: Table, study: Study, frame: pd.DataFrame, *, in_latex: bool = False
 ) -> dict[str, ShownColumn]:
-    """Return the columns that people see, by name: columns with a heading and a value in some row,
-    with SDs and intervals in the column of their number; ``in_latex``: only those that LaTeX has.
+    """Return the columns that page and LaTeX show, by name.
 
-    Methods, tasks and uses of the reward go by their titles, tasks with † where reconstructed.
+    These are the columns with a heading and at least one value. SDs and intervals are in the column
+    of their number. Methods, tasks and uses of the reward have their titles; reconstructed tasks
+    have a †. With ``in_latex``, only the columns that LaTeX has are returned.
     """
     titles = {
         **{str(task.family): str(task.family).split("/")[0] for task in study.tasks.values()},
@@ -258,8 +283,10 @@ def shown_columns(
             if to == "best of this folder" and heading == "best known":
                 heading = to
             if not pd.api.types.is_numeric_dtype(values.infer_objects()):
-                words = {each: titles.get(each) or one_line(str(each)) for each in values.unique()}
-                texts = [NONE if pd.isna(each) else words[each] or NONE for each in values]
+                words = {
+                    value: titles.get(value) or one_line(str(value)) for value in values.unique()
+                }
+                texts = [NONE if pd.isna(value) else words[value] or NONE for value in values]
                 shown[name] = ShownColumn(heading, texts, is_number=False)
                 continue
             of_number = [name, f"{name}_low", f"{name}_high"] if "[" in column.ending else [name]
@@ -275,8 +302,10 @@ def shown_columns(
 
 
 def _number_text(column: Column, value: float, *spread: float) -> str:
-    """Return a number as text with its SD or its interval, where they are not NaN; an interval of
-    no length is left out (:func:`.in_brackets`)."""
+    """Return a number as a string with its SD or interval.
+
+    SDs and intervals that are NaN, and intervals of length 0, are left out (:func:`.in_brackets`).
+    """
     decimals = int(column.digits) if column.digits.isdigit() else None
     if column.digits == "p":
         return "< 0.001" if value < 0.001 else number(value, 3)
@@ -287,9 +316,13 @@ def _number_text(column: Column, value: float, *spread: float) -> str:
 
 
 def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
-    """Return a table in HTML, by pandas' Styler: the cell in row 2 and column 3 has the id
-    ``T_ID_row2_col3``. Cells without a value are empty; rows of methods from files have the class
-    ``own``, unless all rows are of such, and cells with text the class ``text``."""
+    """Return a table as HTML, made by pandas' Styler.
+
+    - The cell in row 2 and column 3 has the id ``T_ID_row2_col3``, where ``ID`` is the table's id.
+    - Cells without a value are empty.
+    - Cells of columns that are not numbers have the class ``text``.
+    - Rows of methods from files have the class ``own``, unless all methods are from files.
+    """
     columns = shown_columns(table, study, frame)
     built_in = {"", *study.methods.index[study.methods.built_in.astype(bool)]}
     is_own = ~frame.get("method", pd.Series("", frame.index)).isin(built_in).to_numpy()
@@ -311,12 +344,15 @@ def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
     caption = f"<span>{html.escape(caption_of(table, study))}</span>"
     page = styler.relabel_index(headings, axis="columns").set_caption(caption).to_html()
     page = re.sub(r' class="data row\d+ col\d+" ', "", re.sub(r"\n\s+", "\n", page))
-    return re.sub(r"data row\d+ col\d+ ", "", page)  # half of the page, which no style needs
+    return re.sub(r"data row\d+ col\d+ ", "", page)  # no style needs them; they are half the page
 
 
 def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[str] = ()) -> str:
-    """Return a table in LaTeX, by pandas' Styler, with booktabs and longtable: the columns that its
-    definition marks. ``notes`` are sentences below the table, with the meaning of a dagger."""
+    """Return a table as LaTeX with booktabs and longtable, made by pandas' Styler.
+
+    It has the columns that are marked with ``tex``. The sentences in ``notes`` follow the table;
+    if the table or a note has a dagger, its meaning is added.
+    """
     columns = shown_columns(table, study, frame, in_latex=True)
     cells = pd.DataFrame({name: map(latex, column.texts) for name, column in columns.items()})
     headings = [latex(column.heading) for column in columns.values()]
@@ -326,7 +362,7 @@ def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[st
         .to_latex(
             environment="longtable",
             hrules=True,
-            column_format="".join("r" if each.is_number else "l" for each in columns.values()),
+            column_format="".join("r" if column.is_number else "l" for column in columns.values()),
             caption=latex(caption_of(table, study)),
             label=f"tab:coartic-{table.id}",
         )
@@ -339,42 +375,56 @@ def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[st
 
 
 def run_ids(*parts: pd.DataFrame) -> Row:
-    """Return a row with one entry, ``run_ids``: the ids of all runs in ``parts``, frames of runs,
-    separated by spaces."""
+    """Return a row with the entry ``run_ids``: the ids of all runs, separated by spaces.
+
+    ``parts`` are frames of runs.
+    """
     return {"run_ids": " ".join(" ".join(runs.run_id.tolist()) for runs in parts)}
 
 
 def _named(study: Study, runs: pd.DataFrame) -> Row:
-    """Return entries of a row on the runs of one method on one task: title of the ``task``
-    (:func:`.marked`), label of the ``method``, the number of ``runs`` and ``run_ids``."""
+    """Return the entries ``task``, ``method``, ``runs`` and ``run_ids`` of a row.
+
+    ``runs`` are the runs of one method on one task. The entries are the title of the task
+    (:func:`.marked`), the label of the method, and the number and the ids of the runs.
+    """
     task, label = marked(study.tasks[runs.task.iloc[0]]), runs.label.iloc[0]
     return {"task": task, "method": label, "runs": len(runs), **run_ids(runs)}
 
 
 ROUNDING = 1e-9
-"""Largest posture difference that counts as rounding, length unit and rad mixed."""
+"""Largest posture difference that counts as rounding; it mixes length unit and rad."""
 _EARLY = 1_000
-"""Number of trials after which the ranking has a further gap, ``gap_early``."""
+"""Number of trials after which the ranking also reports the gap, as ``gap_early``."""
 BUDGETS = (100, 1_000, 10_000)
-"""Numbers of trials after which the table of learning has rewards."""
+"""Numbers of trials after which the table of learning reports rewards."""
 COSTS = (
     ("trials_to_quarter", "trials", 0.25),
     ("trials_to_half", "trials", 0.5),
     ("forward_kinematics_to_half", "forward_kinematics", 0.5),
     ("seconds_to_half", "solve_s", 0.5),
 )
-"""Columns of :func:`list_runtimes`, each with its cost and the share of the targets to reach."""
+"""Columns of :func:`list_runtimes`: name, cost, and share of the targets to reach."""
 
 
 @lru_cache(maxsize=4)
 def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
-    """Return, by label, on how many individual tasks the mean reward of a method is
-    ``better`` and ``worse`` than that of the learner that explores most (EC1, with two arms EC4).
+    """Count the individual tasks on which each method is better or worse than the learner.
 
-    A task counts if both solved every run and the rewards differ significantly: by the two-sided
-    exchange test, or for a deterministic method, whose reward counts as exact, by the bootstrap
-    test, corrected over the tasks of the method (Holm). Runs with the same seed are not compared as
-    pairs. A method is left out if no test could have found a difference.
+    The learner is the one that explores most: EC1 on tasks for one arm, EC4 on tasks for two. A
+    task counts if
+
+    - both methods solved all of their runs, and
+    - the mean rewards differ significantly, corrected over the tasks of the method (Holm).
+
+    The test is the two-sided exchange test. The reward of a deterministic method counts as exact,
+    and the test is then the bootstrap test. Runs with the same seed are not compared as pairs.
+
+    Returns
+    -------
+    dict
+        Numbers of tasks ``better`` and ``worse`` by label. A method is left out if no test could
+        have found a difference.
     """
     counts = dict[str, dict[str, int]]()
     for label, stochastic in study.methods.stochastic.items():
@@ -385,7 +435,7 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
             if runs is None or learner is None or runs is learner:
                 continue
             rewards, learned = (
-                solved(each).reward.to_numpy(np.float64) for each in (runs, learner)
+                solved(cell).reward.to_numpy(np.float64) for cell in (runs, learner)
             )
             if len(rewards) == len(runs) and len(learned) == len(learner):
                 ahead.append(bool(rewards.mean() > learned.mean()))
@@ -407,9 +457,11 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
 
 
 def _gaps_after(study: Study, trials: int) -> pd.Series:
-    """Return the mean gap over tasks of the best of the first ``trials`` trials of each ranked
-    method, by label: NaN if a run had no solution by then. Runs without rewards of trials keep
-    their gap."""
+    """Return the gap that each ranked method had after ``trials`` trials, a mean over tasks.
+
+    The gap of a run is the gap of its best trial so far. Runs without rewards of trials keep their
+    final gap. The mean is NaN if a run had no solution by then. The index has the labels.
+    """
     learned, runs = improvements(study), compared_runs(study)
     best = [
         float(best_after(learned[run_id], trials))
@@ -425,7 +477,7 @@ def _gaps_after(study: Study, trials: int) -> pd.Series:
 
 
 def _standing_rows(study: Study, *, ranked: bool) -> Rows:
-    """Yield a row for each method of :func:`.standings` that is ``ranked``, or for the others."""
+    """Yield the rows of the methods of :func:`.standings` that are ranked, or of the others."""
     rows = standings(study)
     rows = rows[(rows.why == "") == ranked]
     single = [task for task in ranked_tasks(study) if study.tasks[task].family is None]
@@ -435,14 +487,14 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
         gaps = runs.groupby("task").gap.mean()
         counts = [
             counts
-            for each in runs.label.unique()
-            if (counts := _counts_against_learner(study).get(each))
+            for name in runs.label.unique()
+            if (counts := _counts_against_learner(study).get(name))
         ]
         entries: Row = {"method": label}
         entries |= {name: row[name] for name in ("gap", "gap_low", "gap_high")}
         entries |= {name: row[name] for name in ("information", "note", "runs")}
         entries |= {
-            name: sum(of[name] for of in counts) if counts else math.nan
+            name: sum(count[name] for count in counts) if counts else math.nan
             for name in ("better", "worse")
         }
         entries |= {f"on {task}": gaps.get(task, math.nan) for task in single}
@@ -484,9 +536,11 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
     with_settings=True,
 )
 def list_ranking(study: Study) -> Rows:
-    """Yield a row for each ranked method (:func:`.standings`), the smallest gap first: its gap and
-    share of the gain over tasks, its gap on each task that is not random, its gap after a thousand
-    trials, and means of what a run costs."""
+    """Yield a row for each ranked method (:func:`.standings`), the smallest gap first.
+
+    It has the gap and the share of the gain, means over tasks; the gap on each task that is not
+    random; the gap after a thousand trials; and the mean costs of a run.
+    """
     return _standing_rows(study, ranked=True)
 
 
@@ -508,9 +562,11 @@ def list_ranking(study: Study) -> Rows:
     with_settings=True,
 )
 def list_not_ranked(study: Study) -> Rows:
-    """Yield a row for each method that is not ranked (:func:`.standings`), with the reason, the gap
-    if it solved all tasks in another number of trials, and its gap on each task that is not
-    random."""
+    """Yield a row for each method that is not ranked (:func:`.standings`), with the reason.
+
+    The row also has the gap on each task that is not random. If the method solved all tasks, but
+    with another number of trials, the row has its gap over tasks, too.
+    """
     return _standing_rows(study, ranked=False)
 
 
@@ -527,16 +583,24 @@ def list_not_ranked(study: Study) -> Rows:
     """,
 )
 def list_differences(study: Study) -> Rows:
-    """Yield a row for each other method: its gap less the gap of :attr:`.Study.against`, on the
-    tasks on which the latter solved every run; the smallest difference first.
+    """Yield the difference of gaps of other methods from a reference method, smallest first.
 
-    If :attr:`.Study.against` is empty, the compared method is the first of the ranking where one
-    parameter is varied; otherwise each method from a file is compared with the built-in methods
-    with the same use of the reward. Methods that lack or failed a run there or were asked for
-    another number of trials, and settings and ablations of methods that ran
-    (:attr:`.Study.methods`, ``under``), are left out. Intervals are for other runs on the same
-    tasks; p is two-sided (:func:`.stratified_test`), corrected over the rows of the compared method
-    (Holm).
+    The difference is the gap of the other method less the gap of the reference method, on the tasks
+    on which the reference method solved all runs. The reference method is
+
+    - :attr:`.Study.against`, if it is not empty;
+    - otherwise, if the study varies one parameter, the first method of the ranking;
+    - otherwise each method from a file. It is then compared only with the built-in methods that
+      use the reward in the same way.
+
+    A method is left out if
+
+    - it has no runs or a failed run on one of these tasks;
+    - it was asked for another number of trials;
+    - it is a setting or an ablation of a method that ran (:attr:`.Study.methods`, ``under``).
+
+    Intervals are for other runs on the same tasks. p is two-sided (:func:`.stratified_test`), and
+    corrected over the rows of the same reference method (Holm).
     """
     methods, rows = study.methods, standings(study)
     solved_some = [label for label in rows.index if solved_tasks(study, str(label))]
@@ -558,8 +622,8 @@ def list_differences(study: Study) -> Rows:
             is_fair = budgets == asked or not (budgets and asked) or ranking_budget(study) is None
             if len(runs) and runs.reward.notna().all() and is_fair and name != against:
                 found.append((_difference_of_gaps(study, name, against, tasks), name))
-        adjusted = holm([each.p for each, _ in found]) if found else []
-        in_order = sorted(zip(found, adjusted, strict=True), key=lambda each: each[0][0].value)
+        adjusted = holm([difference.p for difference, _ in found]) if found else []
+        in_order = sorted(zip(found, adjusted, strict=True), key=lambda item: item[0][0].value)
         for (difference, name), p in in_order:
             runs = runs_on(study, name, tasks)
             entries: Row = {"method": name, "against": against}
@@ -569,11 +633,18 @@ def list_differences(study: Study) -> Rows:
 
 
 def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[str]) -> Estimate:
-    """Return the mean gap of the ``first`` method (a label) less the mean gap of the ``second``,
-    each a mean over ``tasks``.
+    """Return the mean gap of a method over tasks less that of another method.
 
-    Gaps of deterministic methods are taken as exact. The interval is for other runs on these tasks;
-    two exact gaps have no interval and no p-value.
+    Gaps of deterministic methods count as exact. The interval is for other runs on these tasks. If
+    both gaps are exact, there is no interval and no p-value.
+
+    Parameters
+    ----------
+    study : Study
+    first, second : str
+        Labels of the methods.
+    tasks : sequence of str
+        Names of tasks on which both have runs.
     """
     exact, weights, drawn = 0.0, list[float](), list[Array]()
     pairs: dict[Any, list[Array | float]] = {task: [] for task in tasks}
@@ -617,15 +688,17 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
     with_settings=True,
 )
 def list_contexts(study: Study) -> Rows:
-    """Yield a row for each method, pair of tasks, goal that both share, and hand: the posture
-    difference between the tasks, its verdict, the lean (:func:`.lean`), and the posture difference
-    of random search; p is corrected over a method's rows (Holm)."""
+    """Yield a row for each method, pair of tasks, goal that both tasks share, and hand.
+
+    It has the posture difference between the tasks with its verdict, the lean (:func:`.lean`), and
+    the posture difference of random search. p is corrected over the rows of a method (Holm).
+    """
     for label in study.methods.index:
-        every = list(shared_goals(study, label))
-        spreads = [shared.standardised_posture_difference for shared in every]
-        tested = zip(every, np.isnan(spreads).tolist(), strict=True)
+        contexts = list(shared_goals(study, label))
+        spreads = [shared.standardised_posture_difference for shared in contexts]
+        tested = zip(contexts, np.isnan(spreads).tolist(), strict=True)
         p = holm([math.nan if no_spread else shared.p for shared, no_spread in tested])
-        for shared, adjusted in zip(every, p, strict=True):
+        for shared, adjusted in zip(contexts, p, strict=True):
             first, second = shared.tasks
             row: Row = {
                 "method": label,
@@ -657,7 +730,7 @@ _SIGNATURE = """
     {0}_p            | p | p | {3}
     {0}_control_runs
 """
-"""Columns of a signature."""
+"""Lines of the columns of a signature."""
 
 
 @table(
@@ -677,13 +750,18 @@ _SIGNATURE = """
     + _SIGNATURE.format("hand", "goals with the slower hand for them alone (share)", 2, "", ""),
 )
 def list_signatures(study: Study) -> Rows:
-    """Yield rows with the signatures of every method, except searches, on every individual task,
-    and of random search there for methods that select among trials.
+    """Yield the signatures of each method, except searches, on each individual task.
 
-    A row for each hand sequence of :func:`.with_control`, which a tenth of the solved runs or more
-    have, and a row for the choice of hands (``hands`` empty) on a task for two with two goals or
-    more. Means over runs; p is of the one-tailed exchange test and uncorrected.
-    ``control_idle_arm``: ``with noise``, or ``still`` as under EC3.
+    There is a row for
+
+    - each hand sequence that at least a tenth of the solved runs have (:func:`.with_control`);
+    - the choice of hands, with ``hands`` empty, if the task is for two arms and has at least two
+      goals.
+
+    Values are means over runs. For methods that select their solution from trials, the row also has
+    the signatures of random search, and p of the one-tailed exchange test, not corrected.
+    ``control_idle_arm`` says how random search treats the idle arm: ``with noise``, or ``still`` as
+    under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
     columns = {signature: signature.replace(" ", "_") for signature in SIGNATURES}
@@ -719,13 +797,26 @@ def list_signatures(study: Study) -> Rows:
 
 
 def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
-    """Return a verdict on whether the posture at a shared goal depends on later goals, such as
-    ``different postures``, ``the same posture`` or ``too few runs``.
+    """Return the verdict on whether the posture at a shared goal depends on later goals.
 
-    Of stochastic methods, the permutation test distinguishes postures, and the bootstrap test that
-    the difference is below :data:`.SAME` shows that postures are the same; of others the difference
-    itself does both. Different postures of methods that select their solution from trials are
-    compared with random search, too. ``row``: other columns of :func:`list_contexts`.
+    - Stochastic methods: postures differ if the permutation test says so. They are the same if the
+      bootstrap test shows that their difference is below :data:`.SAME`.
+    - Deterministic methods: the difference itself decides both.
+    - If postures differ and the method selects its solution from trials, the difference is also
+      compared with that of random search.
+
+    Parameters
+    ----------
+    study : Study
+    shared : TwoContexts
+        The runs on two tasks at the shared goal.
+    row : dict
+        Other columns of :func:`list_contexts`.
+
+    Returns
+    -------
+    str
+        Such as ``different postures``, ``the same posture`` or ``too few runs``.
     """
     method: Any = study.methods.loc[shared.method]
     if method.stochastic:
@@ -761,10 +852,13 @@ def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
     """,
 )
 def list_saved(study: Study) -> Rows:
-    """Yield a row for each individual task and method, except searches, that solved a
-    run, with the mean difference of ticks at each goal, ``by_goal_1`` and so on: ticks of the run
-    less the ticks of the corrective process alone with the same hands. Runs with hands with which
-    this process fails are left out, and so are rows without other runs."""
+    """Yield how many ticks more than the corrective process each method takes for each goal.
+
+    There is a row for each individual task and each method, except searches, that solved a run.
+    ``by_goal_1`` and so on are means over runs: ticks of the run less the ticks of the corrective
+    process alone with the same hands. Runs with hands with which this process fails are left out;
+    if no runs remain, so is the row.
+    """
     for (task, label), runs in study.cells.items():
         if (
             task not in study.individual_tasks
@@ -794,11 +888,12 @@ def list_saved(study: Study) -> Rows:
     """,
 )
 def list_runtimes(study: Study) -> Rows:
-    """Yield a row for each method of :func:`.runtimes` with known numbers of trials: the share of
-    targets reached, and the costs of reaching a quarter and half of the targets (:data:`COSTS`).
+    """Yield what it costs each method to reach a quarter and half of the targets (:data:`COSTS`).
 
-    ``half on *``, for methods that use the reward of each trial: median number of trials to the
-    target halfway to the optimum on a task, infinite if most runs do not reach this target.
+    Methods whose numbers of trials are unknown are left out. The row also has the share of targets
+    reached. For methods that use the reward of each trial, ``half on *`` is the median number of
+    trials to the target halfway to the optimum on a task. It is infinite if most runs do not reach
+    this target.
     """
     for method, runs in runs_with_targets(study).items():
         times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
@@ -830,16 +925,19 @@ def list_runtimes(study: Study) -> Rows:
     """,
 )
 def list_learning(study: Study) -> Rows:
-    """Yield a row for each individual task and each method, except searches, if all its
-    runs there have a solution and made 100 trials or more: the best reward, negative ticks, after
-    each number of trials in :data:`BUDGETS` that all runs made, a mean over runs; NaN if a run has
-    no solution by then."""
+    """Yield the best reward of each method after 100, 1000 and 10 000 trials, a mean over runs.
+
+    There is a row for each individual task and each method, except searches, if all of its runs on
+    the task have a solution and made at least 100 trials. Rewards are negative ticks, after each
+    number of trials in :data:`BUDGETS`. A reward is NaN if not all runs made so many trials, or a
+    run had no solution by then.
+    """
     learned = improvements(study)
     for (task, label), runs in study.cells.items():
         is_shown = task in study.individual_tasks and not study.methods.is_search[label]
         is_solved = len(solved(runs)) == len(runs) and learned.keys() >= {*runs.run_id}
         fewest = runs.trials.min()
-        if not (is_shown and is_solved and fewest >= BUDGETS[0]):  # a try or two, no learning
+        if not (is_shown and is_solved and fewest >= BUDGETS[0]):  # with fewer nothing is learned
             continue
         row = _named(study, runs) | {"corrective_best": study.corrective_best[task]}
         for budget in BUDGETS:
@@ -850,7 +948,7 @@ def list_learning(study: Study) -> Rows:
 
 @lru_cache(maxsize=4)
 def _instances(study: Study) -> dict[str, list[str]]:
-    """Return, by family, the names of its instances (random tasks) with a best known reward."""
+    """Return the names of the instances (random tasks) with a best known reward, by family."""
     families: dict[str, list[str]] = {}
     for name in study.optima:
         if (family := study.tasks[name].family) is not None:
@@ -860,9 +958,12 @@ def _instances(study: Study) -> dict[str, list[str]]:
 
 @lru_cache(maxsize=4)
 def on_instances(study: Study) -> pd.DataFrame:
-    """Return the runs of methods on those instances with a best known reward on which the method
-    solved every run, sorted by family and instance as in :func:`_instances`. Column ``method`` has
-    the label of the method's row in the ranking. Do not change the frame: it is kept."""
+    """Return each method's runs on the instances that it solved in all runs.
+
+    Only instances with a best known reward count. Runs are sorted by family and instance, as in
+    :func:`_instances`. Column ``method`` has the label of the method's row in the ranking. The
+    frame is cached: do not change it.
+    """
     runs = compared_runs(study)
     names = [*itertools.chain.from_iterable(_instances(study).values())]
     failed = runs.reward.isna().groupby([runs.ranked_as, runs.task]).transform("any")
@@ -873,9 +974,20 @@ def on_instances(study: Study) -> pd.DataFrame:
 
 
 def by_family(study: Study, runs: pd.DataFrame) -> Scores:
-    """Return, by family, the gaps of a method's runs on each instance of the family, a list of
-    arrays of shape ``(n,)``. ``runs`` are the method's rows of :func:`on_instances`; a family is
-    left out if one of its instances has no run there."""
+    """Return the gaps of a method's runs on each instance, by family.
+
+    Parameters
+    ----------
+    study : Study
+    runs : DataFrame
+        The method's rows of :func:`on_instances`.
+
+    Returns
+    -------
+    dict
+        For each family, a list of arrays of gaps, shape ``(n,)``, one for each instance. A family
+        is left out if one of its instances has no run in ``runs``.
+    """
     return {
         str(family): [
             part.gap.to_numpy(np.float64) for _, part in of_family.groupby("task", sort=False)
@@ -896,18 +1008,20 @@ def by_family(study: Study, runs: pd.DataFrame) -> Scores:
     """,
 )
 def list_family_gaps(study: Study) -> Rows:
-    """Yield a row for each method that ran on instances: its gap to the best known reward, over
-    families with two arms and in each family, with intervals for other tasks of the families.
+    """Yield the gap of each method that ran on instances, in each family and over families.
 
-    A method that did not solve every run of every instance of a family has gap NaN in the family,
-    and over families with two arms if the family has two. ``instances`` is the number of instances
-    on which it solved every run, ``missing`` the number of other instances, of families with two
-    arms, or, for a method that ran on families with one arm alone, of families on which it ran.
+    ``gap`` is over the families with two arms. Intervals are for other tasks of the families. If a
+    method did not solve all runs of all instances of a family, its gap in the family is NaN; if the
+    family has two arms, so is ``gap``.
+
+    ``instances`` is the number of instances that the method solved in all runs; ``missing`` is the
+    number of the other instances. Both count families with two arms. If the method ran only on
+    families with one arm, they count these.
     """
-    every, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
-    two_armed = {each for each in families if len(study.tasks[families[each][0]].hands) > 1}
+    solved_runs, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
+    two_armed = {family for family in families if len(study.tasks[families[family][0]].hands) > 1}
     for method, of_method in runs_by_method(study).items():
-        runs, ran = every[every.method == method], {*of_method.family.dropna()}
+        runs, ran = solved_runs[solved_runs.method == method], {*of_method.family.dropna()}
         scores, over = by_family(study, runs), two_armed if two_armed & ran else ran
         solved = runs[runs.family.isin(over)].task.nunique()
         missing = sum(len(families[family]) for family in over) - solved
@@ -939,8 +1053,11 @@ def list_family_gaps(study: Study) -> Rows:
     """,
 )
 def list_tasks(study: Study) -> Rows:
-    """Yield a row for each individual task with its best known reward, and the rewards
-    of the corrective process alone with the initial and the best hands, negative ticks."""
+    """Yield the best known reward of each individual task, and what corrections alone get.
+
+    ``initial`` and ``best_hands`` are the rewards of the corrective process alone with the
+    initial and with the best hands. All rewards are negative ticks.
+    """
     for name, task in study.individual_tasks.items():
         best, locked = study.optima.get(name), " and ".join(task.locked_base)
         alone = study.sequences(name).reward.dropna()
@@ -977,12 +1094,11 @@ def list_tasks(study: Study) -> Rows:
     with_settings=True,
 )
 def list_methods(study: Study) -> Rows:
-    """Yield a row for each method on each individual task: mean reward, negative ticks, with SD and
-    median, mean gap, hands and median costs.
+    """Yield the rewards, hands and median costs of each method on each individual task.
 
-    Within a task, searches for the optimum come first, then methods from the highest mean reward
-    on. ``median_run`` is the beginning of the id of the run with the reward nearest to the median;
-    None without a solved run.
+    Rewards are negative ticks. Within a task, searches for the optimum come first; the other
+    methods follow, the highest mean reward first. ``median_run`` is the beginning of the id of the
+    run whose reward is nearest to the median, or None if no run is solved.
     """
     places, rows = {task: place for place, task in enumerate(study.individual_tasks)}, []
     for (task, label), runs in study.cells.items():
@@ -1004,7 +1120,7 @@ def list_methods(study: Study) -> Rows:
         }
         below = -row["reward"] if len(good) else math.inf
         rows.append(((places[task], not study.methods.is_search[label], below), label, row))
-    for (place, *_), label, row in sorted(rows, key=lambda each: each[0]):
+    for (place, *_), label, row in sorted(rows, key=lambda item: item[0]):
         yield f"{[*places][place]} {label}", row
 
 
@@ -1019,8 +1135,10 @@ def list_methods(study: Study) -> Rows:
     """,
 )
 def list_failed(study: Study) -> Rows:
-    """Yield a row for each method on each task on which runs failed: their number and three
-    commonest reasons."""
+    """Yield the number of failed runs of each method on each task, and why they failed.
+
+    There is a row if at least one run failed. It has the three most frequent reasons.
+    """
     for (task, label), runs in study.cells.items():
         if len(solved(runs)) < len(runs):
             failed = runs[runs.status != "ok"]
@@ -1030,8 +1148,8 @@ def list_failed(study: Study) -> Rows:
 
 
 TABLES = {
-    each.id: each
-    for each in (
+    table_.id: table_
+    for table_ in (
         list_ranking,
         list_not_ranked,
         list_differences,

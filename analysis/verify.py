@@ -1,24 +1,29 @@
 """Check a results folder: execute every stored solution again.
 
-It needs Python and NumPy, and nothing of coartic. ``python verify.py FOLDER`` opens
-``FOLDER/runs.sqlite`` and checks of every run:
+It only needs Python and NumPy, and does not import coartic. ``python verify.py FOLDER`` opens
+``FOLDER/runs.sqlite`` and checks that
 
-- that its solution (and of a learner its first trial and its replay) keeps the rules, hits every
-  goal, and has the stored ticks, reward and hands;
-- by a hash, that no joint and no trial was changed since;
-- by its id and its seed, that it is of its task, method and parameters;
-- that the runs that the plan asks for are there.
+- the solution of each run (and the first trial and the replay of a learner) obeys the rules, hits
+  all goals, and has the stored ticks, reward and hands;
+- no joint and no trial was changed afterwards, by a hash;
+- each run belongs to its task, method and parameters, by its id and its seed;
+- the folder has all runs that the plan asks for.
 
 The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in Motor Skill
-Acquisition*): A robot, a mobile base with two arms, hits goals with its hands, in their order. A
-configuration q holds x and y of the base, then the angles of the left arm and of the right arm. A
-movement goes from q straight to a target q^t in steps of length m; its last step, often shorter,
-ends at q^t. Before each step the robot looks. It stops if its hand is within the radius of the
-goal (a hit); in a learned or planned movement, also if its hand is within θ^a of where q^t would
-put it (arrival). k steps cost k ticks, and stopping costs one. The reward is minus all ticks. Each
-goal has one hand. The first movement for a goal, unless corrective, is always made, the others only
-while the goal is not hit. A path leads through waypoints and stops on a hit or at its end. The
-targets of corrective movements are stored; the corrective process is not run again.
+Acquisition*):
+
+- A robot, a mobile base with two arms, hits goals with its hands, in order. Each goal has one hand.
+- A configuration q has x and y of the base, then the angles of the left arm and of the right arm.
+- A movement goes straight from q to a target q^t in steps of length m. Its last step, which can be
+  shorter, ends at q^t.
+- Before each step the robot checks whether to stop. It stops if its hand is within the radius of
+  the goal (a hit). In a learned or planned movement, it also stops if its hand is within θ^a of the
+  position that it would have at q^t (arrival).
+- k steps cost k ticks, and stopping costs one. The reward is minus the sum of all ticks.
+- The first movement for a goal is always made, unless it is corrective. Other movements are only
+  made while the goal is not hit.
+- A path leads through waypoints, and stops on a hit or at its end.
+- The targets of corrective movements are stored; the corrective process is not run again.
 """
 
 from __future__ import annotations
@@ -39,7 +44,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-STATED = {  # columns of table results on each part of a run whose movements are stored
+STATED = {  # columns of table results that describe each part of a run with stored movements
     "solution": ("reward", "hands", "solution_corrections", "other_arm_travel"),
     "initial": ("initial_reward", "initial_hands"),
     "replay": ("replay_reward", "replay_hands"),
@@ -52,16 +57,19 @@ def need(holds: Any, words: str) -> None:
         raise ValueError(words)
 
 
-# One bit of a hand's position can decide where a movement stops. So lines are computed in coartic's
-# order and with its polynomials: IEEE arithmetic then gives the same bits on every computer.
+# One bit of a hand's position can decide where a movement stops. Therefore lines are computed in
+# the same order and with the same polynomials as in coartic: IEEE arithmetic then gives the same
+# bits on all computers.
 HIGH, MIDDLE, LOW = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
 S3, S5, S7, S9, S11, S13, S15, S17 = ((-1) ** n / math.factorial(2 * n + 1) for n in range(1, 9))
 C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in range(2, 9))
 
 
 def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
-    """Return cosine and sine of angles, rad, by the Taylor series of what is left after k quarters
-    of a turn (π/2); exact up to ±1e5 rad."""
+    """Return cosine and sine of angles, rad, exact for angles from -1e5 to 1e5 rad.
+
+    An angle is k quarters of a turn (π/2) and a remainder, of which the Taylor series is computed.
+    """
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
     z, k = x * x, quarters.astype(np.int64)
@@ -75,11 +83,14 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]:
-    """Return x and y of the hand of ``arm`` (slice of joints, lengths of links, shoulder's place)
-    for n configurations in the columns of ``q``, ``(n,)`` each; ``on_path``: by NumPy's cosine."""
+    """Return x and y of a hand for n configurations, shape ``(n,)`` each.
+
+    ``q`` has the configurations in its columns. ``arm`` has the slice of the arm's joints, the
+    lengths of its links, and the shoulder's position. With ``on_path``, NumPy's cosine is used.
+    """
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
-    angles = np.cumsum(q[joints], axis=0)  # each joint's is measured from the link before
+    angles = np.cumsum(q[joints], axis=0)  # a joint's angle is measured from the previous link
     waves = (np.cos(angles), np.sin(angles)) if on_path else _cosine_and_sine(angles)
     for length, cosine, sine in zip(links, *waves, strict=True):
         x, y = x + length * cosine, y + length * sine
@@ -88,9 +99,11 @@ def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]
 
 @cache
 def stored_task(content: str) -> Any:
-    """Return the task of a cell from the cell's stored JSON, with its constants of movement
-    (``model``), start (``q0``), locked coordinates and arms, and the hash of the cell
-    (``digest``)."""
+    """Return the task of a cell from the cell's stored JSON.
+
+    Further attributes are the constants of movement (``model``), the start (``q0``), locked
+    coordinates, arms, and the hash of the cell (``digest``).
+    """
     plain = json.loads(content)
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
     task = cell.task
@@ -101,7 +114,7 @@ def stored_task(content: str) -> Any:
     task.q0 = np.array([*task.start.base, *task.start.left, *task.start.right], dtype=np.float64)
     task.locked = ["xy".index(coordinate) for coordinate in task.locked_base]
     robot, middle = task.robot, 2 + len(task.robot.left_links)
-    task.arms = {  # place in q, lengths of the links, and the shoulder's place on the base
+    task.arms = {  # slice of q, lengths of the links, and the shoulder's position on the base
         "left": (slice(2, middle), robot.left_links, robot.left_shoulder),
         "right": (slice(middle, None), robot.right_links, robot.right_shoulder),
     }
@@ -109,8 +122,10 @@ def stored_task(content: str) -> Any:
 
 
 def line(q: Floats, target: Floats, model: Any) -> Floats:
-    """Return points of a straight movement from ``q``, columns ``(dof, points)``, a step of
-    ``model`` apart in joint space; the last, mostly less far, is the target."""
+    """Return the points of a straight movement from ``q`` to a target, shape ``(dof, points)``.
+
+    They are a step of ``model`` apart in joint space; the last step can be shorter.
+    """
     difference = target - q
     distance = math.sqrt(np.cumsum(difference * difference)[-1])
     fractions = np.arange(math.ceil(distance / model.step) + 1) * model.step / (distance or 1.0)
@@ -120,9 +135,11 @@ def line(q: Floats, target: Floats, model: Any) -> Floats:
 
 
 def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
-    """Return points along a path from ``q`` through ``waypoints``, a row each, as columns, shape
-    ``(dof, points)``. Point k, from 0, lies k steps of ``model`` along the path, and the last point
-    at its end."""
+    """Return the points of a path from ``q`` through waypoints, shape ``(dof, points)``.
+
+    ``waypoints`` has a row for each waypoint. Point k, from 0, is k steps of ``model`` along the
+    path; the last point is its end.
+    """
     corners = np.array([q, *waypoints])
     ends = np.append(0.0, np.cumsum(np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))))
     along = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
@@ -134,8 +151,10 @@ def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
 def make(
     task: Any, q: Floats, goal: int, hand: str, kind: str, corners: Floats
 ) -> tuple[Floats, int, bool]:
-    """Return the configuration where a movement from ``q`` stops, its ticks, and True if the hand
-    hits its goal there. ``corners`` has the target, or the waypoints of a path, a row each."""
+    """Make a movement, and return where it stops, its ticks, and whether it hits.
+
+    It starts at ``q``. ``corners`` has a row with the target, or a row for each waypoint of a path.
+    """
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
     points = path(q, corners, model) if on_path else line(q, corners[-1], model)
     x, y = hand_at(points, arm, on_path)
@@ -146,20 +165,28 @@ def make(
         dx, dy = x[-1] - x, y[-1] - y
         stops |= np.sqrt(dx * dx + dy * dy) <= model.arrival_tolerance
     stops[-1] = True
-    k = int(np.argmax(stops))  # the first
+    k = int(np.argmax(stops))  # the first point at which it stops
     return points[:, k], k + 1, bool(hits[k])
 
 
 def _recompute(task: Any, movements: list[list[Any]]) -> tuple[int, str, int, float]:
-    """Return reward, letters of hands, number of corrections, and joint travel of idle arms from
-    start and hit to hit, rad. Raises ValueError if a rule is broken or ticks are not as stored.
-    A movement has its goal, from 1, hand, kind, ticks and path, JSON."""
+    """Make all movements of a part of a run again.
+
+    Each movement is a list of its goal (from 1), hand, kind, ticks, and path as JSON. Raises
+    ValueError if a rule is broken or ticks differ from the stored ones.
+
+    Returns
+    -------
+    (int, str, int, float)
+        Reward, letters of the hands, number of corrections, and the distance in joint space that
+        idle arms travel, added over goals, rad.
+    """
     goals = [movement[0] for movement in movements]
     order = [*range(1, len(task.goals) + 1)]
     need(goals == sorted(goals) and sorted({*goals}) == order, f"its goals are {goals}")
     q, reward, letters, corrections, travel = task.q0, 0, "", 0, 0.0
     for goal in order:
-        to_goal, before, hit = [each for each in movements if each[0] == goal], q, False
+        to_goal, before, hit = [move for move in movements if move[0] == goal], q, False
         hand = to_goal[0][1]
         need(hand in task.hands, f"the task has no {hand} hand")
         for _, same_hand, kind, stored, text in to_goal:
@@ -169,7 +196,7 @@ def _recompute(task: Any, movements: list[list[Any]]) -> tuple[int, str, int, fl
             need(is_locked, "a movement moves a locked base")
             end, ticks, hits = make(task, q, goal, hand, kind, corners)
             if hit or (kind == "corrective" and hits and ticks == 1):
-                # Nothing is to be done. A movement of no ticks to where it is names the hand.
+                # The hand is in the goal already. A movement of 0 ticks without change names it.
                 is_none = len(to_goal) == 1 and not stored and (corners == q).all()
                 need(is_none, f"a movement is made after goal {goal} is hit")
                 hit = True
@@ -187,17 +214,20 @@ def _recompute(task: Any, movements: list[list[Any]]) -> tuple[int, str, int, fl
 class Report(NamedTuple):
     """Result of :func:`check_runs`."""
 
-    runs: int  # checked
-    movements: int  # executed
-    wrong: list[str]  # what differs, a sentence each
-    unfinished: list[str]  # what is missing of the plan, a sentence if anything is
+    runs: int  # number of runs that were checked
+    movements: int  # number of movements that were executed
+    wrong: list[str]  # a sentence for each run that differs
+    unfinished: list[str]  # a sentence if runs of the plan are missing, otherwise empty
 
 
 def check_runs(folder: Path) -> Report:
-    """Execute the stored movements of a results folder, also of runs that the last plan does not
-    ask for, and report what differs or is missing. No method is run. Raises an error, such as
-    sqlite3.Error, if the folder cannot be read."""
-    where = f"{(folder / 'runs.sqlite').absolute().as_uri()}?mode=rw"  # undoes an unfinished batch
+    """Execute the stored movements of a results folder, and report what differs or is missing.
+
+    Runs that the last plan does not ask for are checked as well. No method is run. Raises an error,
+    such as sqlite3.Error, if the folder cannot be read.
+    """
+    # Mode rw, because SQLite must undo an unfinished batch.
+    where = f"{(folder / 'runs.sqlite').absolute().as_uri()}?mode=rw"
     with closing(sqlite3.connect(where, uri=True)) as db:
         db.row_factory = sqlite3.Row
         db.execute("PRAGMA query_only = ON")
@@ -211,17 +241,19 @@ def check_runs(folder: Path) -> Report:
             runs += 1
             try:
                 movements += _check_run(row)
-            except Exception as problem:  # whatever keeps a run from being executed
+            except Exception as problem:  # any error is reported for its run
                 wrong.append(f"Run {row['run_id']}: {problem}.")
         (asked,) = db.execute("SELECT coalesce(sum(runs), 0) FROM cells").fetchone()
-        (there,) = db.execute("SELECT count(*) FROM asked").fetchone()
-        lacks = f"The plan asks for {asked} runs, of which the folder has {there}."
-        return Report(runs, movements, wrong, [lacks] if there < asked else [])
+        (stored,) = db.execute("SELECT count(*) FROM asked").fetchone()
+        lacks = f"The plan asks for {asked} runs, of which the folder has {stored}."
+        return Report(runs, movements, wrong, [lacks] if stored < asked else [])
 
 
 def _check_run(row: Any) -> int:
-    """Return the number of movements of a run, which are executed. Raises ValueError if the run is
-    not as it is stored, or not the run that its id says."""
+    """Execute the movements of a run, and return their number.
+
+    Raises ValueError if the run differs from what is stored, or from what its id says.
+    """
     need(row["content"], "its cell is missing")
     task = stored_task(row["content"])
     text = f"{task.digest} {row['suite_seed']} {row['run']}"
@@ -246,8 +278,10 @@ def _check_run(row: Any) -> int:
 
 
 def main() -> int:
-    """Check the folder that the command line names, and print what was found. Return 0 if nothing
-    differs or is missing, else 1."""
+    """Check the folder that the command line names, and print the result.
+
+    Returns 0 if nothing differs or is missing, otherwise 1.
+    """
     report = check_runs(Path(sys.argv[1]))
     print(f"{report.runs} runs checked, {report.movements} movements executed.")
     print(*(report.wrong or ["Nothing differs."]), *report.unfinished, sep="\n")

@@ -1,4 +1,4 @@
-"""Numbers and names in words, the same on the page, in tables and on the terminal."""
+"""Write numbers and names alike on the page, in tables and on the terminal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _Digits = Annotated[int, Field(ge=0, le=30)]
 NONE = "–"
-"""Text of a missing value."""
+"""String for a missing value."""
 MINUS, NARROW_SPACE, NO_BREAK = "−", "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 RECONSTRUCTED = "† The paper does not publish the goals of this task; ours are a reconstruction."
 _LATEX = str.maketrans(
@@ -30,20 +30,28 @@ _LATEX = str.maketrans(
         **{NARROW_SPACE: "\\,", "σ": "$\\sigma$", "ε": "$\\epsilon$"},
     }
 )
-"""Signs with a meaning in LaTeX or BibTeX, and signs that coartic itself writes."""
+"""Special characters of LaTeX and BibTeX, and symbols that coartic itself writes."""
 
 
 def id_of(function: Callable[..., Any]) -> str:
-    """Return the id of a table or figure from its function: ``family-gaps`` for
-    ``list_family_gaps``, ``ranking`` for ``draw_ranking``."""
+    """Return the id of a table or figure from the name of its function.
+
+    It is ``family-gaps`` for ``list_family_gaps``, and ``ranking`` for ``draw_ranking``.
+    """
     return function.__name__.partition("_")[2].replace("_", "-")
 
 
 def number(value: float, digits: _Digits | None = None) -> str:
-    """Write a number, with a true minus and spaces between thousands from 10 000 on; – for NaN.
+    """Return a number as a string, with a true minus sign; – for NaN.
 
-    ``digits``: decimals; by default none for integers, and as many as three significant figures
-    need for others; below 0.0001 two figures, as in ``1.2e−05``.
+    Numbers from 10 000 on have narrow spaces between thousands.
+
+    Parameters
+    ----------
+    value : float
+    digits : int, optional
+        Number of decimals. By default, integers have none, and other numbers have three significant
+        figures; very small ones have two, as in ``1.2e−05``.
     """
     if math.isnan(value):
         return NONE
@@ -61,16 +69,16 @@ def number(value: float, digits: _Digits | None = None) -> str:
 
 
 def p_value(p: float) -> str:
-    """Write a p-value, ``p < 0.001`` or ``p = 0.012``, with no-break spaces; empty for NaN."""
+    """Return a p-value as ``p < 0.001`` or ``p = 0.012``, with no-break spaces; empty for NaN."""
     if math.isnan(p):
         return ""
     return ("p < 0.001" if p < 0.001 else f"p = {p:.2g}").replace(" ", NO_BREAK)
 
 
 def in_brackets(low: float, high: float, digits: int | None = None) -> str:
-    """Write an interval, ``[1.3, 2.9]``, with ``digits`` decimals, by default as :func:`number`.
+    """Return an interval as ``[1.3, 2.9]``, with ``digits`` decimals or as :func:`number` chooses.
 
-    Empty for NaN, and for an interval of no length, which would look like certainty.
+    Empty if an end is NaN, and if both ends are equal, because this would look like certainty.
     """
     if math.isnan(low) or math.isnan(high) or low == high:
         return ""
@@ -78,7 +86,7 @@ def in_brackets(low: float, high: float, digits: int | None = None) -> str:
 
 
 def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, unit: str = "") -> str:
-    """Write a number of a table with its interval. Raises CoarticError if the row lacks a number.
+    """Return a number of a table with its interval as a string.
 
     Parameters
     ----------
@@ -96,7 +104,12 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     Returns
     -------
     str
-        Such as ``7.8 [7.3, 8.1]``; the number alone if an end is NaN or the ends are equal.
+        Such as ``7.8 [7.3, 8.1]``, or only the number if an end is NaN or both ends are equal.
+
+    Raises
+    ------
+    CoarticError
+        The row does not have these numbers.
 
     Examples
     --------
@@ -107,16 +120,18 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     try:
         value, low, high = (scale * float(row[name]) for name in names)
     except (KeyError, IndexError, TypeError, ValueError, OverflowError):
-        raise CoarticError(f"the row has no numbers {', '.join(names)}") from None
+        raise CoarticError(f"the row must have the numbers {', '.join(names)}") from None
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 
 
 def titled_apart(tasks: Iterable[Task]) -> list[Task]:
-    """Return the tasks in their order, so that titles differ: a task that needs another title is
-    replaced by a copy with this title.
+    """Return the tasks in order, with titles that differ.
 
-    A changed task, ``ascending.radius-0.2``, that has the title of its task gets the change, too:
-    ``Ascending, radius-0.2``. Then tasks with the same title get their names, too.
+    A task that needs another title is replaced by a copy with this title:
+
+    - If a changed task, such as ``ascending.radius-0.2``, has the title of the original task, the
+      change is added: ``Ascending, radius-0.2``.
+    - If tasks then still have the same title, their names are added.
     """
     tasks, titles = [*tasks], []
     for task in tasks:
@@ -140,44 +155,50 @@ def marked(task: Task) -> str:
 
 
 def tally(names: Iterable[str]) -> str:
-    """Write how often each name occurs, ``LRLR 17, RRLR 3``, the commonest first, then by name; –
-    for none."""
+    """Return how often each name occurs, as in ``LRLR 17, RRLR 3``; – for none.
+
+    The most frequent name comes first; names that are equally frequent are in alphabetical order.
+    """
     counts = Counter(sorted(names)).most_common()
     return ", ".join(f"{name} {count}" for name, count in counts) or NONE
 
 
 def commonest(texts: Iterable[str], most: int | None = 3) -> list[str]:
-    """Return the commonest texts, ``most`` at most (None: all), each with its number, ``12 × no
-    hit``."""
+    """Return the most frequent strings with their numbers, as in ``12 × no hit``.
+
+    There are at most ``most``; None stands for all.
+    """
     return [f"{count} × {text}" for text, count in Counter(texts).most_common(most)]
 
 
 def listed(words: Iterable[str]) -> str:
-    """Write a list, ``a, b and c``. Raises ValueError without words."""
-    *first, last = words
-    return f"{', '.join(first)} and {last}" if first else last
+    """Return words as a list, ``a, b and c``. Raises ValueError if there are none."""
+    *others, last = words
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def capital(text: str) -> str:
-    """Return a text with a capital first letter."""
+    """Return a string with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
 def slugs(names: Iterable[str]) -> dict[str, str]:
-    """Return slugs (small letters, digits, dashes) by name, no two equal: ``a-b``, ``a-b-2``."""
-    taken: dict[str, str] = {}
+    """Return a different slug (small letters, digits, dashes) for each name: ``a-b``, ``a-b-2``."""
+    slug_of: dict[str, str] = {}
     for name in names:
-        # Names of files are short.
+        # Slugs are used in names of files, which must be short.
         base = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:80] or "x"
         slug, count = base, 1
-        while slug in taken.values():
+        while slug in slug_of.values():
             count += 1
             slug = f"{base}-{count}"
-        taken.setdefault(name, slug)
-    return taken
+        slug_of.setdefault(name, slug)
+    return slug_of
 
 
 def latex(text: object) -> str:
-    """Return text as one printable line for LaTeX and BibTeX, in which special characters are
-    escaped. Letters that pdfLaTeX does not know stay; XeLaTeX and LuaLaTeX print them."""
+    """Return text as one printable line for LaTeX and BibTeX, with special characters escaped.
+
+    Letters that pdfLaTeX does not know are not changed; XeLaTeX and LuaLaTeX print them.
+    """
     return one_line(str(text)).translate(_LATEX)

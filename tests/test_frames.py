@@ -64,11 +64,11 @@ def small_frame(**changes):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"reward": [300, 380], "best_known": 292}, "reward has 300.0 in row 0: a reward is minus"),
+        ({"reward": [300, 380], "best_known": 292}, "reward has 300.0 in row 0: .*minus the ticks"),
         ({"reward": [-300, -291]}, "reward has -291.0 in row 1: it is above best_known"),
-        ({"best_known": [-292, -200]}, "task has 't' in row 0: the task has several best_known"),
-        ({"reward": [-300, -np.inf]}, "reward has -inf in row 1: needed are finite numbers"),
-        ({"method": ["a", None]}, "method has (nan|None) in row 1: needed is a name"),
+        ({"best_known": [-292, -200]}, "task has 't' in row 0: .*one best_known"),
+        ({"reward": [-300, -np.inf]}, "reward has -inf in row 1: .*finite"),
+        ({"method": ["a", None]}, "method has (nan|None) in row 1: .*name"),
     ],
 )
 def test_a_frame_that_cannot_be_meant_is_refused(changes, words):
@@ -87,7 +87,7 @@ def test_a_status_that_contradicts_the_reward_is_refused(status, reward):
         lambda of: ecdf(of, [0.1]),
     ):
         compute(frame)
-        with pytest.raises(CoarticError, match="column status has .* in row 0: a run has a reward"):
+        with pytest.raises(CoarticError, match="column status has .* in row 0: .*reward"):
             compute(frame.assign(status=pd.array([status, "ok"], "string")))
 
 
@@ -98,9 +98,9 @@ LACKING = pd.DataFrame({"best_known": [-292]})
     ("words", "compute", "given", "arguments"),
     [
         ("no rows", frames.gaps, small_frame()[:0], ()),
-        ("needed is a pandas.DataFrame, not a list", frames.ranking, [1], ()),
+        ("must be a pandas.DataFrame, not a list", frames.ranking, [1], ()),
         ("no column reward", frames.gaps, LACKING, ()),
-        ("by is empty: needed are names", frames.means, {}, ([], ["reward"])),
+        ("by is empty.*names", frames.means, {}, ([], ["reward"])),
         ("trials has 0.0 in row 0", ecdf, {"trials": [0, 9]}, ([0.1],)),
         *(("targets are", ecdf, {}, (gaps,)) for gaps in ([], [-0.1], [1.001])),
     ],

@@ -136,7 +136,7 @@ def test_running_times_of_chosen_targets(study):
 
 def test_running_times_that_cannot_be_shown(study):
     for targets in ([], [0.0], [1.01]):
-        with pytest.raises(CoarticError, match="needed are numbers above 0 and up to 1"):
+        with pytest.raises(CoarticError, match="must be numbers above 0 and up to 1"):
             runtimes(study, targets=targets)
     with pytest.raises(CoarticError, match="no task has a best known reward"):
         runtimes(MadeUp(study, optima={}))

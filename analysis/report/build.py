@@ -1,4 +1,4 @@
-"""Writing a report: the page ``report.html``, and tables and figures as files."""
+"""Write a report: the page ``report.html``, and tables and figures as files."""
 
 from __future__ import annotations
 
@@ -49,20 +49,37 @@ def write_report(
     width: float | None = None,
     watch: Callable[[str], object] = str,
 ) -> tuple[list[str], dict[str, str]]:
-    """Write a report into ``folder``, in the place of an earlier report.
+    """Write a report into a folder; it replaces an earlier report there.
 
-    ``for_paper``: write tables as LaTeX, too, and figures as SVG and PDF, of this ``width``,
-    inches; None: as wide as on the page. ``watch`` is called with the title of each section before
-    it is made, and, ``for_paper``, again with ``TITLE, for print`` before its files of figures.
-    Returns the paths of the files below ``folder``, and the errors of parts that could not be made,
-    by the name of the part. Raises CoarticError if the folder holds the results themselves or the
-    report of other results (not looked for below the results), or another file in the place of a
-    file of the report.
+    Parameters
+    ----------
+    study : Study
+    folder : pathlib.Path
+    for_paper : bool
+        True to also write tables as LaTeX, and figures as SVG and PDF.
+    width : float, optional
+        Width of these figures, inches; by default as on the page.
+    watch : callable
+        Function that is called with the title of each section before it is made, and with ``TITLE,
+        for print`` before its figures are written to files.
+
+    Returns
+    -------
+    (list of str, dict of str to str)
+        Paths of the files relative to ``folder``, and errors of parts of the report that could not
+        be made, by the name of the part.
+
+    Raises
+    ------
+    CoarticError
+        - The folder contains the results themselves.
+        - It contains the report of other results. This is not checked for a folder below the
+          results.
+        - It contains something else at the path of a file of the report.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(
-            f"{folder} holds the results themselves, or lies above them. Give the report a folder "
-            "of its own."
+            f"{folder} contains the results themselves; the report must have a folder of its own"
         )
     make_folder(folder, ["report.html"])
     with lock(folder, command="coartic report"):
@@ -74,16 +91,16 @@ def write_report(
                 head = report.read_text("utf-8").partition("<title>")[0] if report.exists() else ""
             if head and f'-results" content="{home}"' not in html.unescape(head):
                 raise CoarticError(
-                    f"{folder} holds the report of other results: choose another folder"
+                    f"{folder} holds the report of other results; choose another folder"
                 )
         failures: dict[str, str] = {}
         files = {"report.html": _page(study, home, failures, watch).encode()}
         names = {table.id: section.title for section in SECTIONS for table in section.tables}
         for name, table in TABLES.items():
-            made = sections.attempt(
+            of_table = sections.attempt(
                 failures, names.get(name, name), _files_of_table, study, table, for_paper
             )
-            files |= made or {}
+            files |= of_table or {}
         for section in sections.visible_sections(study) if for_paper else ():
             watch(f"{section.title}, for print")
             files |= (
@@ -95,8 +112,11 @@ def write_report(
 
 
 def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
-    """Return files of a table, contents by path: CSV, and ``for_paper`` LaTeX, if it has columns of
-    the table; an empty dictionary for a table without rows."""
+    """Return the contents of a table's files by path.
+
+    There is a CSV file and, with ``for_paper``, a LaTeX file if the table has columns for LaTeX.
+    The result is empty if the table has no rows.
+    """
     frame = table(study)
     if not len(frame):
         return {}
@@ -109,29 +129,38 @@ def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, by
 
 
 def _files_of_figures(study: Study, section: Section, width: float | None) -> dict[str, bytes]:
-    """Return the files of a section's figures of a width, inches, contents by path: SVG and PDF of
-    each; None: each of its usual width."""
+    """Return the contents of the SVG and PDF files of a section's figures by path.
+
+    ``width`` is in inches; None stands for the usual width of each figure.
+    """
     files = {}
     drawn = (draw(study, width=width) for draw in section.figures)
     for plot in filter(None, drawn):
         for ending in (".svg", ".pdf"):
             files[f"figures/{plot.id}{ending}"] = picture(plot.figure, ending)
-            plot.figure.set_layout_engine("none")  # the next is laid out alike
+            plot.figure.set_layout_engine("none")  # so that both files have the same layout
     return files
 
 
 def _rows_shown(study: Study, table: Table) -> pd.DataFrame:
-    """Return the rows of a table that page and LaTeX show: all, or all but settings and ablations
-    (:func:`.is_setting`)."""
+    """Return the rows of a table that page and LaTeX show.
+
+    Settings and ablations (:func:`.is_setting`) are left out, unless the table has
+    ``with_settings``.
+    """
     frame = table(study)
     return frame if table.with_settings else frame[~is_setting(study, frame)]
 
 
 def _parts_of(study: Study, section: Section, lead: Plot | None) -> dict[str, Any]:
-    """Return the values of a section for the template by name. ``finding``: a list of lines;
-    ``figures``: a list of plots, without the one that leads the page (``lead``), each with its SVG
-    and, for the ranking, an SVG at one column, for phones; ``shown``: for each table with rows a
-    dictionary of its ``id``, ``caption``, number of ``rows`` and ``html``."""
+    """Return the values of a section that the page's template needs, by name.
+
+    - ``finding``: a list of lines;
+    - ``figures``: for each figure except ``lead``, the one at the top of the page, a tuple of the
+      plot, its SVG and, for the ranking, a narrow SVG for phones (otherwise empty);
+    - ``shown``: for each table with rows, a dictionary of its ``id``, ``caption``, number of
+      ``rows`` and ``html``.
+    """
     tables = []
     for table in section.tables:
         if len(frame := _rows_shown(study, table)):
@@ -151,20 +180,20 @@ def _parts_of(study: Study, section: Section, lead: Plot | None) -> dict[str, An
 
 
 def stamp(runs: pd.DataFrame) -> str:
-    """Return a hash, 64 hex digits, of the ids and results of runs, whatever their order."""
+    """Return a hash (64 hex digits) of the ids and results of runs, in any order."""
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
 def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[str], object]) -> str:
-    """Return the page in HTML, which needs no other file and no network.
+    """Return the page as HTML, which needs no other file and no network.
 
-    ``home`` is the path from the page's folder to the results. ``failures`` gets the errors of
-    parts that could not be made, by the name of the part; ``watch`` is called with each section's
-    title.
+    ``home`` is the path from the page's folder to the results. Errors of parts that could not be
+    made are added to ``failures``, by the name of the part. ``watch`` is called with the title of
+    each section.
     """
     draw = draw_ranking if study.varied[0] else draw_shared_goal
     lead = sections.attempt(failures, "Picture", partial(draw, width=ONE), study)
-    made = []
+    shown = []
     for section in sections.visible_sections(study):
         watch(section.title)
         parts = sections.attempt(failures, section.title, _parts_of, study, section, lead)
@@ -172,7 +201,7 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         failure = failures.get(section.title, "")
         if failure or parts["figures"] or parts["shown"]:
             note = section.note.replace("{reference}", reference(study, study.optima))
-            made.append({**vars(section), **parts, "failure": failure, "note": note})
+            shown.append({**vars(section), **parts, "failure": failure, "note": note})
     environment = Environment(
         loader=FileSystemLoader(HERE),
         undefined=StrictUndefined,
@@ -183,8 +212,8 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         finalize=lambda value: sections.shown(value) if type(value) is str else value,
     )
     environment.filters |= {"number": number, "listed": listed}
-    there = [section["id"] for section in made]
-    stage = next((name for name in ("coarticulation", "ranking", "tasks") if name in there), "")
+    ids = [section["id"] for section in shown]
+    stage = next((name for name in ("coarticulation", "ranking", "tasks") if name in ids), "")
     try:
         links = metadata("coartic").get_all("Project-URL") or []
     except PackageNotFoundError:
@@ -196,7 +225,7 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         styles=(HERE / "page.css").read_text("utf-8") + part_of_page("play.css"),
         player=sections.attempt(failures, "Film", player, study) or "",
         script=(HERE / "page.js").read_text("utf-8"),
-        sections=made,
+        sections=shown,
         lead=lead and (lead, for_page(lead)),
         stage=stage,
         suite=study.suite,

@@ -17,12 +17,18 @@ from coartic.robot import HANDS
 def player(study: Study) -> str:
     """Return the interactive figure with the runs of a folder as HTML; empty without a preset.
 
-    The figure has a preset for each individual task on which a method that moves
-    straight has a solution, with the run of each such method nearest the median reward. If goal 1
-    is the :func:`.shared_goal` and such a method solved both tasks, this goal is the first preset,
-    with the standardised posture difference of random search there, if any. The method shown first
-    is the first method from a file, in the order of :func:`.standings`, in a preset, or else the
-    method at the shared goal, if it is in the first preset, or the first one there.
+    Presets:
+
+    - There is a preset for each individual task that a method with straight movements solved. It
+      shows, for each such method, the run whose reward is nearest to the median.
+    - If goal 1 is the :func:`.shared_goal`, and such a method solved both tasks, this goal is the
+      first preset. It has the standardised posture difference of random search, if there is one.
+
+    The method that is shown first is
+
+    - the first method from a file that is in a preset, in the order of :func:`.standings`;
+    - otherwise the method of :func:`.shared_goal`, if it is in the first preset;
+    - otherwise the first method of the first preset.
     """
     presets, first = [], ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
@@ -49,8 +55,8 @@ def player(study: Study) -> str:
     own = (
         {"preset": number, "who": method}
         for method in standings(study).query("not built_in").index
-        for number, there in enumerate(ids)
-        if method in there
+        for number, methods in enumerate(ids)
+        if method in methods
     )
     where = {name: presets.index(preset) for name, preset in alone.items()}
     return player_figure(
@@ -67,8 +73,11 @@ def player(study: Study) -> str:
 
 
 def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
-    """Yield the id of each cell of the page with the gap of a method on a task, in the tables of
-    methods that are ranked and that are not, with the task and the label of the method's runs."""
+    """Yield each table cell with the gap of a method on a task, and the runs that it stands for.
+
+    An item has the id of the HTML cell, the task, and the label of the method's runs. Cells are of
+    the tables of ranked methods and of methods that are not ranked.
+    """
     for table in (list_ranking, list_not_ranked):
         frame = table(study)
         columns = [*shown_columns(table, study, frame)]
@@ -80,12 +89,12 @@ def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
 
 
 def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
-    """Return the methods with solved runs on all of these tasks, in the form of ``model.js``: label
-    ``id``, title ``name``, and ``films``, a film for each task.
+    """Return the methods that solved all of these tasks, in the form that ``model.js`` reads.
 
-    A film has the movements of the run nearest the median reward of the first 500 solved runs;
-    films of several tasks also have the postures of these runs at goal 1, which the tasks share.
-    Methods that follow paths are left out, because the script moves straight.
+    Each has its label ``id``, title ``name``, and ``films``, a film for each task. A film has the
+    movements of one of the first 500 solved runs, the one whose reward is nearest to the median. If
+    there is more than one task, a film also has the postures of these runs at goal 1, which the
+    tasks share. Methods that follow paths are left out, because the script only moves straight.
     """
     runs = []
     for label in study.methods.index:
@@ -99,17 +108,17 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
 
 
 def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
-    """Return the run of a cell (task, label) nearest the median reward, in the form of
-    ``model.js``: ``run``, the beginning of its id, ``ticks``, and ``movements`` with ``goal`` (from
-    0), ``hand`` (index in HANDS), ``kind`` and ``target``.
+    """Return the run of a cell whose reward is nearest to the median, in the form of ``model.js``.
 
-    Empty if the cell has no solution, or one of its first 500 solutions follows a path.
+    It has ``run`` (the beginning of its id), ``ticks``, and ``movements`` with ``goal`` (from 0),
+    ``hand`` (index in HANDS), ``kind`` and ``target``. It is empty if the cell has no solution, or
+    one of its first 500 solutions follows a path.
     """
     cell = study.cells.get(key)
     if cell is None or not len(good := solved(cell)[:MOST_EXECUTED]):
         return {}
     run, stored = typical_run(good), study.movements("solution")
-    if any(movement.kind == "path" for each in good.run_id for movement in stored[each]):
+    if any(movement.kind == "path" for run_id in good.run_id for movement in stored[run_id]):
         return {}
     movements = [
         {

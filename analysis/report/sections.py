@@ -1,4 +1,4 @@
-"""Sections of the page with their tables, figures and sentences, and limits of conclusions."""
+"""Define the sections of the page: their tables, figures and sentences, and their limits."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ from coartic.learner.learning import TRIALS
 
 Made = TypeVar("Made")
 RUNS = 20
-"""Number of runs of every experiment of the paper."""
+"""Number of runs of each experiment of the paper."""
 TOO_FEW = f" (too few runs to test: make {FEWEST})"
 NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer runs as points."
 
@@ -76,14 +76,17 @@ class Section:
     """Functions that draw the figures, or return None if the folder has no runs for one. The page
     folds all figures except the first."""
     sentence: str = ""
-    """Jinja template of the finding in words, or empty. Its names are ``every``, the first table;
-    ``rows``, this table with the ``title`` of each method, without settings and ablations;
-    ``others``, the other tables with titles, without settings and ablations (further names:
-    :func:`.finding`)."""
+    """Jinja template of the finding in words, or empty. It can use
+
+    - ``every``: the first table;
+    - ``rows``: the first table with the ``title`` of each method, without settings and ablations;
+    - ``others``: a list of the other tables, likewise;
+    - further names that :func:`.finding` defines.
+    """
     note: str = ""
     """Explanation of figures and tables."""
     single: bool = True
-    """True for sections about single tasks, left out for many random tasks."""
+    """True for sections about individual tasks. A study of many random tasks leaves them out."""
     folded: bool = False
     """True if the page folds the tables."""
 
@@ -246,14 +249,15 @@ interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them with
 
 
 def shown(text: str) -> str:
-    """Return text as one printable line with no-break spaces for spaces before per cent signs and
-    daggers."""
+    """Return text as one printable line, with no-break spaces before per cent signs and daggers."""
     return one_line(text).replace(" %", f"{NO_BREAK}%").replace(" †", f"{NO_BREAK}†")
 
 
 def visible_sections(study: Study) -> list[Section]:
-    """Return the sections of the page, without sections about single tasks if the tasks are many
-    random ones (individual tasks is empty)."""
+    """Return the sections of the page.
+
+    If the study has no individual tasks (only many random ones), sections about them are left out.
+    """
     return [section for section in SECTIONS if study.individual_tasks or not section.single]
 
 
@@ -263,29 +267,32 @@ def attempt(
     """Return ``make(*args)``, a part of a report, or None if it raises an exception.
 
     The error, with file and line, is then added to ``failures`` by the ``name`` of the part, unless
-    there is one already. A CoarticError passes through.
+    the part has an error already. A CoarticError is raised again.
     """
     try:
         return make(*args)
     except CoarticError:
         raise
     except Exception as error:
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{Path(place.filename).name}, line {place.lineno}"
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(frame.filename).name}, line {frame.lineno}"
         failures.setdefault(name, f"{error_line(error)} ({where})")
         return None
 
 
 def finding(study: Study, section: Section) -> list[str]:
-    """Return the finding of a section in words, a list of lines: its template ``sentence``, filled
-    in from its tables; an empty list if it has no sentence, or its first table no rows."""
+    """Return the finding of a section in words, as a list of lines.
+
+    The template ``sentence`` is filled in from the section's tables. The list is empty if the
+    section has no sentence, or its first table has no rows.
+    """
     if not section.sentence or not len(frame := section.tables[0](study)):
         return []
     methods = study.methods
     built_in = methods.index[methods.built_in.astype(bool)]
 
     def few(row: Mapping[str, Any]) -> str:
-        """Return why a difference of gaps is not tested: too few runs of a stochastic method."""
+        """Return the words that a stochastic method has too few runs to test, or none."""
         labels = {str(row["method"]), str(row["against"])}
         drawn = [
             runs_on(study, label, solved_tasks(study, str(row["against"]))) for label in labels
@@ -298,8 +305,8 @@ def finding(study: Study, section: Section) -> list[str]:
         return TOO_FEW if counts and min(counts) < FEWEST else ""
 
     def named(table: Table) -> pd.DataFrame:
-        every = table(study)
-        rows: pd.DataFrame = every[~is_setting(study, every)]
+        all_rows = table(study)
+        rows: pd.DataFrame = all_rows[~is_setting(study, all_rows)]
         return rows.assign(title=rows.method.map(methods.title), own=~rows.method.isin(built_in))
 
     rows, *others = map(named, section.tables)
@@ -320,8 +327,11 @@ def finding(study: Study, section: Section) -> list[str]:
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return rows of a table, each as a dict: the rows of the first two rows' methods, of the
-    paper's learner, of random search and of methods from files."""
+    """Return the rows of a table that a finding mentions, as dicts.
+
+    These are the rows of the methods in the first two rows, of the paper's learner, of random
+    search, and of methods from files.
+    """
     always = [joined_label(EC1, EC4), EC1, EC4, RANDOM_SEARCH]
     is_shown = rows.method.isin([*rows.method[:2], *always]) | rows.own
     return rows[is_shown].to_dict("records")
@@ -329,18 +339,29 @@ def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
 
 @lru_cache(maxsize=4)
 def limits(study: Study) -> dict[str, Any]:
-    """Return facts that limit conclusions from a study's runs, by name: numbers of ``runs`` and of
-    ``failed`` runs, and the commonest ``reasons``; titles of the individual tasks that
-    are ``reconstructed``, and whose best reward is ``unproven``, ``unknown`` or known from this
-    folder alone (``own``); numbers of ``trials`` of the learner other than the paper's; ``few``,
-    the fewest runs of the learner on a task, if fewer than the paper's; ``seed``; ``processor`` and
-    ``cores``; True for runs ``side_by_side`` and code that is ``dirty``; ``late``, all
-    :attr:`.Study.marks`; ``imports`` by method. 0, False or empty where a limit does not apply."""
+    """Return facts that limit the conclusions from a study's runs, by name.
+
+    A value is 0, False or empty if the limit does not apply.
+
+    - ``runs``, ``failed``: numbers of runs and of failed runs; ``reasons``: the most frequent ones;
+    - ``reconstructed``: titles of the individual tasks that are reconstructed;
+    - ``unproven``, ``unknown``, ``own``: titles of the individual tasks whose best reward is not
+      proven, is unknown, or is known only from this folder;
+    - ``trials``: numbers of trials of the learner that differ from the paper's;
+    - ``few``: smallest number of runs of the learner on a task, if it is below the paper's;
+    - ``seed``, ``processor``, ``cores``;
+    - ``side_by_side``: True if runs were made at the same time;
+    - ``dirty``: True if the code had changes that are not committed;
+    - ``late``: all :attr:`.Study.marks`;
+    - ``imports``: packages that methods import, by title of the method.
+    """
     runs, made_with = study.runs, study.made_with
     failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
     trials = {int(n) for n in runs[runs.label.map(algorithm) == "learner"].trials.dropna()}
-    fewest = min((len(of) for (_, label), of in study.cells.items() if papers[label]), default=RUNS)
+    fewest = min(
+        (len(cell) for (_, label), cell in study.cells.items() if papers[label]), default=RUNS
+    )
     tasks, optima = list(study.individual_tasks.values()), defaultdict[str, list[str]](list)
     for task in tasks:
         best = study.optima.get(task.name)
@@ -370,9 +391,11 @@ def limits(study: Study) -> dict[str, Any]:
 
 
 def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
-    """Return sentences for below a table with these columns: which best known rewards are not
-    proven (with column ``gap`` or ``optimum``), and which are known from this folder alone (with
-    ``gap``; :func:`limits`)."""
+    """Return the sentences that follow a table with these columns (:func:`limits`).
+
+    - With ``gap`` or ``optimum``: which best known rewards are not proven.
+    - With ``gap``: which best known rewards are known only from this folder.
+    """
     unproven, own, columns = limits(study)["unproven"], limits(study)["own"], set(columns)
     notes = []
     if unproven and columns & {"gap", "optimum"}:
