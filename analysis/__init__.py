@@ -47,8 +47,11 @@ _import, __dir__ = import_lazily(__name__, _MODULES)
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name when it is first used. Functions of :data:`_CHECKED` check the arguments that
-    users give them here; functions of the package call each other without these checks."""
+    """Import a name when it is first used.
+
+    Functions of :data:`_CHECKED` that are imported from here check their arguments. Functions of
+    the package call each other without these checks.
+    """
     value = _import(name)
     if name in _CHECKED:
         from coartic.internal.arguments import checked_arguments

@@ -1,6 +1,6 @@
 """Compare signatures of coarticulation with those of random search, their control.
 
-Selection by reward alone produces signatures of coarticulation. Therefore the signatures of a
+Selection by reward is enough to produce signatures of coarticulation. Therefore signatures of a
 method that selects its solution from trials are compared with those of random search
 (:mod:`coartic.baselines.random_search`), which is the paper's learner without its memory. The
 compared runs have
@@ -99,7 +99,7 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
 
 
 def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:
-    """Return the label of the random search that is the control of a method on a task.
+    """Return the label of the random search that controls a method on a task.
 
     It has the hand sequence ``hands`` (if ``hands`` is empty, it tries all hand sequences) and the
     same number of trials. The result is empty if there are no such runs.
@@ -157,12 +157,12 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
 
 @lru_cache(maxsize=4_096)
 def _most_trials(study: Study, task: str, label: str) -> float:
-    """Return the largest number of trials that a run of a method on a task made, or 0."""
+    """Return the most trials that a run of a method on a task made, or 0."""
     return float(study.cells[task, label].trials.fillna(0).max())
 
 
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
-    """Return how much larger a method's signature is than that of random search, a mean over runs.
+    """Return how much a method's signature exceeds that of random search, a mean over runs.
 
     Each run is compared with the mean of random search with the same hands (for signature ``hand``,
     with any hands), in the unit of the signature. Only runs count for which :func:`with_control`
@@ -213,7 +213,7 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 
 def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
-    """Yield the runs of a method on two tasks at each first goal that these tasks share.
+    """Yield a method's runs on two tasks at each first goal that these share.
 
     There is an item for each pair of tasks (:func:`.context_pairs`), shared goal, and hand that
     hits this goal on both tasks. Only the first 500 solved runs on each task count.

@@ -66,22 +66,22 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 
 
 def share_reached(times: RunningTimes) -> float:
-    """Return the share (0 to 1) of all pairs of run and target that are reached at any cost.
+    """Return the share of pairs of run and target that are reached at any cost.
 
-    All tasks have the same weight.
+    It is from 0 to 1. All tasks have the same weight.
     """
     return float(_pairs(times)[1].sum())
 
 
 def budget_for(times: RunningTimes, share: float) -> Estimate:
-    """Return the smallest budget within which a share of all pairs of run and target is reached.
+    """Return the smallest budget within which a share of the targets is reached.
 
     Parameters
     ----------
     times : sequence of arrays, shape (runs, targets)
         Running times on each task. All tasks have the same weight.
     share : float
-        Above 0, and up to 1.
+        Share of all pairs of run and target, above 0 and up to 1.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=4)
 def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
-    """Return the trials of each run that improved its best reward, and these rewards, by run id.
+    """Return the trials that improved the best reward, and these rewards, by run id.
 
     Runs without rewards of trials are left out. Trials are numbered from 1; rewards are negative
     ticks. Both arrays have shape ``(n,)``.

@@ -177,7 +177,7 @@ def isolated_reaches(
 
 
 def gain_at_next(runs: Solutions) -> Array:
-    """Return the ticks that the posture at each goal saves for the next goal, shape ``(n, G − 1)``.
+    """Return the ticks that postures save for the next goal, shape ``(n, G − 1)``.
 
     r(q', g + 1, h(i, g + 1)) − r(q'', g + 1, h(i, g + 1)),
 
@@ -194,7 +194,7 @@ def gain_at_next(runs: Solutions) -> Array:
     task, hands = runs.task, runs.hands
     goals = 1 + np.arange(len(task.goals))
     now, following = np.s_[:, :-1], np.s_[:, 1:]
-    alone, corrective = isolated_reaches(task, runs.starts[now], goals[:-1], hands[now])
+    isolated, corrective = isolated_reaches(task, runs.starts[now], goals[:-1], hands[now])
     idle = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
     for number, hand in enumerate(HANDS):
         idle[number, task.robot.joints(_other(hand))] = True
@@ -202,7 +202,7 @@ def gain_at_next(runs: Solutions) -> Array:
     after, nearer = (
         isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (corrective, hit)
     )
-    return np.where(np.isnan(alone), np.nan, after - nearer)
+    return np.where(np.isnan(isolated), np.nan, after - nearer)
 
 
 def ticks_slower(runs: Solutions) -> Array:
@@ -215,18 +215,20 @@ def ticks_slower(runs: Solutions) -> Array:
     goal alone. It is infinite if the reach with the chosen hand ends without a hit.
     """
     goals = 1 + np.arange(len(runs.task.goals))
-    alone = np.full((len(HANDS), *runs.hands.shape), np.inf)
+    isolated = np.full((len(HANDS), *runs.hands.shape), np.inf)
     for hand in map(HANDS.index, runs.task.hands):
         reached, _ = isolated_reaches(runs.task, runs.starts, goals, np.array(hand))
-        alone[hand] = np.where(np.isnan(reached), np.inf, reached)
-    chosen = np.take_along_axis(alone, runs.hands[None], axis=0)[0]
+        isolated[hand] = np.where(np.isnan(reached), np.inf, reached)
+    chosen = np.take_along_axis(isolated, runs.hands[None], axis=0)[0]
     slower: Array = np.full_like(chosen, np.inf)
-    np.subtract(chosen, alone.min(axis=0), out=slower, where=chosen < np.inf)
+    np.subtract(chosen, isolated.min(axis=0), out=slower, where=chosen < np.inf)
     return slower
 
 
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
-    """Return the share of the path to its next goal that the idle hand covers, shape ``(G,)``.
+    """Return how much of the path to its next goal the idle hand covers.
+
+    It is a share for each goal, shape ``(G,)``:
 
     (d_held(g) − d(g)) / d_initial(g),
 
@@ -281,10 +283,11 @@ class Signature:
 
 
 def hand(runs: Solutions) -> Array:
-    """Return the share of goals whose hand is not the fastest for that goal alone, shape ``(n,)``.
+    """Return the share of goals that are not hit with their fastest hand, shape ``(n,)``.
 
-    It is 1 − mean over g < G of a(i, g) of :func:`as_in_isolation`: the last goal does not count.
-    NaN on a task for one hand or with one goal.
+    The fastest hand is that for the goal alone. The share is 1 − mean over g < G of a(i, g) of
+    :func:`as_in_isolation`: the last goal does not count. NaN on a task for one hand or with one
+    goal.
     """
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
@@ -303,12 +306,12 @@ def as_in_isolation(runs: Solutions) -> Array:
 
 
 def other_arm(runs: Solutions) -> Array:
-    """Return the share of the path to its next goal that the idle hand covers, shape ``(n,)``.
+    """Return how much of the path to its next goal the idle hand covers.
 
-    It is the mean of :func:`preshaping` over the goals for which this is not NaN, and negative if
-    the idle hand moves away on average. It is NaN on a task for one hand or without an initial
-    solution (:func:`initial_solution`), and for a run in which :func:`preshaping` is NaN for all
-    goals.
+    It is a share for each run, shape ``(n,)``: the mean of :func:`preshaping` over the goals for
+    which this is not NaN, and negative if the idle hand moves away on average. It is NaN on a task
+    for one hand or without an initial solution (:func:`initial_solution`), and for a run in which
+    :func:`preshaping` is NaN for all goals.
     """
     initial = initial_solution(runs.task)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:
@@ -320,10 +323,11 @@ def other_arm(runs: Solutions) -> Array:
 
 
 def arm(runs: Solutions) -> Array:
-    """Return the ticks that postures of base and chosen arm save for the next goal, shape ``(n,)``.
+    """Return the ticks that postures save for the next goal, a mean over goals.
 
-    It is the mean of :func:`gain_at_next` over goals g < G. It is NaN on a task with one goal, and
-    if one of these gains is NaN.
+    Postures are those of base and chosen arm. The result has shape ``(n,)``: the mean of
+    :func:`gain_at_next` over goals g < G. It is NaN on a task with one goal, and if one of these
+    gains is NaN.
     """
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
@@ -589,7 +593,7 @@ FEWEST_RUNS = 5
 
 
 class Lean(NamedTuple):
-    """Lean of postures at a shared goal towards the next posture, as shares of the path to it."""
+    """Lean of postures at a shared goal, as shares of the path to the next posture."""
 
     more: Estimate
     """Lean at the goal less lean at the start, with its interval for other runs. ``n`` are the
@@ -611,7 +615,7 @@ def lean(
     deterministic: bool = False,
     resamples: Resamples = FEWER_RESAMPLES,
 ) -> Lean:
-    """Return the share of the path to the next posture that is already covered at a shared goal.
+    """Return how much of the path to the next posture is covered at a shared goal.
 
     The lean of contexts A and B is
 
@@ -750,7 +754,7 @@ def _postures(runs: Numbers) -> Array:
 
 
 def _variance_of_mean(values: Array) -> float:
-    """Return the sum of the variances of the k means of values, shape ``(n, k)``; 0 if n is 1."""
+    """Return the summed variance of the means of ``(n, k)`` values; 0 if n is 1."""
     if len(values) < 2:
         return 0.0
     return float(centred(values).var(axis=0, ddof=1).sum()) / len(values)
@@ -775,10 +779,11 @@ It mixes length unit and rad."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
-    """Return the pairs of tasks that share their first goals, and the number n of these goals.
+    """Return the pairs of tasks that share first goals, and how many they share.
 
-    n counts the shared first goals that are followed by another goal in both tasks. A pair is left
-    out if n is 0, if all goals are equal, or if robot, start, radius, hands or locked base differ.
+    The number n counts the shared first goals that are followed by another goal in both tasks. A
+    pair is left out if n is 0, if all goals are equal, or if robot, start, radius, hands or locked
+    base differ.
 
     Returns
     -------

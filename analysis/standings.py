@@ -1,6 +1,7 @@
-"""The ranking of a study: who solved all tasks that were asked for, and why others are not ranked.
+"""Rank the methods of a study, and say why some are not ranked.
 
-Searches for the optimum are references and are not ranked.
+A method is ranked if it solved all tasks that were asked for. Searches for the optimum are
+references and are not ranked.
 """
 
 from __future__ import annotations
@@ -80,7 +81,7 @@ def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
 
 @lru_cache(maxsize=4)
 def ranked_tasks(study: Study) -> tuple[str, ...]:
-    """Return the names of the tasks on which methods are ranked, in the order of the study.
+    """Return the tasks on which methods are ranked, in the order of the study.
 
     These are all tasks that have a best known reward and on which runs were asked for.
     """
@@ -141,11 +142,11 @@ def standings(study: Study) -> pd.DataFrame:
             f"{listed(map(number, asked))} trials, not {number(budget or 0)}" if is_other else ""
         )
         reasons.append("; ".join(filter(None, [row.why, trials])))
-        made, due = int(of_method.trials.fillna(0).max()), max([*asked, budget or 0])
-        is_told = not row.built_in and row.information == BY_TRIAL and due and made != due
+        most_trials, due = int(of_method.trials.fillna(0).max()), max([*asked, budget or 0])
+        is_told = not row.built_in and row.information == BY_TRIAL and due and most_trials != due
         fragile = int((of_method.reward.notna() & of_method.noisy_ticks.isna()).sum())
         note = [
-            f"made {number(made)} of {number(due)} trials" * bool(is_told),
+            f"made {number(most_trials)} of {number(due)} trials" * bool(is_told),
             f"{fragile} of {counted(len(of_method), 'solution')} can fail with motor noise"
             * bool(fragile),
         ]

@@ -424,7 +424,7 @@ class Study:
         return solved_runs
 
     def configurations(self, task: str, method: str, *, replay: bool = False) -> Array:
-        """Return the postures in which the solved runs of a method hit the goals of a task.
+        """Return the postures in which a method's solved runs hit the goals of a task.
 
         Parameters
         ----------

@@ -133,10 +133,10 @@ class Column(NamedTuple):
 
 
 def _column_of(line: str) -> Column:
-    """Return the column that a line describes, such as ``gap[] | gap (%) | 1 | tex``.
+    """Return the column that a line describes.
 
-    The parts are the name with its ending (:class:`Column`), heading, decimals and ``tex``. The
-    last parts can be left out.
+    The parts of a line, such as ``gap[] | gap (%) | 1 | tex``, are the name with its ending
+    (:class:`Column`), heading, decimals and ``tex``. The last parts can be left out.
     """
     name, heading, digits, tex = (*map(str.strip, line.split("|")), "", "", "")[:4]
     ending = next((ending for ending in ("[]", "±", "[*]", "*") if name.endswith(ending)), "")
@@ -925,12 +925,12 @@ def list_runtimes(study: Study) -> Rows:
     """,
 )
 def list_learning(study: Study) -> Rows:
-    """Yield the best reward of each method after 100, 1000 and 10 000 trials, a mean over runs.
+    """Yield the best reward of each method after some numbers of trials.
 
     There is a row for each individual task and each method, except searches, if all of its runs on
-    the task have a solution and made at least 100 trials. Rewards are negative ticks, after each
-    number of trials in :data:`BUDGETS`. A reward is NaN if not all runs made so many trials, or a
-    run had no solution by then.
+    the task have a solution and made at least 100 trials. Rewards are means over runs, negative
+    ticks, after each number of trials in :data:`BUDGETS`. A reward is NaN if not all runs made so
+    many trials, or a run had no solution by then.
     """
     learned = improvements(study)
     for (task, label), runs in study.cells.items():

@@ -70,9 +70,11 @@ from coartic.tasks.task import shipped_tasks
 
 
 def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
-    """Draw the gap against the values of the only parameter that is varied (:attr:`.Study.varied`),
-    or else, also with fewer than two gaps of values, gaps of ranked methods; None without a gap.
-    ``how``: see :data:`.DrawsFigure`."""
+    """Draw the gap of each ranked method, or by value if the study varies one parameter.
+
+    If fewer than two values of the parameter (:attr:`.Study.varied`) have a gap, the gaps of ranked
+    methods are drawn. Returns None if no method has a gap. For ``how`` see :data:`.DrawsFigure`.
+    """
     plot = _draw_varied(study, **how) or _draw_gaps(study, **how)
     return plot and replace(plot, id="ranking")
 
@@ -84,8 +86,10 @@ def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
     "varied. n = {n} runs of a value.",
 )
 def _draw_varied(study: Study) -> Parts | None:
-    """Draw gaps against the values of the only parameter that is varied; None with fewer than two
-    values that have a gap."""
+    """Draw gaps against the values of the parameter that the study varies.
+
+    Returns None if fewer than two values have a gap.
+    """
     name, values = study.varied
     rows = standings(study).query("why == ''")
     rows = rows.loc[[label for label in values if label in rows.index]]
@@ -105,10 +109,10 @@ def _draw_varied(study: Study) -> Parts | None:
     mean: Any = {"color": style.BLUE, "marker": "o", "markersize": 5, "linewidth": 1.6}
     shown = rows.assign(place=places)
     tasks = ranked_tasks(study)
-    on = [runs_on(study, method, tasks).groupby("task").gap.mean() for method in rows.method]
+    gaps_on = [runs_on(study, method, tasks).groupby("task").gap.mean() for method in rows.method]
     each_task = tasks if 1 < len(tasks) <= 8 else ()
     for task in each_task:
-        gaps = [100 * each[task] for each in on]
+        gaps = [100 * by_task[task] for by_task in gaps_on]
         axes.plot(places, gaps, color=style.GREY, linewidth=0.8)
         at: Any = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
         axes.annotate(marked(study.tasks[task]), (places[-1], gaps[-1]), color=style.GREY, **at)
@@ -133,8 +137,12 @@ _FEW: Any = {"markersize": 3, "alpha": 0.6}
 
 
 def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
-    """Return the gaps (%) of the runs of a ranked method, each a mean over tasks of the runs with
-    one number, if they are too few for an interval; an empty list for enough or for one run."""
+    """Return the gaps (%) of runs that are too few for an interval.
+
+    The runs are those of a ranked method. A gap is a mean over tasks of the runs with the same
+    number. The list is empty if the runs
+    are enough for an interval, or there is only one run.
+    """
     runs = runs_on(study, str(row["method"]), ranked_tasks(study))
     gaps = 100 * runs.groupby("run").gap.mean()
     return list(gaps) if 1 < runs.groupby("task").size().min() < FEWEST else []
@@ -146,8 +154,10 @@ def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
     f"{style.COVERAGE} bootstrap interval over runs. The axis is logarithmic from 0.1 % on.",
 )
 def _draw_gaps(study: Study) -> Parts | None:
-    """Draw the gap of each ranked method, a mean over tasks, with interval and name, without
-    settings whose method is there; None if no method is ranked."""
+    """Draw the gap of each ranked method, a mean over tasks, with its interval.
+
+    Settings of methods that are drawn are left out. Returns None if no method is ranked.
+    """
     rows, tasks = standings(study).query("why == ''"), ranked_tasks(study)
     rows = without_settings(rows).reset_index(names="method")
     if not len(rows):
@@ -176,7 +186,7 @@ def _draw_gaps(study: Study) -> Parts | None:
     axes.set_xlim(left, 1.1 * farthest)
     axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
     axes.axvline(0, **style.OPTIMUM)
-    # In a narrow figure headings, which are longer than names, stand on the right.
+    # Headings are longer than names. In a narrow figure they are on the right.
     style.name_rows(axes, [name * (isinstance(line, dict) or not narrow)
                            for name, line in zip(names, lines, strict=True)])  # fmt: skip
     places: Any = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
@@ -195,7 +205,7 @@ def _draw_gaps(study: Study) -> Parts | None:
                 axes.annotate(row, (0, -place), (2, 0), color=style.GREY, **places)
             continue
         learner, y = row["is_learner"], -place
-        size = looks[row["method"]]["markersize"] + learner  # a diamond of equal width is smaller
+        size = looks[row["method"]]["markersize"] + learner  # diamonds look smaller
         look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
         axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
         of_runs = _gaps_of_few_runs(study, row)
@@ -231,10 +241,14 @@ ALONE = KNOWN_METHODS["corrective-alone/given"].algorithm
     "n = {n} runs.",
 )
 def draw_saved(study: Study) -> Parts | None:
-    """Draw for each task a row for each of some methods (the learner that explores most, random
-    search, the best of each kind that uses the reward, methods from files), the smallest mean gap
-    first. A row has a bar for each goal: mean ticks of the runs less the ticks of the corrective
-    process alone with the same hands. None if there is nothing to draw."""
+    """Draw how many ticks more than the corrective process methods take for each goal.
+
+    There is a panel for each task, with a row for each of these methods, the smallest mean gap
+    first: the learner that explores most, random search, the best method of each kind that uses the
+    reward, and methods from files. A row has a bar for each goal: mean ticks of the runs less the
+    ticks of the corrective process alone with the same hands. Returns None if there is nothing to
+    draw.
+    """
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
     drawn, parts = {*headline_methods(single)}, []
@@ -243,12 +257,12 @@ def draw_saved(study: Study) -> Parts | None:
             solved(study.cells[cell]).gap.mean()
             for cell in zip(part.task, part.method, strict=True)
         ]
-        part = part.assign(gap=gaps, use=[methods.information[each] for each in part.method])
+        part = part.assign(gap=gaps, use=[methods.information[label] for label in part.method])
         part = part.sort_values("gap")
         best = part.drop_duplicates("use").method[part.use != WITHOUT_REWARD]
-        learners = [each for each in LEARNERS if each in {*part.method}]
-        kept = {*best, RANDOM_SEARCH, *learners[-1:], *single.index[~single.built_in.astype(bool)]}
-        part = part[part.method.isin(kept)]
+        learners = [learner for learner in LEARNERS if learner in {*part.method}]
+        own = single.index[~single.built_in.astype(bool)]
+        part = part[part.method.isin({*best, RANDOM_SEARCH, *learners[-1:], *own})]
         if len(part):
             parts.append(part)
     if not parts:
@@ -289,8 +303,11 @@ def draw_saved(study: Study) -> Parts | None:
     "thin: every run. Dashed arrows lead to the next goal. The bar is one length unit.",
 )
 def draw_postures(study: Study) -> Parts | None:
-    """Draw the postures of the method of :func:`shared_goal` at this goal on both tasks, and the
-    postures of random search, its control, if it has one; None without a shared goal."""
+    """Draw the postures of a method at the goal of :func:`shared_goal` on both tasks.
+
+    If the method has random search as its control, its postures are drawn as well. Returns None if
+    there is no shared goal.
+    """
     shared = shared_goal(study)
     if shared is None:
         return None
@@ -299,12 +316,12 @@ def draw_postures(study: Study) -> Parts | None:
     size = (style.ONE, style.TWO)[len(contexts) - 1], 2.0
     drawing, panels = style.panels((1, len(contexts)), size, sharex=True, sharey=True)
     parts, differences = [], []
-    for axes, each in zip(panels, contexts, strict=True):
-        title = study.methods.title[each.method]
-        difference = number(each.posture_difference, 2)
-        axes.set_title(f"{name_in_figure(study, each.method)}: difference {difference}")
-        parts += _draw_contexts(axes, each)
-        differences.append(f"{title} {each.posture_difference:.2f}")
+    for axes, context in zip(panels, contexts, strict=True):
+        title = study.methods.title[context.method]
+        difference = number(context.posture_difference, 2)
+        axes.set_title(f"{name_in_figure(study, context.method)}: difference {difference}")
+        parts += _draw_contexts(axes, context)
+        differences.append(f"{title} {context.posture_difference:.2f}")
     hands = [shared.tasks[0].robot.forward_kinematics(runs.mean(axis=0), shared.hand)
              for runs in shared.configurations]  # fmt: skip
     first, second = (task.label for task in shared.tasks)
@@ -333,9 +350,11 @@ DOTS = {
     f"the next goal. Lines: {style.COVERAGE} bootstrap intervals over runs, from five runs on.",
 )
 def draw_shared_goal(study: Study) -> Parts | None:
-    """Draw the posture difference and the lean of each method at the goal of :func:`shared_goal`,
-    a panel each, without settings whose method is there; random search, if it is there, is a
-    vertical line, too. None without a shared goal."""
+    """Draw the posture difference and the lean of each method at the goal of :func:`shared_goal`.
+
+    Each has a panel. Settings of methods that are drawn are left out. Random search, if there is
+    one, is also a vertical line. Returns None if there is no shared goal.
+    """
     shared = shared_goal(study)
     if shared is None:
         return None
@@ -366,9 +385,11 @@ def draw_shared_goal(study: Study) -> Parts | None:
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
-    """Draw the postures of runs at a shared goal, runs thin and their mean on each task thick;
-    return two frames, one for each task, with a row for each run: ``task``, ``method``, ``goal``,
-    ``hand`` and the posture, a column for each of its entries."""
+    """Draw the postures of runs at a shared goal, and their mean on each task.
+
+    Returns a frame for each task, with a row for each run: ``task``, ``method``, ``goal``, ``hand``
+    and a column for each coordinate of the posture.
+    """
     axes.set_axis_off()
     axes.set_aspect("equal")
     robot, radius = shared.tasks[0].robot, shared.tasks[0].radius
@@ -398,7 +419,7 @@ def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
         axes.add_artist(Circle(following, radius, fill=False, edgecolor=color))
         then = f"then goal {shared.goal + 1}\n({marked(task)})"
         axes.annotate(then, following, (5, 0), va="center", ha="left", **words)
-        # The base's name stands on the side of the next goal.
+        # The base's name is on the side of the next goal.
         x, y = outlines[place].T
         end, off, side = (y.max(), 3, "bottom") if following[1] >= at[1] else (y.min(), -3, "top")
         name = f"base,\n{marked(task)}"
@@ -416,7 +437,7 @@ def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
 
 
 PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluations"}
-"""Costs with a panel in the figure, and the labels of their axes."""
+"""Costs that have a panel in the figure, with the labels of their axes."""
 
 
 @figure(
@@ -427,13 +448,16 @@ PANELS = {"trials": "trials", "forward_kinematics": "forward-kinematics evaluati
     f"trials. Bands: {style.COVERAGE} bootstrap intervals over runs. n = {{n}} runs of a method.",
 )
 def draw_runtimes(study: Study) -> Parts | None:
-    """Draw the share of targets that methods reach within a number of trials, and of
-    forward-kinematics evaluations, a panel each, or only one if the other has no curve; None
-    without a curve.
+    """Draw the share of targets that methods reach within a budget.
 
-    Among :func:`.headline_methods`, without the corrective process alone, curves are for methods
-    that use the reward of each trial, for methods from files, and for the method that reaches most
-    targets without using the reward of each trial.
+    Budgets are numbers of trials and of forward-kinematics evaluations, each in its own panel. A
+    panel without a curve is left out. Returns None if there is no curve.
+
+    Of :func:`.headline_methods`, except the corrective process alone, there are curves for
+
+    - methods that use the reward of each trial;
+    - methods from files;
+    - of the other methods, the one that reaches most targets.
     """
     if not len(tabled := list_runtimes(study)):
         return None
@@ -450,7 +474,7 @@ def draw_runtimes(study: Study) -> Parts | None:
         return None
     steps = []
     for (label, spend), curve in data.groupby(["method", "spend"], sort=False):
-        # No more than are seen.
+        # More points could not be seen.
         curve = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 100).round()).astype(int)]
         runs = runs_with_targets(study)[str(label)]
         times = times_on_tasks(study, runs, str(spend))
@@ -466,7 +490,7 @@ def draw_runtimes(study: Study) -> Parts | None:
         style.log_axis(axes)
         of_spend = data[data.spend == spend]
         edge, most = of_spend.budget.min() / 1.5, of_spend.budget.max()
-        most = max(most, 10 ** round(math.log10(most)))  # with the number at the end
+        most = max(most, 10 ** round(math.log10(most)))  # so that the axis ends at a number
         axes.axhline(50, color=style.GREY, linewidth=0.5)
         for label, rows in of_spend.groupby("method", sort=False):
             x = np.append(rows.budget, most)
@@ -508,7 +532,7 @@ def draw_runtimes(study: Study) -> Parts | None:
 
 
 CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
-"""Built-in methods with learning curves; all methods from files with trials have them, too."""
+"""Built-in methods with learning curves. All methods from files with trials also have them."""
 
 
 @figure(
@@ -516,8 +540,10 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
     "Best reward so far (mean over runs; band: quartiles). n = {n} runs of a method on a task.",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
-    """Draw :func:`learning_curves`, the best reward so far against the trial, a panel for each
-    task; None without a curve."""
+    """Draw the best reward so far against the trial, a panel for each task.
+
+    Curves are those of :func:`learning_curves`. Returns None if there is no curve.
+    """
     data = learning_curves(study)
     if not len(data):
         return None
@@ -544,7 +570,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
         if optimum is not None:
             axes.axhline(optimum.reward, **style.OPTIMUM)
             top = max(top, optimum.reward)
-        reach = max(top - floor, 1.0)  # tick; nothing learned and no optimum
+        reach = max(top - floor, 1.0)  # 1 tick, if nothing is learned and no optimum is known
         axes.set_ylim(floor - 0.04 * reach, top + 0.06 * reach)
         style.log_axis(axes)
         axes.set_xlim(1, max(2, of_task.trial.max()))
@@ -570,18 +596,25 @@ def draw_learning_curves(study: Study) -> Parts | None:
 def learning_curves(study: Study) -> pd.DataFrame:
     """Return the best reward so far, negative ticks, by task, method and number of trials.
 
-    Runs count that are solved and have rewards of trials, on individual tasks. Methods
-    are the :func:`.headline_methods` among :data:`CURVES` and methods from files of users; EC1 has
-    a curve only on tasks without such runs of EC2 to EC4. Columns: ``task``, ``method`` (label),
-    ``runs`` (number of runs), ``trial`` (at most 120 numbers, from 1 to the trials of the shortest
-    run), ``best`` (mean over runs, NaN until all have a solution), quartiles ``best_low`` and
-    ``best_high``. Without any curve the frame is empty and has no columns.
+    Only solved runs on individual tasks with rewards of trials count. Methods are the
+    :func:`.headline_methods` among :data:`CURVES` and methods from files. EC1 has a curve only on
+    tasks without such runs of EC2 to EC4.
+
+    Returns
+    -------
+    DataFrame
+        If there are no curves, it is empty and has no columns. Otherwise its columns are
+
+        - ``task``, ``method`` (label), and ``runs`` (number of runs);
+        - ``trial``: at most 120 numbers, from 1 to the trials of the shortest run;
+        - ``best``: mean over runs, NaN until all runs have a solution;
+        - ``best_low`` and ``best_high``: quartiles.
     """
     learned, curves = improvements(study), [pd.DataFrame()]
     cells = {
         (task, label): runs
-        for (task, label), every in study.cells.items()
-        if task in study.individual_tasks and len(runs := solved(every[every.run_id.isin(learned)]))
+        for (task, label), cell in study.cells.items()
+        if task in study.individual_tasks and len(runs := solved(cell[cell.run_id.isin(learned)]))
     }
     rows = study.methods[study.methods.index.isin([label for _, label in cells])]
     drawn = headline_methods(rows[rows.base.isin(CURVES) | ~rows.built_in])
@@ -591,7 +624,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
             continue
         runs = cells[task, label]
         at = np.unique(np.round(np.geomspace(1, int(runs.trials.min()), 120)).astype(np.int64))
-        # Until every run has a solution (NaN before) there is no mean of them.
+        # Rewards are NaN until a run has a solution, and the mean is NaN until all runs have one.
         best = np.array([best_after(learned[run_id], at) for run_id in runs.run_id])
         if np.isnan(best).any(axis=0).all():
             continue
@@ -610,9 +643,12 @@ def learning_curves(study: Study) -> pd.DataFrame:
     "runs), for methods that solved every run.",
 )
 def draw_gaps_by_family(study: Study) -> Parts | None:
-    """Draw the gap to the best known reward, mean over runs, of each instance that a method solved
-    in every run, a panel for each family and a row for each method, without settings whose method
-    is there; None without such runs."""
+    """Draw the gap to the best known reward of each instance, by family and method.
+
+    There is a panel for each family and a row for each method. A dot is the mean over runs on an
+    instance that the method solved in all runs. Settings of methods that are drawn are left out.
+    Returns None if there is nothing to draw.
+    """
     runs, rows = on_instances(study), study.methods
     methods = without_settings(rows[rows.index.isin(runs.method)])
     runs = runs[runs.method.isin(methods.index)]
@@ -654,8 +690,8 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
         label.set_fontweight("normal" if methods.built_in[method] else "bold")
     panels[len(panels) // 2].set_xlabel(f"gap to the {reference(study, study.optima)} (%)")
     style.letters(panels)
-    first = data.drop_duplicates(["method", "family"]).dropna(subset="mean")
-    means = spoken(study, first, "{title}, {family}: {mean:.1%}")
+    rows_with_mean = data.drop_duplicates(["method", "family"]).dropna(subset="mean")
+    means = spoken(study, rows_with_mean, "{title}, {family}: {mean:.1%}")
     words = f" {means}." if means else ""
     alt = f"Gaps of instances by method and family.{words}"
     return drawing, data, alt, " Gaps above 100 % stand at the right end." * any(data.gap > 1)
@@ -667,8 +703,10 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     "hit in the order of their numbers.",
 )
 def draw_tasks(study: Study) -> Parts | None:
-    """Draw start configuration and goals of the individual tasks, a panel each; None
-    without such tasks."""
+    """Draw the start configuration and the goals of each individual task, a panel for each.
+
+    Returns None if there are no individual tasks.
+    """
     shown = list(study.individual_tasks.values())
     if not shown:
         return None
@@ -689,7 +727,7 @@ def draw_tasks(study: Study) -> Parts | None:
 
 @style.styled
 def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
-    """Return a figure with start configuration and goals of some tasks, a panel for each."""
+    """Return a figure with the start configuration and the goals of tasks, a panel for each."""
     tasks = titled_apart(tasks)
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
@@ -705,10 +743,10 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     if style.is_narrow():
         size = style.ONE, size[1] * style.ONE / size[0] + 0.45 * rows
     drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
-    drawing.set_layout_engine("compressed")  # else a title can stand beyond the edge
+    drawing.set_layout_engine("compressed")  # otherwise a title can extend beyond the edge
     for place, (axes, task, corners) in enumerate(zip(panels, tasks, boxes, strict=True)):
         draw_robot(axes, task, task.q0)
-        if len(task.hands) > 1:  # what shows of an arm under the other one
+        if len(task.hands) > 1:  # the part of an arm under the other one that can be seen
             left = task.robot.joint_positions(task.q0, "left").T
             axes.plot(*left, color=style.GREY, alpha=0.5, linewidth=3.2, zorder=1.7)
         circle_goals(axes, task)
@@ -725,7 +763,7 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
         if not style.is_narrow() or place + columns >= len(tasks):
             axes.set_xlabel("x (length unit)")
         axes.set_ylabel("y (length unit)")
-    room = 12 if style.is_narrow() else None  # numbers of goals stand in between
+    room = 12 if style.is_narrow() else None  # leaves room for numbers of goals
     style.letters(panels if len(tasks) > 1 else (), pad=room)
     hands = {hand for task in tasks for hand in task.hands}
     arms = [

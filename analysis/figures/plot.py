@@ -1,4 +1,4 @@
-"""Figures with their words and numbers, and their files."""
+"""Make figures with their words and numbers, and write them to files."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ from coartic.internal.text import one_line
 from coartic.internal.threads import environment
 
 FORMATS = (".svg", ".pdf", ".png")
-_LONGEST_NAME = 48  # letters of a line with a name; half of it in a narrow figure
-_NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # whatever the user has there: no date is written
+_LONGEST_NAME = 48  # most letters of a line of a name; half of it in a narrow figure
+_NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # replaces the user's value, so that no date is written
 
 
 @dataclass(frozen=True)
@@ -41,18 +41,20 @@ class Plot:
     """A figure with its words and numbers."""
 
     id: str
-    """Name of the figure's files, without an ending."""
+    """Name of the figure's files without suffix."""
     title: str
     caption: str
     alt: str
-    """Alternative text, a description for people who cannot see the figure."""
+    """Alternative text: a description for people who cannot see the figure."""
     figure: Figure
     data: pd.DataFrame
-    """Drawn numbers as a tidy frame."""
+    """The numbers that are drawn, as a tidy frame."""
 
     def save(self, path: str | Path) -> None:
-        """Write the picture into a file ``.svg``, ``.pdf`` or ``.png``, over an earlier one. Raises
-        CoarticError for another ending, and if the file cannot be written."""
+        """Write the picture into a file ``.svg``, ``.pdf`` or ``.png``, or replace the file.
+
+        Raises CoarticError for another suffix, and if the file cannot be written.
+        """
         path = Path(path)
         with errors_in_words(path):
             path.write_bytes(picture(self.figure, path.suffix))
@@ -64,24 +66,28 @@ class Plot:
 
 
 Parts = tuple[Figure, pd.DataFrame, str, str]
-"""Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and the end of its
-caption, sentences on what only some of these figures show."""
+"""Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and further sentences of
+the caption, about what this figure shows but others of its kind need not."""
 DrawsFigure = Callable[..., Plot | None]
-"""A figure of the report, as a function of a study; None if the folder has no runs for it.
+"""Function of a study that draws a figure of the report, or returns None if the folder has no runs
+for it.
 
-Further arguments: ``width``, inches, such as 3.4, 5.5 or 7.2; ``style``: settings of Matplotlib
-that count more than the project's, in a form of ``matplotlib.style.use``.
+Further arguments: ``width`` in inches, such as 3.4, 5.5 or 7.2; ``style``: settings of Matplotlib,
+as ``matplotlib.style.use`` accepts them, that override the project's.
 """
 
 
 def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
-    """Return a decorator that turns a drawing function of a study into a figure of the report.
+    """Return a decorator that makes a figure of the report from a drawing function.
 
-    The figure is in the style of all figures; its id is the function's name behind the first
-    underscore, with dashes for other underscores. The caption gets the sentences that the function
-    returns, and an explanation of the dagger if one is drawn; ``{n}`` in it is the range of column
-    ``runs`` of the drawn numbers, empty without this column, ``{reference}`` the name of the
-    rewards to which gaps are taken.
+    - The figure has the style of all figures.
+    - Its id is the part of the function's name after the first underscore, with dashes for
+      underscores.
+    - The caption is followed by the sentences that the function returns, and by an explanation of
+      the dagger if one is drawn.
+    - In the caption ``{n}`` stands for the range of column ``runs`` of the drawn numbers (empty if
+      there is no such column), and ``{reference}`` for the name of the rewards from which gaps are
+      measured.
     """
 
     def as_figure(draw: Callable[[Study], Parts | None]) -> DrawsFigure:
@@ -108,8 +114,11 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 
 
 def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
-    """Return the look of the lines and marks of methods by label, the same in all figures of a
-    study; methods from files have wider lines and larger marks."""
+    """Return the looks of the lines and markers of methods, by label.
+
+    They are the same in all figures of a study. Methods from files have wider lines and larger
+    markers.
+    """
     looks: dict[str, style.Look] = {}
     for label, row in study.methods.loc[[*labels]].iterrows():
         color, mark = row.look
@@ -117,49 +126,59 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
         looks[str(label)] = {
             "color": COLORS[color], "marker": MARKS[mark][0], "linestyle": MARKS[mark][1],
             "linewidth": width, "markersize": size, "markeredgewidth": 0,
-            "markevery": 0.2,  # a mark at every fifth of the diagonal
+            "markevery": 0.2,  # a marker at each fifth of the diagonal
         }  # fmt: skip
     return looks
 
 
 def name_in_figure(study: Study, method: str) -> str:
-    """Return the name of a method, given by label, in the figure that is being drawn: its title, in
-    a narrow figure its short name; a long name on several lines."""
+    """Return the name of a method (a label) for the figure that is being drawn.
+
+    It is the method's title, or its short name in a narrow figure. A long name has several lines.
+    """
     if style.is_narrow():
         return "\n".join(textwrap.wrap(study.methods.short[method], _LONGEST_NAME // 2))
     return "\n".join(textwrap.wrap(study.methods.title[method], _LONGEST_NAME))
 
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
-    """Return the rows in words, for an alternative text: the template filled in for each row,
-    joined by ``; ``. Names in ``{}`` are columns, ``{title}`` is the title of the method whose
-    label is in column ``method``."""
+    """Return rows in words, for an alternative text.
+
+    The template is filled in for each row, and the results are joined by ``; ``. Names in ``{}``
+    are columns; ``{title}`` is the title of the method whose label is in column ``method``.
+    """
     rows = rows.assign(title=rows.method.map(study.methods.title))
     return "; ".join(template.format_map(row) for row in rows.to_dict("records"))
 
 
 def picture(drawing: Figure, ending: str) -> bytes:
-    """Return a figure as the bytes of a file with this ending, one of :data:`FORMATS`.
+    """Return a figure as the bytes of a file with this suffix, one of :data:`FORMATS`.
 
-    Equal figures give equal bytes with equal fonts and an equal version of Matplotlib, which SVG
-    and PDF name: ids of SVG do not depend on chance, and no date is written. Raises CoarticError
-    for another ending.
+    The same figure gives the same bytes, if the fonts and the version of Matplotlib, which SVG and
+    PDF name, are the same: ids in SVG are not random, and no date is written. Raises CoarticError
+    for another suffix.
     """
     if ending not in FORMATS:
-        raise CoarticError(f"a picture ends in {', '.join(FORMATS)}; not in {brief_value(ending)}")
+        raise CoarticError(
+            f"the name of a picture must end in one of {', '.join(FORMATS)}, not in "
+            f"{brief_value(ending)}"
+        )
     dated = {".pdf": "CreationDate", ".svg": "Date", ".png": "Software"}[ending]
     return _saved(drawing, style.RC, format=ending[1:], dpi=300, metadata={dated: None})
 
 
 def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
-    """Return a figure as the bytes of a file, made by ``Figure.savefig`` with the arguments ``how``
-    and with ``settings`` of Matplotlib (rcParams). Parts of the figure are laid out only once."""
+    """Return a figure as the bytes of a file, and keep its layout engine.
+
+    ``settings`` are rcParams of Matplotlib; ``how`` are arguments of ``Figure.savefig``. Parts of
+    the figure are laid out only once.
+    """
     stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
     canvas = drawing.canvas
     try:
         with rc_context(settings), environment(_NO_DATE):
             if layout is not None:
-                FigureCanvasSVG(drawing)  # its fonts are measured
+                FigureCanvasSVG(drawing)  # measures its fonts
                 layout.execute(drawing)
                 drawing.set(layout_engine=None, dpi=dpi)
             drawing.savefig(stream, **how)
@@ -172,11 +191,13 @@ def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
 def for_page(plot: Plot) -> str:
     """Return a figure as one ``<svg>`` element for a page of HTML.
 
-    The element scales with its container, its background is transparent and its ink is the page's
-    ``currentColor``; open marks are filled with the custom property ``--paper`` where the page has
-    it. Grey is ``--grey``, blue ``--blue``, and colours of methods have their names. Marks
-    with a :func:`~.style.tip` show its text. Ids begin with the plot's id, so that several figures
-    can share a page. Every ``style`` attribute becomes a class, named by a hash of the style.
+    - The element scales with its container and has a transparent background.
+    - Ink is the page's ``currentColor``. Open markers are filled with the custom property
+      ``--paper``, if the page has it. Grey is ``--grey``, blue ``--blue``, and colours of methods
+      have their names.
+    - Marks with a :func:`~.style.tip` show its text.
+    - Ids begin with the plot's id, so that a page can have several figures.
+    - Each ``style`` attribute becomes a class, named by a hash of the style.
     """
 
     def shorten(attribute: re.Match[str]) -> str:  # lengths to tenths of a point
@@ -189,9 +210,9 @@ def for_page(plot: Plot) -> str:
     text = re.sub(r'\b(?:d|x|y|transform)="[^"]*"', shorten, text)
     text = re.sub(r"\n\s*", "\n", text[text.index("<svg") :])
     text = re.sub(rf' id=(["\']){style.TIP}(.*?)\1>', r"><title>\2</title>", text)
-    text = re.sub(r' id="[\w.]+_\d+"', "", text)  # of elements that nothing refers to
+    text = re.sub(r' id="[\w.]+_\d+"', "", text)  # nothing refers to these elements
     text = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{plot.id}-", text)
-    # The backend leaves black fills out: they inherit the root's.
+    # The backend does not write black fills, so they inherit the fill of the root.
     text = text.replace(style.INK, "currentColor").replace(style.BACKGROUND, "var(--paper, none)")
     names = {"grey": style.GREY, "blue": style.BLUE, **COLORS}
     for name, color in names.items():

@@ -1,7 +1,7 @@
-"""Style of all figures: sizes, colours and marks.
+"""Define the style of all figures: sizes, colours and markers.
 
-Colours: Okabe & Ito (2008), Color Universal Design, without the yellow.
-Methods have colours of their own (:data:`.COLORS`), and marks and dashes that distinguish them.
+Colours are those of Okabe & Ito (2008), Color Universal Design, without the yellow. Methods have
+their own colours (:data:`.COLORS`), markers and dashes.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ ONE = 89 / INCH
 TWO = 183 / INCH
 """Width of two journal columns, inches."""
 TALLEST = 225 / INCH
-"""Height of a page that leaves room for a caption, inches."""
+"""Largest height of a figure that leaves room for a caption on the page, inches."""
 _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
-"""Matplotlib's settings of all figures."""
+"""Settings of Matplotlib for all figures."""
 LEAST_PANEL, LEAST_SMALL_PANEL = 2.2, 1.6
-"""Least widths of a panel next to another one in a figure of chosen width, inches: a panel with
-names next to it, and one without."""
+"""Smallest widths of panels side by side in a figure of chosen width, inches: of a panel with names
+next to it, and of one without."""
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
 BACKGROUND = "#ffffff"
 TIP = "tip:"
-"""Beginning of the id of a mark with a :func:`tip`."""
+"""Prefix of the id of a mark with a :func:`tip`."""
 BLUE, SKY, GREEN, ORANGE = "#0072b2", "#56b4e9", "#009e73", "#e69f00"
 VERMILLION, PURPLE, GREY, INK = COLORS["rust"], "#cc79a7", "#6b6b6b", COLORS["ink"]
 PALETTE = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY)
@@ -54,24 +54,28 @@ OPTIMUM: Any = {"color": INK, "linewidth": 0.8, "linestyle": (0, (1, 1.2))}
 INITIAL: Any = {"color": GREY, "linewidth": 0.8, "linestyle": (0, (5, 1.2, 1, 1.2))}
 """Looks of the lines at the optimum, and at the reward of the corrective process alone."""
 styled = style.context(["default", RC])
-"""Decorator that draws in this style on Matplotlib's defaults, without the user's settings."""
+"""Decorator that draws in this style, with Matplotlib's defaults instead of the user's settings."""
 
 
 Look = dict[str, Any]
-"""Look of a method's lines and marks: arguments of Matplotlib's ``plot``."""
+"""Look of a method's lines and markers: arguments of Matplotlib's ``plot``."""
 
 
 def grid(panels: int) -> tuple[int, int]:
-    """Return the numbers of rows and columns for a number of panels: two columns for up to six
-    panels, three for more; one for a single panel."""
+    """Return the numbers of rows and columns for a number of panels.
+
+    There are two columns for up to six panels, three for more, and one for a single panel.
+    """
     columns = min(2 if panels <= 6 else 3, panels)
     return -(-panels // columns), columns
 
 
 @contextmanager
 def drawn_at(width: float | None) -> Iterator[None]:
-    """Let :func:`panels` make figures of a width, inches, within a ``with`` block; None: of the
-    width in argument ``size`` of :func:`panels`."""
+    """Set the width of the figures that :func:`panels` makes in a ``with`` block, inches.
+
+    None stands for the width in argument ``size`` of :func:`panels`.
+    """
     before = _width.set(width)
     try:
         yield
@@ -80,8 +84,7 @@ def drawn_at(width: float | None) -> Iterator[None]:
 
 
 def is_narrow() -> bool:
-    """Return True if the width chosen by :func:`drawn_at` is below five inches; False without a
-    chosen width."""
+    """Return True if :func:`drawn_at` has set a width below five inches."""
     return (_width.get() or TWO) < 5
 
 
@@ -92,9 +95,10 @@ def panels(
     least: float = LEAST_PANEL,
     **subplots: Any,
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with panels. In a block of :func:`drawn_at` the figure has the width chosen
-    there, if any, and, if panels would be too narrow, fewer panels side by side; its height changes
-    with the number of rows.
+    """Return a figure with panels.
+
+    If :func:`drawn_at` has set a width, the figure has this width. If its panels would be too
+    narrow, there are fewer side by side, and the height changes with the number of rows.
 
     Parameters
     ----------
@@ -104,17 +108,17 @@ def panels(
         Width and height, inches: ``ONE`` and ``TWO`` are the widths of one and two columns of a
         journal.
     used : int, optional
-        Number of panels used, the first ones, by default all. Further panels stay empty; in a
-        figure of chosen width there are none, except empty ones that fill the last row.
+        Number of panels that are used, by default all. The other panels stay empty. If a width is
+        set, only the last row has empty panels.
     least : float
-        Least width of a panel next to another one in a figure of chosen width, inches.
+        Smallest width of panels side by side if a width is set, inches.
     **subplots
         Arguments of Matplotlib's ``Figure.subplots``, such as ``sharey=True``.
 
     Returns
     -------
     (Figure, list of Axes)
-        The figure, and the panels used, row by row.
+        The figure, and the panels that are used, row by row.
     """
     used = used or shape[0] * shape[1]
     if (width := _width.get()) is not None:
@@ -122,26 +126,29 @@ def panels(
         rows = -(-used // columns)
         shape, size = (rows, columns), (width, size[1] * rows / shape[0])
     figure = Figure(figsize=size, layout="constrained")
-    every = figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
-    for axes in every[used:]:
+    all_axes = figure.subplots(*shape, squeeze=False, **subplots).ravel().tolist()
+    for axes in all_axes[used:]:
         axes.set_axis_off()
-    return figure, every[:used]
+    return figure, all_axes[:used]
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:
-    """Write names to the left of rows, which stand at y = 0, -1, -2 and so on, first name first."""
+    """Write names to the left of rows at y = 0, -1, -2 and so on."""
     axes.set_yticks([-place for place in range(len(names))], names)
     axes.set_ylim(-len(names) + 0.4, 0.6)
     axes.tick_params(axis="y", length=0)
 
 
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
-    """Draw a legend of ``columns`` columns, or fewer if the figure is too narrow for these entries,
-    below all panels; for more than two lines of entries the figure becomes taller."""
+    """Draw a legend below all panels.
+
+    It has ``columns`` columns, or fewer if the figure is too narrow for the entries. If it has more
+    than two lines, the figure becomes taller.
+    """
     widths = [0.45 + 0.06 * len(str(handle.get_label())) for handle in handles]  # inches
     while columns > 1:
         if (
-            sum(max(each, default=0) for each in np.array_split(widths, columns))
+            sum(max(column, default=0) for column in np.array_split(widths, columns))
             <= figure.get_figwidth()
         ):
             break
@@ -173,23 +180,23 @@ def means(
         A row for each mean, such as the table of :func:`coartic.analysis.means`: columns ``x`` and
         ``y``, and for intervals the columns of ``y`` with ``_low`` and ``_high``.
     x, y : str
-        Columns of the places and of the means.
+        Columns of the x coordinates and of the means.
     by : str
-        Column of groups, each with a line, a colour and a label; a row with NaN there is not drawn.
-        Empty for a single line.
+        Column of groups. Each group has a line, a colour and a label; rows with NaN in this column
+        are not drawn. Empty for a single line.
     scale : float
         Factor of means and intervals: 100 for per cent.
     shift : float
-        Distance by which each line is moved to the right of the line before, in units of ``x``.
+        Distance of each line to the right of the previous line, in units of ``x``.
     bars : float, optional
         Line width of the intervals, points; None for Matplotlib's line width.
     **line
-        Look of the line and its marks: arguments of Matplotlib's ``plot``.
+        Look of the line and its markers: arguments of Matplotlib's ``plot``.
 
     Raises
     ------
     CoarticError
-        The frame has no rows, lacks a column, or has text or infinite numbers in place of numbers.
+        The frame has no rows, a column is missing, or a value is not a finite number.
     """
     ends = [f"{y}_low", f"{y}_high"] if f"{y}_low" in getattr(frame, "columns", ()) else []
     checked(frame, numbers=[x, y, *ends], others=[by] * bool(by))
@@ -213,19 +220,19 @@ def dots(rows: pd.DataFrame, quantities: Mapping[str, str], lines: Mapping[str, 
     Parameters
     ----------
     rows : DataFrame
-        A row for each dot, from the top on: ``name``, ``color`` and ``marker`` (of Matplotlib),
-        ``bold`` (True for a bold name), and for each quantity its column, with ``_low`` and
-        ``_high`` if it has intervals; NaN for a dot or an interval that is missing.
+        A row for each row of the plot, from top to bottom: ``name``, ``color`` and ``marker`` (of
+        Matplotlib), ``bold`` (True for a bold name), and a column for each quantity, with ``_low``
+        and ``_high`` if it has intervals. NaN stands for a missing dot or interval.
     quantities : dict
-        Labels of the axes by column, a panel for each.
+        For each panel, the column of the quantity and the label of its axis.
     lines : dict
-        Values at which panels have a dashed line, by column; NaN and other names are left out.
+        Values at which panels have a dashed line, by column. NaN and other names are ignored.
     """
     height = 0.55 + (0.135 if is_narrow() else 0.165) * len(rows)
     size = TWO, height + 0.1 * sum(name.count("\n") for name in rows.name)
     shape, least = (1, len(quantities)), LEAST_SMALL_PANEL
-    drawing, every = panels(shape, size, None, least, sharey=True)
-    for axes, (name, label) in zip(every, quantities.items(), strict=True):
+    drawing, all_axes = panels(shape, size, None, least, sharey=True)
+    for axes, (name, label) in zip(all_axes, quantities.items(), strict=True):
         axes.axvline(0, color=GREY, linewidth=0.5)
         axes.grid(axis="y", color=GREY, alpha=0.3, linewidth=0.5)
         if not math.isnan(lines.get(name, math.nan)):
@@ -238,16 +245,18 @@ def dots(rows: pd.DataFrame, quantities: Mapping[str, str], lines: Mapping[str, 
             tip(dot, f"{row['name']}: {row[name]:.2f}".replace("\n", " "))
         axes.set_xlabel(label.partition("\n")[0] if is_narrow() else label)
         axes.tick_params(axis="y", length=0)
-    name_rows(every[0], [*rows.name])
-    for text, is_bold in zip(every[0].get_yticklabels(), rows.bold, strict=True):
+    name_rows(all_axes[0], [*rows.name])
+    for text, is_bold in zip(all_axes[0].get_yticklabels(), rows.bold, strict=True):
         text.set_fontweight("bold" if is_bold else "normal")
-    letters(every)
+    letters(all_axes)
     return drawing
 
 
 def tip(artist: Artist, text: str) -> None:
-    """Set the text that a page of HTML shows when the pointer rests on a mark. The mark keeps the
-    text as its id (gid), in place of an earlier id."""
+    """Set the text that a page of HTML shows when the pointer rests on a mark.
+
+    The text replaces the mark's id (gid).
+    """
     artist.set_gid(f"{TIP}{text}")
 
 
@@ -257,9 +266,9 @@ def legend_line(label: str, **line: Any) -> Line2D:
 
 
 def log_axis(axes: Axes) -> None:
-    """Make the x axis logarithmic, with numbers at whole decades: 1, 100, 1k, 1M; 100m for 0.1.
+    """Make the x axis logarithmic, with numbers at decades: 1, 100, 1k, 1M.
 
-    Small ticks are at 2 and 5 times each decade.
+    0.1 is written 100m. Small ticks are at 2 and 5 times each decade.
     """
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(EngFormatter(sep=""))
@@ -268,7 +277,9 @@ def log_axis(axes: Axes) -> None:
 
 
 def letters(panels: Iterable[Axes], pad: float | None = None) -> None:
-    """Name panels a, b, ... z before their titles, ``pad`` points above the axes; panels after the
-    26th stay as they are."""
+    """Write a, b, ... z before the titles of panels, ``pad`` points above the axes.
+
+    Panels after the 26th do not change.
+    """
     for letter, axes in zip(ascii_lowercase, panels, strict=False):
         axes.set_title(f"{letter}  {axes.get_title(loc='left')}", loc="left", pad=pad)

@@ -43,12 +43,12 @@ def player(study: Study) -> str:
         control = contexts_of_control(study, shared)
         by_chance = control.standardised_posture_difference if control else math.nan
         presets.append(both | {"by_chance": by_chance if math.isfinite(by_chance) else None})
-    alone = {
+    single_presets = {
         name: preset_of(task) | {"runs": methods_played(study, [name])}
         for name, task in study.individual_tasks.items()
     }
-    alone = {name: preset for name, preset in alone.items() if preset["runs"]}
-    presets = [preset for preset in (*presets, *alone.values()) if preset["runs"]]
+    single_presets = {name: preset for name, preset in single_presets.items() if preset["runs"]}
+    presets = [preset for preset in (*presets, *single_presets.values()) if preset["runs"]]
     if not presets:
         return ""
     ids = [[run["id"] for run in preset["runs"]] for preset in presets]
@@ -58,7 +58,7 @@ def player(study: Study) -> str:
         for number, methods in enumerate(ids)
         if method in methods
     )
-    where = {name: presets.index(preset) for name, preset in alone.items()}
+    where = {name: presets.index(preset) for name, preset in single_presets.items()}
     return player_figure(
         presets,
         page=None,
@@ -67,13 +67,13 @@ def player(study: Study) -> str:
         cells=[
             (cell, {"preset": where[task], "who": label})
             for cell, task, label in _cells_shown(study)
-            if task in where and label in {run["id"] for run in alone[task]["runs"]}
+            if task in where and label in {run["id"] for run in single_presets[task]["runs"]}
         ],
     )
 
 
 def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
-    """Yield each table cell with the gap of a method on a task, and the runs that it stands for.
+    """Yield the table cells with gaps on a task, and the runs they stand for.
 
     An item has the id of the HTML cell, the task, and the label of the method's runs. Cells are of
     the tables of ranked methods and of methods that are not ranked.
@@ -108,7 +108,7 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
 
 
 def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
-    """Return the run of a cell whose reward is nearest to the median, in the form of ``model.js``.
+    """Return the run of a cell whose reward is nearest to the median, for ``model.js``.
 
     It has ``run`` (the beginning of its id), ``ticks``, and ``movements`` with ``goal`` (from 0),
     ``hand`` (index in HANDS), ``kind`` and ``target``. It is empty if the cell has no solution, or

@@ -66,7 +66,7 @@ NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer run
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page, left out if the folder has neither its tables nor its figures."""
+    """A section of the page, left out if it has no tables and no figures."""
 
     id: str
     title: str

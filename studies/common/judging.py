@@ -84,12 +84,14 @@ def _largest_p(tests: Iterable[Estimate]) -> float:
 def _tests_over_tasks(values: ArrayLike, bound: float) -> tuple[Estimate, Estimate]:
     """Test that the mean over tasks exceeds a bound, with and without the largest value.
 
-    ``values`` has one value for each task, two at least. p is NaN for a test of a single value.
+    ``values`` has one value for each task, for at least two tasks. p is NaN for a test of a single
+    value.
     """
-    every = np.asarray(values, dtype=np.float64)
+    by_task = np.asarray(values, dtype=np.float64)
+    others = np.delete(by_task, by_task.argmax())
     return (
-        bootstrap_test(every, bound, resamples=RESAMPLES_OF_CLAIMS),
-        bootstrap_test(np.delete(every, every.argmax()), bound, resamples=RESAMPLES_OF_CLAIMS),
+        bootstrap_test(by_task, bound, resamples=RESAMPLES_OF_CLAIMS),
+        bootstrap_test(others, bound, resamples=RESAMPLES_OF_CLAIMS),
     )
 
 
@@ -288,7 +290,7 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
         claim = of_file[name]
         if missing := [key for key in ("text", "test", "means") if key not in claim]:
             raise CoarticError(f"{words}: claim {name} has no {missing[0]}")
-        by_group = [each if isinstance(each, Mapping) else {"": each} for each in means]
+        by_group = [entry if isinstance(entry, Mapping) else {"": entry} for entry in means]
         if len(claim["means"]) != len(by_group):
             raise CoarticError(
                 f"{words}: claim {name} has {len(claim['means'])} means, but values has "

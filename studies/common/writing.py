@@ -1,4 +1,4 @@
-"""Write the files of a study: its tables, its page, and a suite of the control that it lacks."""
+"""Write the tables and the page of a study, and a suite of its missing control."""
 
 from __future__ import annotations
 
