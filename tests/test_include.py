@@ -67,7 +67,9 @@ def test_an_array_of_jobs_shares_a_cell(coartic, tmp_path, in_this_process):
         code, text, _ = coartic(*command, "--runs", runs, "--out", place)
         assert code == 0, text
     assert "with all other parts, joins them" in " ".join(text.split())
-    with pytest.raises(CoarticError, match="has 2 of 4 runs: it was interrupted, or has a part"):
+    with pytest.raises(
+        CoarticError, match="has 2 of 4 runs: it was interrupted, or has only a part"
+    ):
         load(places[1])
     report = check_runs(places[1])
     said = "The plan asks for 4 runs, of which the folder has 2."
