@@ -75,8 +75,6 @@ class Dask:
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed
 
-        order = dict[Any, int]()  # a worker reuses its process for jobs of one method in a row
-        jobs = sorted(jobs, key=lambda job: order.setdefault(job.cell.method.key, len(order)))
         try:
             futures = client.map(_remote, jobs, pure=False, retries=2)
             job_of = {future.key: job for future, job in zip(futures, jobs, strict=True)}
