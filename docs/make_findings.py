@@ -15,10 +15,12 @@ import tomllib
 from pathlib import Path
 from typing import Any, get_args
 
+import finding_figures
 import pandas as pd
 from scipy import stats
 
 from coartic.analysis import by_task, load, mean
+from coartic.analysis.figures import picture
 from common.judging import Verdict
 from common.writing import fill_page
 
@@ -142,6 +144,17 @@ def filled_pages() -> dict[str, str]:
     }
 
 
+def figures() -> dict[str, bytes]:
+    """Return every figure of the findings as SVG, by its path below ``docs``."""
+    drawings = {
+        name: draw(table, *[early_less_late] * (name == "early-gain"))
+        for name, draw in finding_figures.FIGURES.items()
+    }
+    return {
+        f"stored/findings/{name}.svg": picture(drawing, ".svg") for name, drawing in drawings.items()
+    }
+
+
 def store(results: Path) -> None:
     """Copy tables and figures from the reports below ``results``; lists of run ids stay there.
 
@@ -175,6 +188,9 @@ def main() -> None:
         store(results)
     for name, text in filled_pages().items():
         (DOCS / name).write_text(text, encoding="utf-8")
+    (STORED / "findings").mkdir(exist_ok=True)
+    for name, drawing in figures().items():
+        (DOCS / name).write_bytes(drawing)
 
 
 if __name__ == "__main__":

@@ -214,7 +214,11 @@ def means(
         axes.plot(places, scale * rows[y], **looks)
 
 
-def dots(rows: pd.DataFrame, quantities: Mapping[str, str], lines: Mapping[str, float]) -> Figure:
+def dots(
+    rows: pd.DataFrame,
+    quantities: Mapping[str, str],
+    lines: Mapping[str, float | Sequence[float]],
+) -> Figure:
     """Return a dot plot: a row for each name, a panel for each quantity, with intervals.
 
     Parameters
@@ -226,7 +230,8 @@ def dots(rows: pd.DataFrame, quantities: Mapping[str, str], lines: Mapping[str, 
     quantities : dict
         For each panel, the column of the quantity and the label of its axis.
     lines : dict
-        Values at which panels have a dashed line, by column. NaN and other names are ignored.
+        Values at which panels have dashed lines, by column: one or several. NaN and other names are
+        ignored.
     """
     height = 0.55 + (0.135 if is_narrow() else 0.165) * len(rows)
     size = TWO, height + 0.1 * sum(name.count("\n") for name in rows.name)
@@ -235,8 +240,9 @@ def dots(rows: pd.DataFrame, quantities: Mapping[str, str], lines: Mapping[str, 
     for axes, (name, label) in zip(all_axes, quantities.items(), strict=True):
         axes.axvline(0, color=GREY, linewidth=0.5)
         axes.grid(axis="y", color=GREY, alpha=0.3, linewidth=0.5)
-        if not math.isnan(lines.get(name, math.nan)):
-            axes.axvline(lines[name], color=INK, linewidth=0.8, linestyle=(0, (4, 2)))
+        for value in np.atleast_1d(lines.get(name, math.nan)):
+            if not math.isnan(value):
+                axes.axvline(value, color=INK, linewidth=0.8, linestyle=(0, (4, 2)))
         for place, row in enumerate(rows.to_dict("records")):
             look: Any = {"color": row["color"], "clip_on": False}
             ends = row.get(f"{name}_low", math.nan), row.get(f"{name}_high", math.nan)
@@ -248,7 +254,8 @@ def dots(rows: pd.DataFrame, quantities: Mapping[str, str], lines: Mapping[str, 
     name_rows(all_axes[0], [*rows.name])
     for text, is_bold in zip(all_axes[0].get_yticklabels(), rows.bold, strict=True):
         text.set_fontweight("bold" if is_bold else "normal")
-    letters(all_axes)
+    if len(all_axes) > 1:
+        letters(all_axes)
     return drawing
 
 

@@ -1,0 +1,183 @@
+"""The figures of ``docs/findings.md``: one dot plot for each finding, from stored tables.
+
+``python docs/make_findings.py`` writes them into ``docs/stored/findings``.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from coartic.analysis.figures import dots, styled
+from coartic.analysis.methods import COLORS
+
+Table = Callable[[str, str], pd.DataFrame]
+"""Function that returns a stored table of a suite or a study by their names."""
+FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
+LEARNER, RANDOM = "dual-process (EC1, EC4)", "random-search"
+METHODS = {
+    "cma-es/bandit": ("CMA-ES", "forest", "s"),
+    "hill-climbing": ("hill climbing", "amber", "v"),
+    LEARNER: ("the paper's learner", "navy", "D"),
+    RANDOM: ("random search", "silver", "o"),
+}
+"""Name, colour and marker of the methods of finding 4."""
+NOTHING = (math.nan, math.nan, math.nan)
+_NUMBER = r"(−?\d+(?:\.\d+)?)"
+
+
+def estimate(row: Any, column: str, scale: float = 1) -> tuple[float, float, float]:
+    """Return the value of a column of a stored row, and the ends of its interval."""
+    low, high = row.get(f"{column}_low", math.nan), row.get(f"{column}_high", math.nan)
+    return scale * row[column], scale * low, scale * high
+
+
+def written(evidence: str, words: str) -> tuple[float, float, float]:
+    """Return the number with its interval that stands behind some words of a claim's evidence."""
+    found = re.search(rf"{re.escape(words)}: {_NUMBER} \[{_NUMBER}, {_NUMBER}\]", evidence)
+    if found is None:
+        return NOTHING
+    value, low, high = (float(number.replace("−", "-")) for number in found.groups())
+    return value, low, high
+
+
+def draw(
+    names: Sequence[str],
+    quantities: dict[str, Sequence[tuple[float, float, float]]],
+    looks: Sequence[tuple[str, str]] = (),
+    **lines: Any,
+) -> Figure:
+    """Draw a dot plot with a panel for each quantity, and an estimate in it for each name."""
+    rows = pd.DataFrame({"name": names, "bold": False})
+    rows[["color", "marker"]] = looks or [(COLORS["navy"], "D")] * len(rows)
+    for label, estimates in quantities.items():
+        rows[[label, f"{label}_low", f"{label}_high"]] = estimates
+    return dots(rows, {label: label for label in quantities}, lines.get("at", {}))
+
+
+@styled
+def first_movement(table: Table) -> Figure:
+    """Draw finding 2: how much slower the first movement is, and the whole task faster."""
+    runs, equal = table("comparison", "signatures"), table("memory", "one_selection")
+    scales = table("memory", "scales")
+    names, first, whole = [], [], []
+    for task in ("ascending", "descending"):
+        names += [f"{task}, 10,000 trials", f"{task}, at equal gain"]
+        row = runs.loc[f"{task} dual-process/EC1 RRR"]
+        first += [estimate(row, "first_difference"), estimate(equal.loc[f"{task} first"], "equal")]
+        whole += [estimate(row, "whole_difference"), estimate(equal.loc[f"{task} gain"], "equal")]
+    for family in FAMILIES:
+        names.append(f"40 random tasks, {family}")
+        first.append(estimate(scales.loc[f"{family} postures first"], "beyond_one"))
+        whole.append(estimate(scales.loc[f"{family} postures gain"], "beyond_one"))
+    return draw(
+        names,
+        {
+            "first movement slower than in\nrandom search (ticks)": first,
+            "whole task faster than in\nrandom search (ticks)": whole,
+        },
+    )
+
+
+@styled
+def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]]) -> Figure:
+    """Draw finding 3: gains of a hundred informed and of ten thousand trials by family."""
+    rows = table("dial", "results")
+    drift = [estimate(rows.loc[f"{name} 1 0.01 next-goal"], "gain_100") for name in FAMILIES]
+    paper = [estimate(rows.loc[f"{name} 0 0.05"], "gain_10000") for name in FAMILIES]
+    more = [estimate(early_less_late(name), "more") for name in FAMILIES]
+    return draw(
+        FAMILIES,
+        {
+            "informed exploration,\n100 trials (%)": drift,
+            "the paper's learner,\n10,000 trials (%)": paper,
+            "difference\n(percentage points)": more,
+        },
+    )
+
+
+@styled
+def gaps(table: Table) -> Figure:
+    """Draw finding 4: gaps on the paper's tasks and in each family of random tasks."""
+    ranking, families = table("comparison", "ranking"), table("families", "family-gaps")
+    panels = {"the paper's\ntasks (%)": [estimate(ranking.loc[m], "gap", 100) for m in METHODS]}
+    for family in (*FAMILIES, "many-goals"):
+        column = f"in {family}/v1"
+        label = "fourteen\ngoals (%)" if family == "many-goals" else f"{family}\n(%)"
+        panels[label] = [estimate(families.loc[m], column, 100) for m in METHODS]
+    looks = [(COLORS[color], marker) for _, color, marker in METHODS.values()]
+    return draw([name for name, *_ in METHODS.values()], panels, looks)
+
+
+@styled
+def rewards(table: Table) -> Figure:
+    """Draw finding 5: rewards less the published ones, in per cent of these."""
+    cells = table("replication", "rewards")
+    cells = cells[cells.hands.isna() & cells.difference.notna()]
+    label = "our mean reward less the published one (% of it; dashed: ± 1 %)"
+    values = [estimate(row, "difference", -100 / row.published) for _, row in cells.iterrows()]
+    return draw([*cells.index], {label: values}, at={label: (-1, 1)})
+
+
+@styled
+def idle_arms(table: Table) -> Figure:
+    """Draw finding 7: how much nearer the arms come to the next goal."""
+    runs, claims = table("comparison", "signatures"), table("replication", "claims")
+    moving = claims.loc["arm-coarticulation-in-general"]
+    idle = claims.loc["other-arm-coarticulation-in-general"]
+    names, nearer, more, other = [], [], [], []
+    for condition in ("EC3", "EC4"):
+        row = runs.loc[f"two-armed-1 dual-process/{condition} LRLR"]
+        names.append(f"two-armed task 1 †, {condition}")
+        nearer.append(estimate(row, "arm"))
+        more.append(estimate(row, "arm_difference"))
+        other.append(estimate(row, "other_arm") if condition == "EC4" else NOTHING)
+    for family in FAMILIES:
+        names.append(f"random tasks, {family}")
+        nearer.append(written(moving.evidence, f"{family}/v1"))
+        more.append(written(moving.evidence_beyond, f"{family}/v1, more than random search"))
+        other.append(written(idle.evidence, f"{family}/v1"))
+    return draw(
+        names,
+        {
+            "next goal nearer\n(ticks)": nearer,
+            "more than in random\nsearch (ticks)": more,
+            "idle hand nearer\n(share of its path)": other,
+        },
+    )
+
+
+@styled
+def goals_ahead(table: Table) -> Figure:
+    """Draw finding 8: what each goal in view is worth to a planner."""
+    whole, movement = table("horizon", "results"), table("horizon", "movements")
+    ahead = range(5)
+    many = [whole.loc[f"goals 6 or more h={h}"] for h in ahead]
+    return draw(
+        [f"{h or 'no'} goal{'s' * (h != 1)} ahead" for h in ahead],
+        {
+            "gap (%)": [estimate(row, "gap", 100) for row in many],
+            "gain of the last goal seen,\n% of the whole task": [
+                estimate(row, "gain", 100) for row in many
+            ],
+            "% of a movement that\nhas it ahead": [
+                NOTHING, *(estimate(movement.loc[f"goals 6 or more h={h}"], "gain") for h in ahead[1:])
+            ],
+        },
+    )  # fmt: skip
+
+
+FIGURES: dict[str, Any] = {
+    "first-movement": first_movement,
+    "early-gain": early_gain,
+    "gaps": gaps,
+    "rewards": rewards,
+    "arms": idle_arms,
+    "goals-ahead": goals_ahead,
+}
+"""Each figure's function by the name of its file."""
