@@ -157,7 +157,9 @@ def goals_ahead(table: Table) -> Figure:
     """Draw finding 8: what each goal in view is worth to a planner."""
     whole, movement = table("horizon", "results"), table("horizon", "movements")
     ahead = range(5)
-    many = [whole.loc[f"goals 6 or more h={h}"] for h in ahead]
+    name = "goals 6 or more h={}"
+    many = [whole.loc[name.format(h)] for h in ahead]
+    of_movement = [estimate(movement.loc[name.format(h)], "gain") for h in ahead[1:]]
     return draw(
         [f"{h or 'no'} goal{'s' * (h != 1)} ahead" for h in ahead],
         {
@@ -165,11 +167,9 @@ def goals_ahead(table: Table) -> Figure:
             "gain of the last goal seen,\n% of the whole task": [
                 estimate(row, "gain", 100) for row in many
             ],
-            "% of a movement that\nhas it ahead": [
-                NOTHING, *(estimate(movement.loc[f"goals 6 or more h={h}"], "gain") for h in ahead[1:])
-            ],
+            "% of a movement that\nhas it ahead": [NOTHING, *of_movement],
         },
-    )  # fmt: skip
+    )
 
 
 FIGURES: dict[str, Any] = {

@@ -150,9 +150,7 @@ def figures() -> dict[str, bytes]:
         name: draw(table, *[early_less_late] * (name == "early-gain"))
         for name, draw in finding_figures.FIGURES.items()
     }
-    return {
-        f"stored/findings/{name}.svg": picture(drawing, ".svg") for name, drawing in drawings.items()
-    }
+    return {f"stored/findings/{name}.svg": picture(made, ".svg") for name, made in drawings.items()}
 
 
 def store(results: Path) -> None:

@@ -21,6 +21,13 @@ def test_pages_are_their_templates_filled_from_the_stored_tables():
         assert text == (DOCS / page).read_text(encoding="utf-8"), page
 
 
+def test_figures_are_drawn_from_the_stored_tables_and_each_is_on_the_page():
+    page = (DOCS / "findings.md").read_text(encoding="utf-8")
+    for path, drawing in make_findings.figures().items():
+        assert drawing == (DOCS / path).read_bytes(), path
+        assert path in page
+
+
 def test_stored_gaps_of_families_are_to_the_best_known_rewards_that_ship():
     """Else pages are behind a reward that was renewed."""
     stored = pd.read_csv(DOCS / "stored" / "families" / "by-task.csv")
