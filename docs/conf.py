@@ -35,17 +35,13 @@ myst_enable_extensions = ["attrs_inline", "colon_fence"]
 
 # Pages that are folded under another page in the navigation.
 FOLDED = {
-    "findings": ("corrections", "foreign"),
-    "paper": ("reconstruction", "claims"),
+    "findings": ("foreign",),
     "tasks": ("families",),
     "methods": ("beside",),
-    "howto/report": ("/gallery",),
-    "howto/share": ("/cluster",),
-    "howto/python": ("/how-fast",),
 }
 
 # Pages whose code is run whenever the site is built, so they show what came out.
-NOTEBOOKS = {"gallery", "tutorial"}
+NOTEBOOKS = {"howto/report", "tutorial"}
 nb_execution_mode = "force"
 nb_execution_timeout = 900  # a busy machine is slow
 nb_execution_raise_on_error = True
@@ -119,7 +115,7 @@ def setup(app):
             r"```(?:toml|python)\n# (\S+\.(?:toml|py))\n", cell + r"%%writefile \1\n", source[0]
         )
         text = text.replace("```sh\n", cell + "%%sh\n").replace("```python\n", cell)
-        text = "".join(map(pictures_named, re.split(r"(?m)^(?=## )", text)))
+        text = "".join(map(pictures_named, re.split(r"(?m)^(?=###? )", text)))
         image = 'import IPython\nIPython.display.Image("\\1", width=360)'
         options = ':mystnb: {image: {alt: "\\2"}}\n:tags: [remove-input]'
         text = re.sub(r"<!-- picture (\S+): (.+) -->", f"{cell}{options}\n{image}\n```", text)

@@ -2,8 +2,8 @@
 
     python docs/scripts/speed.py
 
-The script writes the times of the functions into the page ``docs/how-fast.md``. Times depend on the
-machine: compare ratios, and times of the same call.
+The script writes the times of the functions into the table of ``docs/howto/install.md``. Times depend
+on the machine: compare ratios, and times of the same call.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from coartic.motion.solution import movements_of
 
 
 def main() -> None:
-    """Print all times, and write the page."""
+    """Print all times, and write the table of the page."""
     show_functions()
     warm_up(load_task("ascending"))
     print(f"{'experiment':20}{'one run':>12}{f'{SLOTS} runs':>12}   microseconds of a core a trial")
@@ -38,26 +38,15 @@ def main() -> None:
         print(f"{task.name:16}{condition:4}{one:12.1f}{many:12.1f}", flush=True)
 
 
-PAGE = Path(__file__).parents[1] / "how-fast.md"
+PAGE = Path(__file__).parents[1] / "howto" / "install.md"
 ROUNDS = 50
 """Number of times that each function is measured."""
-HEAD = """\
-# How fast
-
-CPU microseconds of one core for a trial, by the function that makes it: medians of one run of
-`make speed`. Times depend on the machine, ratios less.
-
-| µs a trial | {heads} |
-| --- | {rules} |
-"""
-FOOT = """
-*Plain loop*: the model as a programmer would first write it in C
-(`docs/scripts/plain_loop.c`); *bounds* skip steps in which the hand provably misses, as here.
-"""
+HEAD = "| µs a trial |"
+"""Beginning of the table on the page."""
 
 
 def show_functions() -> None:
-    """Print the time of a trial by each public function, and write the page."""
+    """Print the time of a trial by each public function, and write the table of the page."""
     columns = {name: functions(load_task(name)) for name in ("ascending", "two-armed-1")}
     rounds: dict[str, list[dict[str, float]]] = {name: [] for name in columns}
     for _ in range(ROUNDS):  # in turn, so that other work of the machine slows all functions
@@ -67,11 +56,13 @@ def show_functions() -> None:
     times = {name: pd.DataFrame(rows).agg(statistics).T for name, rows in rounds.items()}
     print("CPU microseconds a trial", pd.concat(times, axis=1).round(2).to_string(), sep="\n")
     table = pd.DataFrame({name: of_task["median"] for name, of_task in times.items()})
-    rules = " | ".join(["---:"] * len(columns))
-    text = HEAD.format(heads=" | ".join(columns), rules=rules)
+    rows = [f"{HEAD} {' | '.join(columns)} |", "| --- |" + " ---: |" * len(columns)]
     for function, cells in table.map("{:.3g}".format).iterrows():
-        text += f"| {function} | {' | '.join(cells)} |\n"
-    PAGE.write_text(text + FOOT, encoding="utf-8")
+        rows.append(f"| {function} | {' | '.join(cells)} |")
+    before, found, after = PAGE.read_text(encoding="utf-8").partition(HEAD)
+    assert found, f"{PAGE} has no table that begins with {HEAD}"
+    after = after[after.index("\n\n") :]
+    PAGE.write_text(before + "\n".join(rows) + after, encoding="utf-8")
 
 
 def functions(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
