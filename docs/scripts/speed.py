@@ -2,8 +2,8 @@
 
     python docs/scripts/speed.py
 
-The script writes the times of the functions into the table of ``docs/howto/install.md``. Times depend
-on the machine: compare ratios, and times of the same call.
+The script writes the times of the functions into the table of ``docs/howto/install.md``. Times
+depend on the machine: compare ratios, and times of the same call.
 """
 
 from __future__ import annotations
