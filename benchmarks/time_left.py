@@ -18,6 +18,9 @@ _Kind = tuple[str, str, int]
 """Method, task and number of trials (0 without trials). Runs of a kind take about equally long."""
 _EARLY = 0.1
 """Share of the work before which there is no estimate, because processes are starting."""
+_RECENT = 0.2
+"""Share of the finished work after which an earlier run counts 1/e, because the load of a machine
+changes."""
 
 
 class TimeLeft:
@@ -27,16 +30,18 @@ class TimeLeft:
 
     - a run of a shipped method takes as long as the shipped runs of the method on this task, or on
       all tasks if this one is not shipped, times a factor of this machine;
-    - a run of another method takes as long as the mean of its runs here;
+    - a run of another method takes as long as its runs here;
+    - recent runs tell more than earlier ones;
     - ``workers`` runs are made at once, or more if the times of finished runs add up to more.
     """
 
     def __init__(self, workers: int = 1) -> None:
         self._workers = workers
-        self._waiting, self._made = Counter[_Kind](), Counter[_Kind]()
-        self._took_s = defaultdict[_Kind, float](float)
+        self._waiting = Counter[_Kind]()
+        self._done_s = 0.0
         self._begun = self._last = time.monotonic()
-        self._job_s = 0.0
+        # Weighted sums of times of finished runs: here, and of their :func:`_shipped_s`.
+        self._took_s, self._usual_s = defaultdict[str, float](float), defaultdict[str, float](float)
         self._lock = threading.Lock()
 
     def expect(self, jobs: Iterable[Job]) -> None:
@@ -53,9 +58,11 @@ class TimeLeft:
             self._last = time.monotonic()
             self._waiting[kind] -= 1
             if times.wall_s is not None:
-                self._made[kind] += 1
-                self._took_s[kind] += times.wall_s
-                self._job_s = times.wall_s * times.together
+                self._done_s += times.wall_s
+                weight = math.exp(-times.wall_s / max(_RECENT * self._done_s, 1e-9))
+                group = _group_of(kind[0])
+                self._took_s[group] = weight * self._took_s[group] + times.wall_s
+                self._usual_s[group] = weight * self._usual_s[group] + _shipped_s(kind)
 
     @property
     def seconds(self) -> float:
@@ -65,36 +72,29 @@ class TimeLeft:
         is unknown. If no run finishes for a long time, it grows again.
         """
         with self._lock:
-            factors, done_s = self._factors(), sum(self._took_s.values())
-            run_s = {
-                kind: _shipped_s(kind) * factors.get(kind[0], math.nan)
+            left_s = sum(
+                count * _shipped_s(kind) * self._factor(kind[0])
                 for kind, count in self._waiting.items()
                 if count > 0
-            }
-            left_s = sum(run_s[kind] * self._waiting[kind] for kind in run_s)
+            )
+            done_s, since_s = self._done_s, time.monotonic() - self._last
             at_once = max(self._workers, done_s / max(self._last - self._begun, 1.0))
-            since_s = time.monotonic() - self._last
         if not left_s:
             return 0.0
         if not done_s >= _EARLY * (done_s + left_s):  # True for NaN
             return math.nan
-        half_done_s = min((at_once - 1) * self._job_s, left_s) / 2  # the other workers are halfway
-        expected_s = max((left_s - half_done_s) / at_once, *run_s.values())
-        return max(expected_s - since_s, since_s / 4)
+        return max(left_s / at_once - since_s, since_s / 4)
 
-    def _factors(self) -> dict[str, float]:
-        """Return, by method, the time of its runs here as a multiple of :func:`_shipped_s`.
+    def _factor(self, method: str) -> float:
+        """Return the time of runs here as a multiple of :func:`_shipped_s`, NaN before the first
+        run."""
+        usual_s = self._usual_s[_group_of(method)]
+        return self._took_s[_group_of(method)] / usual_s if usual_s else math.nan
 
-        All shipped methods have the same factor, that of the machine.
-        """
-        took_s, shipped_s = defaultdict[str, float](float), defaultdict[str, float](float)
-        for kind, count in self._made.items():
-            group = "" if kind[0] in _shipped_means() else kind[0]
-            shipped_s[group] += _shipped_s(kind) * count
-            took_s[group] += self._took_s[kind]
-        factors = {group: took_s[group] / time_s for group, time_s in shipped_s.items()}
-        machine = factors.pop("", math.nan)
-        return dict.fromkeys(_shipped_means(), machine) | factors
+
+def _group_of(method: str) -> str:
+    """Return a method's group, whose runs have the same factor: shipped methods are one group."""
+    return "" if method in _shipped_means() else method
 
 
 def _kind_of(cell: Cell) -> _Kind:

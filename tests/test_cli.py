@@ -12,11 +12,14 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from coartic import CoarticError, load_task
+from coartic import CoarticError, builtin_tasks, load_task
 from coartic.analysis.report import build
 from coartic.analysis.study import load
 from coartic.benchmarks import pool, template
-from coartic.cli import COMMANDS
+from coartic.benchmarks.registry import registry
+from coartic.benchmarks.suites import suites
+from coartic.cli import COMMANDS, completion
+from coartic.cli.arguments import methods_meant
 from coartic.cli.terminal import say
 from coartic.gym import TaskEnv
 from coartic.pictures import film
@@ -256,6 +259,54 @@ def test_examples_have_options_that_there_are(commands, command, example):
     name = command.__name__.removesuffix("_")
     options = {opt for parameter in commands.commands[name].params for opt in parameter.opts}
     assert {word for word in example.split() if word.startswith("--")} <= options
+
+
+def test_lines_of_the_help_are_whole_sentences(coartic, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    names = [command.__name__.removesuffix("_") for command, _ in COMMANDS]
+    for arguments in (["--help"], *([name, "--help"] for name in names)):
+        code, text, _ = coartic(*arguments)
+        lines = [line for line in text.splitlines() if not line.startswith("Usage:")]
+        assert (code, [line for line in lines if line.endswith(("...", "…"))]) == (0, [])
+        assert max(map(len, lines)) <= 80
+
+
+COMPLETED = """if True:
+    import sys
+    from coartic.cli import main
+    try:
+        main()
+    except SystemExit:
+        print("imported:", *sys.modules.keys() & {"matplotlib", "numba", "pandas"})"""
+
+
+@pytest.mark.process
+def test_a_shell_completes_names_and_prints_no_error(tmp_path):
+    cells = [cell_on(load_task("ascending"), KNOWN["dual-process/EC1"])]
+    run_id = run_and_write(tmp_path / "out", cells, runs=1, trials=3).runs.run_id[0]
+    for line, words in (
+        ("run qu", {"quick"}),
+        ("run quick --tasks ascending,d", {"ascending,descending"}),
+        ("run quick --methods EC1,CMA", {"EC1,CMA-ES"}),
+        ("check optimum/", {"optimum/search"}),
+        ("list comp", {"comparison"}),
+        (f"verify {tmp_path}/out --run {run_id[:3]}", {run_id}),
+        (f"draw {tmp_path}/out --run ", {run_id}),
+        (f"verify {tmp_path}/nowhere --run ", set()),
+    ):  # fmt: skip
+        typed = f"coartic {line}"
+        shell = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split(" ")) - 1)}
+        done = python("-c", COMPLETED, _COARTIC_COMPLETE="complete_bash", **shell)
+        *offered, imported = done.stdout.splitlines()
+        assert ({*offered} - {""}, imported, done.stderr) == (words, "imported:", ""), line
+
+
+def test_names_that_are_completed_are_those_that_commands_take():
+    registered = registry()
+    taken = methods_meant(completion.methods(), registered)
+    assert {*taken} == {*registered}
+    assert {*completion.suites()} == {*suites()}
+    assert {*builtin_tasks()} <= {load_task(name).name for name in completion.tasks()}
 
 
 @pytest.mark.usefixtures("in_this_process")

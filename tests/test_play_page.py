@@ -46,9 +46,9 @@ def text(page, name):
     return page.locator(f"[data-is={name}]").inner_text()
 
 
-def ticks(page, who):
+def ticks(page, who, where="score"):
     """What the page says that somebody needs."""
-    (found,) = re.findall(rf"{who} (\d+) ticks", text(page, "score"))
+    (found,) = re.findall(rf"{who} (\d+) ticks", text(page, where))
     return int(found)
 
 
@@ -140,21 +140,27 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
     file.write_text(pages.play_page().replace("TRIALS = 10000;", f"TRIALS = {trials};"), "utf-8")
     page = settled(visited(f"{file.as_uri()}#open=1", reduced_motion="reduce"))
     assert trials_made(page) == trials
-    postures = []  # at the goal that they share
+    postures, before, after = [], [], []  # postures at the goal that they share
     for role, name in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
         runs = [learn(name, "EC1", seed=seed, trials=trials) for seed in range(5)]
-        assert ticks(page, role) == -median_of(runs)
+        before.append(ticks(page, role, "before"))
+        after.append(ticks(page, role))
+        assert before[-1] == -learn(name, "EC1", seed=0, trials=1).reward
+        assert after[-1] == -median_of(runs)
         postures.append(np.array([run.execute().configurations[0] for run in runs]))
     learned = standardised_posture_difference(*postures)
     assert learned > 2
     words = f"the posture difference is {learned:.1f} standard deviations."
     assert words in text(page, "finding")
+    saved = [first - now for first, now in zip(before, after, strict=True)]
+    assert f"saves blue {saved[0]} ticks and orange {saved[1]}." in text(page, "finding")
     assert "5 runs each)" in text(page, "meaning")
     # Earlier, by the slider, there was less of it.
     reset = page.get_by_role("button", name="Reset")
     assert reset.is_disabled()
     slide(page, "Practice", 1)
     assert "same posture" in text(page, "finding")
+    assert [ticks(page, role) for role in ("Blue", "Orange")] == before
     reset.click()
     assert words in text(settled(page), "finding")
     assert reset.is_disabled()
@@ -208,7 +214,9 @@ def test_the_link_holds_the_whole_state(opened):
     assert f"trials={trials_made(settled(page))}&" in page.url
     comes_back(page, anew=True)
     assert trials_made(changed_to(page, "trials=20")) == 20
-    changed_to(page, "preset=3&explores=EC3&reward=movement&drift=1")
+    changed_to(page, "open=1&preset=3&explores=EC3&reward=movement")
+    slide(page, "It leans towards the next goal", 4)
+    settled(page)
     condition = shown_condition(page)
     assert (condition.drift, condition.credit) == (1.0, "subtask")
     assert ticks(page, "The learner") == learned("two-armed-1", condition)

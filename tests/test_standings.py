@@ -192,7 +192,7 @@ def test_methods_are_ranked_with_equal_trials(trials, by_suite, budget, why):
     assert rows.gap["mine"] == 0  # of all tasks, with whatever trials
     unlike = {name for name in rows.index if trials.get(name, 10) not in (budget, 0)}
     assert {*TABLES["not-ranked"](seen).index} == unlike
-    assert any("mine leaves" in line for line in said(seen, "ranking")) == (not why)
+    assert any("“mine” leaves" in line for line in said(seen, "ranking")) == (not why)
 
 
 def test_two_budgets_are_refused_in_a_frame():

@@ -26,7 +26,15 @@ from coartic.analysis.figures.drawings import (
     draw_tasks,
 )
 from coartic.analysis.figures.plot import DrawsFigure
-from coartic.analysis.methods import EC1, EC4, GROUPS, RANDOM_SEARCH, joined_label, title_of
+from coartic.analysis.methods import (
+    EC1,
+    EC4,
+    GROUPS,
+    MARK,
+    RANDOM_SEARCH,
+    joined_label,
+    title_of,
+)
 from coartic.analysis.standings import ranked_tasks, reference, runs_on, solved_tasks, standings
 from coartic.analysis.study import Study
 from coartic.analysis.tables import (
@@ -45,6 +53,7 @@ from coartic.analysis.tables import (
 )
 from coartic.analysis.words import (
     NO_BREAK,
+    capital,
     commonest,
     interval,
     listed,
@@ -61,6 +70,8 @@ Made = TypeVar("Made")
 RUNS = 20
 """Number of runs of each experiment of the paper."""
 TOO_FEW = f" (too few runs to test: make {FEWEST})"
+_WITHOUT_ARTICLE = ("CMA-ES", "random search", "hill climbing", "posture planning")
+"""Algorithms whose names have no article in a sentence."""
 NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer runs as points."
 
 
@@ -79,7 +90,8 @@ class Section:
     """Jinja template of the finding in words, or empty. It can use
 
     - ``every``: the first table;
-    - ``rows``: the first table with the ``title`` of each method, without settings and ablations;
+    - ``rows``: the first table with the ``title`` of each method, and with its ``subject``
+      (:func:`subject_of`), without settings and ablations;
     - ``others``: a list of the other tables, likewise;
     - further names that :func:`.finding` defines.
     """
@@ -100,15 +112,16 @@ SECTIONS = (
         sentence="""\
 {% if varied %}
 {% for best in leading(rows)[:1] %}
-{{ best.title }} comes nearest to the {{ reference }}: its gap is \
+{{ best.subject }} comes nearest to the {{ reference }}: its gap is \
 {{ interval(best, "gap", scale=100, unit=" %") }}.
 {%- for next in others[1].to_dict("records")[:1] %}
- Next is {{ next.title }}, {{ interval(next, "difference", scale=100) }} percentage points behind\
+ Next is {{ next.subject.removesuffix(",") }}, \
+{{ interval(next, "difference", scale=100) }} percentage points behind\
 {{ ": %s chance (%s)" % ("beyond" if next.p_holm < LEVEL else "not beyond", p_value(next.p_holm)) \
 if next.p_holm >= 0 else few(next) }}.
 {%- endfor %}
 {%- for row in rows[rows.method.isin(papers)].to_dict("records") if row.method != best.method %}
- {{ row.title }} leaves {{ interval(row, "gap", scale=100, unit=" %") }}.
+ {{ row.subject | capital }} leaves {{ interval(row, "gap", scale=100, unit=" %") }}.
 {%- endfor %}
 
 {% endfor %}
@@ -119,11 +132,11 @@ if next.p_holm >= 0 else few(next) }}.
 {% set place = (of_use.gap < row.gap).sum() + 1 %}
 {% set tied = (of_use.gap == row.gap).sum() > 1 %}
 {% if loop.first %}
-{{ use | capitalize }}, {{ row.title }} leaves \
+{{ use | capital }}, {{ row.subject }} leaves \
 {{ "a" if loop.last or tied else "the smallest" }} gap to the {{ reference }}\
 {{ " of" if loop.last or tied else "," }} \
 {% else %}
-{{ row.title }} leaves {% endif %}
+{{ row.subject }} leaves {% endif %}
 {{ interval(row, "gap", scale=100, unit=" %") }}\
 {{ " (place %d of %d)" % (place, of_use | length) if place > loop.index }}\
 {{ "." if loop.last else "; " }}
@@ -132,7 +145,7 @@ if next.p_holm >= 0 else few(next) }}.
 {% endfor %}
 {% endif %}
 {% for against, group in others[1].groupby("against", sort=False) if not varied %}
-{{ titles[against] }} against {{ rivals }} methods, percentage points by which its gap is \
+{{ subjects[against] }} against {{ rivals }} methods, percentage points by which its gap is \
 smaller on the tasks that it solved: \
 {% for row in leading(group) %}
 {{ row.title }} {{ interval(row, "difference", scale=100) }}\
@@ -162,7 +175,7 @@ smaller on the tasks that it solved: \
         sentence="""\
 {% set of_best = rows[rows.method == first] if varied else rows[:0] %}
 {% for row in (of_best if of_best | length else rows).head(1).to_dict("records") %}
-{{ row.title }} hits {{ row.place }} {{ {
+{{ row.subject }} hits {{ row.place }} {{ {
 "different postures": "in postures that depend on the next goal",
 "no more than random search": "in postures that differ no more than those of random search",
 "no significant difference": "in postures without significant difference",
@@ -194,7 +207,7 @@ Methods at shared goals by verdict: {{ every.verdict | commonest(none) | listed 
         sentence="""\
 {% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
 ascending=False)) %}
-{{ row.title }} reaches {{ (100 * row.reached) | number(0) }} %\
+{{ row.subject }} reaches {{ (100 * row.reached) | number(0) }} %\
 {{ " of the reward targets from the corrective process alone to the " ~ \
 reference if loop.first }}, {{ "never half" if \
 row.trials_to_half == infinite else "half of them after %s trials" % \
@@ -290,6 +303,7 @@ def finding(study: Study, section: Section) -> list[str]:
         return []
     methods = study.methods
     built_in = methods.index[methods.built_in.astype(bool)]
+    subjects = methods.apply(subject_of, axis=1)
 
     def few(row: Mapping[str, Any]) -> str:
         """Return the words that a stochastic method has too few runs to test, or none."""
@@ -307,23 +321,46 @@ def finding(study: Study, section: Section) -> list[str]:
     def named(table: Table) -> pd.DataFrame:
         all_rows = table(study)
         rows: pd.DataFrame = all_rows[~is_setting(study, all_rows)]
-        return rows.assign(title=rows.method.map(methods.title), own=~rows.method.isin(built_in))
+        titles, subject = rows.method.map(methods.title), rows.method.map(subjects)
+        return rows.assign(title=titles, subject=subject, own=~rows.method.isin(built_in))
 
     rows, *others = map(named, section.tables)
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"number": number, "commonest": commonest, "listed": listed}
+    environment.filters["capital"] = capital
     environment.globals |= {
         "interval": interval, "number": number, "p_value": p_value, "leading": leading, "few": few,
         "infinite": math.inf,
         "uses": GROUPS, "first": next(iter(standings(study).index), ""),
-        "titles": methods.title,
+        "subjects": subjects,
         "reference": reference(study, ranked_tasks(study)),
         "LEVEL": LEVEL, "varied": study.varied[0] and not study.against,
         "papers": methods.index[methods.is_learner & (methods.setting == "")],
         "rivals": "other" if study.against else "built-in",
     }  # fmt: skip
     text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
-    return [shown(line.strip()) for line in text.split("\n") if line.strip()]
+    return [capital(shown(line.strip())) for line in text.split("\n") if line.strip()]
+
+
+def subject_of(method: Mapping[str, Any]) -> str:
+    """Return the name of a method as the subject of a sentence.
+
+    A method from a file has a free title, which gets quotation marks. Other names get an article,
+    except names of activities, such as random search, and CMA-ES. A name that contains a comma,
+    such as ``CMA-ES, hands goal by goal``, ends in one.
+
+    Parameters
+    ----------
+    method : mapping
+        Row of :attr:`.Study.methods`.
+    """
+    title = str(method["title"])
+    if not method["built_in"]:
+        plain_title = title.removesuffix(MARK)
+        return f"“{plain_title}”{title[len(plain_title) :]}"
+    article = "" if method["algorithm"] in _WITHOUT_ARTICLE else "the "
+    comma = "," if "," in title.partition("(")[0] else ""
+    return f"{article}{title}{comma}"
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:

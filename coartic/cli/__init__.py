@@ -77,6 +77,8 @@ def main() -> None:
         if getattr(sys, name) is None:  # closed; otherwise a file would get its number
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
             os.set_inheritable(getattr(sys, name).fileno(), True)
+    if "_COARTIC_COMPLETE" in os.environ:  # for a shell, which shows errors within the command line
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # also for help and messages of libraries
             stream.reconfigure(errors="replaced")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from coartic.cli.completion import Words
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import unknown
@@ -29,7 +30,7 @@ def file_or_folder(metavar: str, what: str, *names: str) -> Any:
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
 
-def option(metavar: str, what: str, *names: str) -> Any:
+def option(metavar: str, what: str, *names: str, words: Words | None = None) -> Any:
     """Make a command-line option for a string, a number, or files that are read later.
 
     Parameters
@@ -40,8 +41,10 @@ def option(metavar: str, what: str, *names: str) -> Any:
         Help.
     *names : str
         Flags; by default a flag with the name of the parameter.
+    words : callable, optional
+        Function that completes the value (:mod:`coartic.cli.completion`).
     """
-    return typer.Option(*names, readable=False, metavar=metavar, help=what)
+    return typer.Option(*names, readable=False, metavar=metavar, help=what, autocompletion=words)
 
 
 ResultsFolder = Annotated[

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from coartic.cli import arguments as given
+from coartic.cli import completion
 from coartic.cli.terminal import Display, complain, say, say_pairs, say_table
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
@@ -40,7 +41,11 @@ def report(
     ] = None,
     against: Annotated[
         str | None,
-        given.option("METHOD", "Method to compare all others with, in table differences."),
+        given.option(
+            "METHOD",
+            "Method to compare all others with, in table differences.",
+            words=completion.methods,
+        ),
     ] = None,
 ) -> None:
     """Write the report of a results folder."""
@@ -139,11 +144,16 @@ def verify(
     again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
     run: Annotated[
         str | None,
-        given.option("ID", "Only perform this run again; ID is the beginning of its id.", "--run"),
+        given.option(
+            "ID",
+            "Only perform this run again; ID is the beginning of its id.",
+            "--run",
+            words=completion.runs,
+        ),
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """Check stored runs: execute all solutions again, and perform runs again if asked to.
+    """Check stored runs by executing their solutions again.
 
     Exits with code 1 if a result differs, or if the folder lacks runs. With --run only one run is
     performed again, and nothing else is checked.
@@ -251,7 +261,7 @@ def cite(
         bool, typer.Option("--analysis", help="Also cite works on the statistics and signatures.")
     ] = False,
 ) -> None:
-    """Print BibTeX for coartic, the paper and methods."""
+    """Print BibTeX entries of coartic, the paper and the methods."""
     from coartic.analysis.citations import bibliography
     from coartic.benchmarks.registry import built_in
     from coartic.runs.store import open_store
@@ -276,11 +286,17 @@ def draw(
         typer.Argument(
             metavar="TASK",
             help="Tasks, task files, or long/v1/i000..i003. With --run: a results folder.",
+            autocompletion=completion.tasks,
         ),
     ] = None,
     run: Annotated[
         list[str] | None,
-        given.option("ID", "Run to film. Give it twice for two runs side by side.", "--run"),
+        given.option(
+            "ID",
+            "Run to film. Give it twice for two runs side by side.",
+            "--run",
+            words=completion.runs,
+        ),
     ] = None,
     initial: Annotated[
         bool, typer.Option("--initial", help="Also film the corrective process, next to the run.")
@@ -432,7 +448,11 @@ def _film(
 def play(
     task: Annotated[
         str | None,
-        typer.Argument(metavar="TASK", help="First task of the page, or a task file (.toml)."),
+        typer.Argument(
+            metavar="TASK",
+            help="First task of the page, or a task file (.toml).",
+            autocompletion=completion.tasks,
+        ),
     ] = None,
     out: given.Out = None,
     show: Annotated[
@@ -440,7 +460,7 @@ def play(
     ] = True,
     replace: given.Replace = False,
 ) -> None:
-    """Open a page in the browser on which you can move goals and watch the learner learn."""
+    """Play in the browser: move goals, and watch the learner learn."""
     import webbrowser
 
     from coartic import load_task

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from coartic.cli import arguments as given
+from coartic.cli import completion
 from coartic.cli.read import say_ranking
 from coartic.cli.terminal import Display, say, say_pairs, say_table
 from coartic.errors import CoarticError
@@ -32,7 +33,9 @@ def run(
     suite: Annotated[
         str | None,
         typer.Argument(
-            metavar="SUITE", help="Suite to run (`coartic list` names them), or a TOML file."
+            metavar="SUITE",
+            help="Suite to run (`coartic list` names them), or a TOML file.",
+            autocompletion=completion.suites,
         ),
     ] = None,
     folder: Annotated[
@@ -56,10 +59,20 @@ def run(
         given.within("--jobs", "Number of processes; by default one for each core.", 1, MOST_JOBS),
     ] = None,
     tasks: Annotated[
-        str | None, given.option("A,B", "Only these tasks, such as two-armed-1, or files (TOML).")
+        str | None,
+        given.option(
+            "A,B",
+            "Only these tasks, such as two-armed-1, or files (TOML).",
+            words=completion.after_commas(completion.tasks),
+        ),
     ] = None,
     methods: Annotated[
-        str | None, given.option("X,Y", "Only these methods, such as EC4, CMA-ES or 'optimum/*'.")
+        str | None,
+        given.option(
+            "X,Y",
+            "Only these methods, such as EC4, CMA-ES or 'optimum/*'.",
+            words=completion.after_commas(completion.methods),
+        ),
     ] = None,
     method_file: given.MethodFiles = None,
     family_file: Annotated[
@@ -80,10 +93,10 @@ def run(
         given.option("FOLDER", "Include the runs of a folder, or the results named 'shipped'."),
     ] = None,
 ) -> None:
-    """Run the missing part of a suite, and print the ranking unless --runs names a part.
+    """Run the missing part of a suite, and print the ranking.
 
     If the command is interrupted, repeat it. It continues where it stopped, and repeats runs that
-    crashed.
+    crashed. If --runs names a part of the runs, no ranking is printed.
     """
     from coartic.analysis.study import load
     from coartic.benchmarks.cluster import Dask
@@ -142,11 +155,18 @@ def run(
 def list_(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="Task, suite, method, family or results folder."),
+        typer.Argument(
+            metavar="NAME",
+            help="Task, suite, method, family or results folder.",
+            autocompletion=completion.names,
+        ),
     ] = None,
     method_file: given.MethodFiles = None,
 ) -> None:
-    """List tasks, suites and methods; describe one of them; or list the runs of a folder."""
+    """List tasks, suites and methods, or describe one of them.
+
+    For a results folder, list its runs and their ids.
+    """
     from coartic import builtin_tasks, load_task
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.suites import check_kind, kind_of, load_suite, suites
@@ -270,7 +290,9 @@ def check(
     subject: Annotated[
         str,
         typer.Argument(
-            metavar="NAME", help="Methods, such as EC4 or 'optimum/*', or a task file (.toml)."
+            metavar="NAME",
+            help="Methods, such as EC4 or 'optimum/*', or a task file (.toml).",
+            autocompletion=completion.methods,
         ),
     ],
     method_file: given.MethodFiles = None,
@@ -279,7 +301,10 @@ def check(
         typer.Option("--verbose", help="Show what the method prints and logs, and tracebacks."),
     ] = False,
 ) -> None:
-    """Check whether a method or a task file keeps the rules; exit with code 1 if it does not."""
+    """Check whether a method or a task file keeps the rules.
+
+    Exits with code 1 if it does not.
+    """
     from coartic import builtin_tasks
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry
@@ -329,14 +354,13 @@ def new(
     out: given.Out = None,
     replace: given.Replace = False,
 ) -> None:
-    """Write a file with a small working method, as a start for your own."""
+    """Write a small working method into a file, to start your own."""
     from coartic.benchmarks import template
     from coartic.benchmarks.registry import check_id, registry
-    from coartic.internal.files import write_output
+    from coartic.internal.files import check_ending, write_output
 
     path = Path(given.file_name(name)) if out is None else out
-    if path.suffix != ".py":
-        raise CoarticError(f"--out {path}: the name must end in .py.")
+    check_ending(path, [".py"])
     check_id(name, "coartic new", registry())
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)

@@ -85,7 +85,7 @@ class Play {
     this.find = (name) => root.querySelector(`[data-is="${name}"]`);
     this.set = (property, values) => Object.entries(values).forEach(([name, value]) => { this.find(name)[property] = value; });
     this.stage = new Picture(this.find("stage"));
-    this.inset = new Picture(this.find("inset"));
+    [this.first_inset, this.inset] = ["first", "inset"].map((name) => new Picture(this.find(name)));
     this.curve = new Picture(this.find("curve"));
     this.calm = window.matchMedia("(prefers-reduced-motion: reduce)");
     this.listen();
@@ -435,27 +435,44 @@ class Play {
     }).map((runs) => runs.filter(Boolean));
   }
 
-  /* Posture difference of the robots at the goal that they share, in words and as a picture. */
+  /* What two learners do in their first trial; empty if they are not shown, or until both have made it. */
+  get first_trials() {
+    if (this.main.length < 2 || this.announced || this.state.who !== "learner") return [];
+    const trials = this.problems.map((_, k) => this.snapshot(`${k} run 0`, 1));
+    return trials.every((trial) => trial && trial.reached.length) ? trials : [];
+  }
+
+  /* Posture difference of the robots at the goal that they share, in words and as pictures, before practice as well. */
   compare() {
     const both = this.main.length > 1 && !this.editing ? this.postures_met : [];
-    this.find("inset").hidden = !both.length || !both.every((runs) => runs.length);
+    const shown = both.length > 0 && both.every((runs) => runs.length);
+    const first = shown ? this.first_trials.map(({ reached }) => reached.slice(0, 1)) : [];
+    this.set("hidden", { inset: !shown, before: !first.length, now: !first.length });
     this.difference = null;
-    if (this.find("inset").hidden) return;
+    if (!shown) return;
     this.difference = posture_difference(this.announced ? both.map((runs) => runs.slice(1)) : both);
     if (this.announced) this.difference.shifts = both.map(([before, after]) => distance_of(before, after));
-    const { inset, colours, problems: [problem] } = this;
-    const { means } = this.difference;
-    const points = both.flatMap((runs, k) => [...runs, means[k]].flatMap((q) => problem.hands.flatMap((hand) => joint_positions(problem, q, hand))));
+    const { problems: [problem], difference: { means } } = this;
+    const { scale, hands } = problem;
     const [x, y] = problem.goals[this.shared];
-    const { scale } = problem;
-    const sides = means.map(([base_x, base_y]) => [base_x - 0.5 * scale, base_y - 0.1 * scale]);
-    inset.begin(around([...points, [x + 0.3 * scale, y + 0.2 * scale], ...sides], 0.3 * scale));
+    const points = [...first, ...both, means].flat().flatMap((q) => [
+      [q[0] - 0.5 * scale, q[1] - 0.1 * scale], ...hands.flatMap((hand) => joint_positions(problem, q, hand)),
+    ]);
+    const box = around([...points, [x + 0.3 * scale, y + 0.2 * scale]], 0.3 * scale);
+    if (first.length) this.drawMeeting(this.first_inset, box, first, first.flat());
+    this.drawMeeting(this.inset, box, both, means);
+  }
+
+  /* Draw postures of both robots at the goal that they share: thin those of runs, thick their means. */
+  drawMeeting(picture, box, both, means) {
+    const { colours, problems: [problem] } = this;
+    picture.begin(box);
     both.forEach((runs, k) => {
-      runs.forEach((q) => inset.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, thin: true }));
-      inset.robot(problem, means[k], { colour: colours[ROLES[k]], alpha: 0.9 });
+      runs.forEach((q) => picture.robot(problem, q, { colour: colours[ROLES[k]], alpha: 0.35, thin: true }));
+      picture.robot(problem, means[k], { colour: colours[ROLES[k]], alpha: 0.9, weight: k ? 1 : 1.4 }); // the one below shows
     });
-    inset.goal([x, y], problem.radius, { label: "", colour: colours.ink, hit: true });
-    inset.text(`at goal ${this.shared + 1}`, [8, 12], colours.soft, "left", 12);
+    picture.goal(problem.goals[this.shared], problem.radius, { label: "", colour: colours.ink, hit: true });
+    picture.text(`at goal ${this.shared + 1}`, [8, 12], colours.soft, "left", 12);
   }
 
   /* Ticks needed against trials, on a logarithmic scale. */
@@ -562,8 +579,10 @@ class Play {
     if (!hasRuns) return [`At goal 1 the posture difference is ${short(distance)}.`, far];
     const by_chance = this.stored(state.who) && this.preset.by_chance;
     const random = Number.isFinite(by_chance) ? ` (random search: ${by_chance.toFixed(1)})` : "";
+    const saved = this.first_trials.map(({ reward }, k) => main[k].trial.reward - reward);
+    const pays = saved.length && Math.min(...saved) > 0 ? `Practice saves blue ${counted(saved[0], "tick")} and orange ${saved[1]}. ` : "";
     return [
-      `At goal 1 the posture difference is ${deviations === null ? "…" : deviations.toFixed(1)} standard deviations${random}.`,
+      `${pays}At goal 1 the posture difference is ${deviations === null ? "…" : deviations.toFixed(1)} standard deviations${random}.`,
       `One standard deviation is the typical distance of a run (thin) from the mean (thick, ${counted(runs, "run")} each).${random && " Random search takes the best of as many random trials."}`,
     ];
   }
@@ -583,13 +602,19 @@ class Play {
     return scores;
   }
 
+  /* The scores as the page shows them, in words. */
+  get score_words() {
+    const words = (name) => [...this.find(name).children].map((line) => line.textContent).join("; ");
+    return this.find("before").hidden ? words("score") : `before practice: ${words("first-score")}; after practice: ${words("score")}`;
+  }
+
   say() {
     const { state } = this;
     const learns = state.who === "learner";
     const run = this.result("0 run 0");
     const at = learns && run ? Math.min(this.shown, run.made) : 0;
     const [finding, meaning = ""] = this.finding;
-    const scores = this.scores.map(([role, name, reward]) => {
+    const lines = (all) => all.map(([role, name, reward]) => {
       const line = document.createElement("span");
       const figure = document.createElement("strong");
       line.className = role;
@@ -597,10 +622,13 @@ class Play {
       line.append(`${name} `, figure);
       return line;
     });
-    this.find("score").replaceChildren(...scores);
+    const scores = this.scores;
+    const first = this.first_trials.map(({ reward }, k) => [...scores[k].slice(0, 2), reward]);
+    this.find("score").replaceChildren(...lines(scores));
+    this.find("first-score").replaceChildren(...lines(first));
     const drift = state.drift ? `, drift ${state.drift}` : "";
     this.set("textContent", {
-      lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", play: this.playing ? "Pause" : "Play",
+      lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", now: `After ${counted(at, "trial")}`, play: this.playing ? "Pause" : "Play",
       count: this.main.map((mover, k, all) => `${all.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${k < all.length - 1 ? mover.last + 1 : counted(mover.last + 1, "tick")}`).join(", "),
     });
     const stored = this.stored(state.who);
@@ -618,7 +646,7 @@ class Play {
     this.find("stage").setAttribute("aria-label", `${this.lead} ${finding}`);
     const open = this.busy || this.stale || [...this.fresh].some((key) => !this.results.get(key).done) || this.fresh.size < this.asked.size || this.paced < TRIALS;
     this.root.toggleAttribute("data-settled", !open);
-    const spoken = [...scores.map((line) => `${line.textContent};`), finding].join(" ");
+    const spoken = `${this.score_words}; ${finding}`;
     if (!this.playing && !open && !this.held && spoken !== this.spoken) {
       this.find("status").textContent = spoken;
       this.spoken = spoken;
@@ -931,7 +959,7 @@ class Play {
     this.find("why").textContent = (few && "The only goal cannot be removed, and has no next goal.") || (full && `A task can have at most ${MOST_GOALS} goals here.`) || "";
     const other = who !== "learner";
     this.set("hidden", {
-      runs: !runs.length, dial: other, "for-learner": other, "for-dial": other, "for-two": other || hasOneHand,
+      runs: !runs.length, "for-learner": other, "for-drift": other, "for-two": other || hasOneHand,
       "for-plan": who !== "plan", "for-you": who !== "you", "by-hand": hasOneHand,
     });
   }
@@ -992,14 +1020,16 @@ class Play {
 
   /* Save the stage at twice its size, with the postures at the shared goal and the text below. */
   save() {
-    const { stage, inset, data, colours } = this;
-    [stage.density, inset.density] = [2, 2];
+    const { stage, first_inset, inset, data, colours } = this;
+    const pictures = [stage, first_inset, inset];
+    pictures.forEach((each) => { each.density = 2; });
     this.draw();
     const [width, stage_height] = stage.size;
-    const height = stage_height + (inset.canvas.hidden ? 0 : inset.size[1]);
+    const insets = [first_inset, inset].filter(({ canvas }) => canvas.checkVisibility());
+    const height = stage_height + (insets.length ? inset.size[1] : 0);
     const picture = new Picture(document.createElement("canvas"));
     const { canvas, context } = picture;
-    const words = [[...this.find("score").children].map((line) => line.textContent).join("; "), ...this.finding, `${[this.find("preset").selectedOptions[0].text, this.nameOf(this.state.who), this.find("progress").textContent].filter(Boolean).join(", ")}; coartic ${data.version}`];
+    const words = [capital(this.score_words), ...this.finding, `${[this.find("preset").selectedOptions[0].text, this.nameOf(this.state.who), this.find("progress").textContent].filter(Boolean).join(", ")}; coartic ${data.version}`];
     context.font = "28px system-ui, sans-serif";
     const lines = words.flatMap((text) => text.split(" ").reduce((all, word) => {
       const longer = all.length ? `${all.at(-1)} ${word}` : word;
@@ -1009,9 +1039,9 @@ class Play {
     context.fillStyle = stage.colour("page");
     context.fillRect(0, 0, canvas.width, canvas.height);
     context.drawImage(stage.canvas, 0, 0);
-    if (height > stage_height) context.drawImage(inset.canvas, 0, 2 * stage_height);
+    insets.forEach(({ canvas: drawn }, k) => context.drawImage(drawn, k * drawn.width, 2 * stage_height));
     lines.forEach((line, k) => picture.text(line, [24, 2 * height + 32 + 40 * k], colours.ink, "left", 28));
-    [stage.density, inset.density] = [0, 0];
+    pictures.forEach((each) => { each.density = 0; });
     this.draw();
     canvas.toBlob((blob) => this.download(blob, "coartic.png"));
   }

@@ -1,0 +1,74 @@
+"""Complete names on the command line: suites, tasks, methods, and ids of runs.
+
+A shell calls these functions when the user presses Tab. Each takes the incomplete word and returns
+words; typer offers those that begin with it. If there are none, the shell offers files. To be fast,
+they read the names of shipped files, and import neither pandas nor Numba.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import typer
+
+import coartic
+
+Words = Callable[[str], list[str]]
+"""Function that returns words for an incomplete word."""
+_PACKAGE = Path(coartic.__file__).parent
+
+
+def suites(incomplete: str = "") -> list[str]:
+    """Return the names of the shipped suites."""
+    return sorted(path.stem for path in (_PACKAGE / "benchmarks" / "suites").glob("*.toml"))
+
+
+def tasks(incomplete: str = "") -> list[str]:
+    """Return the names of the shipped tasks, and of the first instance of each shipped family."""
+    files = sorted((_PACKAGE / "tasks" / "paper").glob("*.toml"))
+    return [
+        *(path.stem.partition("-")[2] for path in files),  # such as 1-ascending
+        *(f"{family}/i000" for family in families()),
+    ]
+
+
+def families(incomplete: str = "") -> list[str]:
+    """Return the names of the shipped families."""
+    files = sorted((_PACKAGE / "tasks" / "families").glob("*.toml"))
+    return [path.stem.replace(".", "/") for path in files]
+
+
+def methods(incomplete: str = "") -> list[str]:
+    """Return the ids of built-in methods, conditions of the learner, and names without blanks."""
+    known = tomllib.loads((_PACKAGE / "analysis" / "methods.toml").read_text("utf-8"))
+    conditions = [name.partition("dual-process/")[2] for name in known]
+    short_names = [method["name"] for method in known.values() if " " not in method["name"]]
+    return [name for name in (*conditions, *short_names, *known) if name not in ("", "custom")]
+
+
+def names(incomplete: str = "") -> list[str]:
+    """Return the names that ``coartic list`` describes."""
+    return [*suites(), *tasks(), *families(), *methods()]
+
+
+def after_commas(words: Words) -> Words:
+    """Return a function that completes the last word of a list with commas."""
+
+    def complete(incomplete: str) -> list[str]:
+        before, comma, last = incomplete.rpartition(",")
+        return [f"{before}{comma}{word}" for word in words(last)]
+
+    return complete
+
+
+def runs(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Return the ids of the runs of the results folder that the command line names."""
+    from coartic.runs.store import open_store
+
+    # The folder is not parsed yet, because the option before the incomplete word lacks its value.
+    for folder in ctx.args[:1]:
+        with open_store(Path(folder)) as store:
+            return store.ids(incomplete)
+    return []
