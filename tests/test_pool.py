@@ -120,28 +120,46 @@ def test_whatever_a_method_does_is_kept_with_a_reason(runs, name):
     assert run.isna().reward if status != "ok" else run.reward == HONEST
 
 
+class Impatient(Local):
+    """Ends a job that waits for its file, after a moment, and gives one whose file is there ample
+    time. The file of ``once`` comes before its second attempt."""
+
+    def __init__(self, folder):
+        super().__init__(1)
+        self.folder, self.asked = folder, []
+
+    def wall_limit_s(self, job):
+        name = job.cell.parameters["what"]
+        self.asked.append(name)
+        if self.asked.count("once") == 2:
+            (self.folder / "mine.py.once").touch()
+        return 600.0 if (self.folder / f"mine.py.{name}").exists() else 0.2
+
+
 def test_a_run_that_waits_twice_is_stored_as_timed_out(tmp_path):
-    """In one command, which counts what it stored; a command with more time makes it again. Wall
-    time is ample: on a busy machine a run that waits for nothing but its turn ends in time."""
-    body = """if not os.path.exists(__file__ + '.NAME'):
-            open(__file__ + '.once', 'w').close()
+    """In one command, which counts what it stored; a command with more time makes it again."""
+    body = """while not os.path.exists(__file__ + '.' + self.parameters.what):
             time.sleep(999)
         return Result(corrected(session))"""
-    once, twice = (body.replace("NAME", name) for name in ("once", "ready"))
-    cells = cells_of(tmp_path, once=once, twice=twice)
-    executor, limits = Local(1, timeout_s=4.1), (0.3, 0.3, 0.31)
+    cells = cells_of(tmp_path, once=body, twice=body)
+    limits, executor = (0.3, 0.3, 0.31), Impatient(tmp_path)
     plans = [planned(cells, runs=1, time_limit_s=limit) for limit in limits]
     said = [str(perform(plan, tmp_path / "out", executor=executor)) for plan in plans[:2]]
     runs = load(tmp_path / "out").runs
     assert runs.status.tolist() == ["ok", "timeout"]
-    assert runs.reason[1] == "wall time limit of 5 s exceeded twice: the job waited"
+    assert runs.reason[1] == "wall time limit of 0.2 s exceeded twice: the job waited"
     assert said[0].startswith("2 runs in ")
     assert "1 failed" in said[0]
     assert said[1].startswith("2 runs (2 reused) in ")
     assert "1 failed" in said[1]
-    (tmp_path / "mine.py.ready").touch()
+    (tmp_path / "mine.py.twice").touch()
     assert perform(plans[2], tmp_path / "out", executor=executor).failed == 0
     assert load(tmp_path / "out").runs.status.tolist() == ["ok"] * 2
+
+
+def test_the_limit_of_wall_time_follows_from_that_of_cpu_time():
+    (job,) = planned([PLAN[0].cell], runs=1, time_limit_s=0.3)
+    assert Local(1, timeout_s=4.1).wall_limit_s(job) == pytest.approx(3 * 0.3 + 4.1)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the test chooses the core of processes")

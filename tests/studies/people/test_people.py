@@ -12,43 +12,53 @@ FOLDER = ROOT / "studies" / "people"
 TARGETS = (1, 9, 11)
 
 
-def noise(rng, repeats, carried):
+def noise(rng, *shape, carried):
     """Noise of 0.05 rad at start, end and next posture, of which a share is carried on."""
-    fresh = 0.05 * rng.normal(size=(repeats, 3, 4))
+    fresh = 0.05 * rng.normal(size=(*shape, 3, 4))
     for k in (1, 2):
-        fresh[:, k] = carried * fresh[:, k - 1] + np.sqrt(1 - carried**2) * fresh[:, k]
+        fresh[..., k, :] = (
+            carried * fresh[..., k - 1, :] + (1 - carried**2) ** 0.5 * (fresh[..., k, :])
+        )
     return fresh
 
 
-def direction(rng):
-    vector = rng.normal(size=4)
-    return vector / np.linalg.norm(vector)
+def directions(rng, *shape):
+    vectors = rng.normal(size=(*shape, 4))
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def planted(rng, lean=0.0, drift=0.0, shift=0.0, apart=0.6, people=7, repeats=3, carried=0.7):
-    """Contexts of a study: a way of length ``apart`` for each target; ``drift``: SD of an offset of
-    each block at the start, which is carried on; ``shift``: length of an offset of the end posture
-    alone, in a random direction, which is carried on to the next posture."""
+def planted(
+    rng, studies=1, lean=0.0, drift=0.0, shift=0.0, apart=0.6, people=7, repeats=3, carried=0.7
+):
+    """Contexts of studies, each with targets and people of its own: a way of length ``apart`` for
+    each target; ``drift``: SD of an offset of each block at the start, which is carried on;
+    ``shift``: length of an offset of the end posture alone, in a random direction, which is carried
+    on to the next posture."""
     contexts = {}
-    for target in TARGETS:
-        way, base = apart * direction(rng), rng.normal(size=(3, 4))
-        contexts[target] = {}
-        for person in range(people):
-            both = []
-            for ahead in (way, 0 * way):
-                mean = base + np.array([0 * way, lean * ahead, ahead])
-                mean = mean + np.outer([1, carried, carried**2], drift * rng.normal(size=4))
-                off = shift * direction(rng) if shift else np.zeros(4)
-                mean[1:] += np.array([off, carried * off])
-                both.append(mean + noise(rng, repeats, carried))
-            contexts[target][person] = both
+    for target in range(studies * len(TARGETS)):
+        way, base = apart * directions(rng), rng.normal(size=(3, 4))
+        ahead = np.array([way, 0 * way])  # of both contexts
+        means = base + np.stack([0 * ahead, lean * ahead, ahead], axis=1)
+        blocks = np.repeat(means[None], people, axis=0)  # people, contexts, 3, 4
+        faded = np.array([1, carried, carried**2])[:, None]
+        blocks += faded * drift * rng.normal(size=(people, 2, 1, 4))
+        blocks[:, :, 1:] += faded[:2] * shift * directions(rng, people, 2, 1)
+        runs = blocks[:, :, None] + noise(rng, people, 2, repeats, carried=carried)
+        first = people * (target // len(TARGETS))
+        contexts[target] = dict(enumerate(runs, first))
     return contexts
 
 
+def values_of(contexts, people=7, **options):
+    """The values of people, shape (studies, people)."""
+    found = RULES.people(RULES.leans(contexts, **options))
+    return found.more.to_numpy().reshape(-1, people)
+
+
 def share_rejected(studies, **kinds):
-    rng = np.random.default_rng(7)
-    values = [RULES.people(RULES.leans(planted(rng, **kinds))) for _ in range(studies)]
-    return np.mean([RULES.sign_flips(each.more) <= RULES.LEVEL for each in values])
+    values = values_of(planted(np.random.default_rng(7), studies, **kinds))
+    assert len(values) == studies
+    return np.mean([RULES.sign_flips(each) <= RULES.LEVEL for each in values])
 
 
 @pytest.mark.parametrize(
@@ -60,26 +70,18 @@ def test_without_a_lean_the_test_keeps_its_level(kind):
 
 
 def test_a_planted_lean_is_found():
-    rng, values, held = np.random.default_rng(3), [], []
-    for _ in range(60):
-        each = RULES.people(RULES.leans(planted(rng, lean=0.3))).more
-        values.append(each.mean())
-        half = 2.447 * each.std() / np.sqrt(7)  # t with 6 degrees of freedom
-        held.append(abs(each.mean() - 0.3) <= half)
-    assert 0.28 < np.mean(values) < 0.31
-    assert np.mean(held) > 0.85
+    values = values_of(planted(np.random.default_rng(3), 60, lean=0.3))
+    half = 2.447 * values.std(axis=1, ddof=1) / np.sqrt(7)  # t with 6 degrees of freedom
+    assert 0.28 < values.mean() < 0.31
+    assert np.mean(np.abs(values.mean(axis=1) - 0.3) <= half) > 0.85
     assert share_rejected(10, lean=0.3) == 1.0
 
 
 def test_own_next_postures_would_take_a_shift_for_a_lean():
     """What a person carries on counts with n of the same person, and not with n of others."""
-    rng, own, others = np.random.default_rng(5), [], []
-    for _ in range(30):
-        contexts = planted(rng, shift=0.2)
-        own.append(RULES.people(RULES.leans(contexts, own=True)).more.mean())
-        others.append(RULES.people(RULES.leans(contexts)).more.mean())
-    assert np.mean(own) > 0.05
-    assert abs(np.mean(others)) < 0.02
+    contexts = planted(np.random.default_rng(5), 30, shift=0.2)
+    assert values_of(contexts, own=True).mean() > 0.05
+    assert abs(values_of(contexts).mean()) < 0.02
 
 
 def test_equal_next_postures_have_no_lean():
