@@ -196,7 +196,8 @@ def for_page(plot: Plot) -> str:
       ``--paper``, if the page has it. Grey is ``--grey``, blue ``--blue``, and colours of methods
       have their names.
     - Marks with a :func:`~.style.tip` show its text.
-    - Ids begin with the plot's id, so that a page can have several figures.
+    - Ids begin with the plot's id, so that a page can have several figures. The id of the whole
+      drawing ends in ``-drawing``.
     - Each ``style`` attribute becomes a class, named by a hash of the style.
     """
 
@@ -232,8 +233,35 @@ def for_page(plot: Plot) -> str:
     rules = "".join(f".{name}{{{look}}}" for look, name in looks.items())
     return (
         f'<svg {view[0]} xmlns="http://www.w3.org/2000/svg" role="img" '
-        f'aria-label="{html.escape(one_line(plot.alt))}"><g stroke-linejoin="round" '
-        'stroke-linecap="butt" fill="currentColor">'
+        f'aria-label="{html.escape(one_line(plot.alt))}"><g id="{plot.id}-drawing" '
+        'stroke-linejoin="round" stroke-linecap="butt" fill="currentColor">'
         f"<style>{rules}</style>"
         f"{body.replace('xlink:href', 'href').strip().removesuffix('</svg>')}</g></svg>"
     )
+
+
+def panels_for_page(plot: Plot) -> list[str]:
+    """Return the panels and legends of a figure as ``<svg>`` elements, for a narrow page.
+
+    They show parts of :func:`for_page`, which must be on the page, and be called before. The list
+    is empty if there is only one panel, or a panel lacks the names of its rows.
+    """
+    drawing, canvas = plot.figure, plot.figure.canvas
+    panels = [axes for axes in drawing.axes if axes.has_data()]
+    named = [axes.yaxis.get_tick_params()["labelleft"] for axes in panels if axes.axison]
+    if len(panels) < 2 or not all(named):
+        return []
+    FigureCanvasSVG(drawing)  # measures its fonts
+    boxes = [part.get_tightbbox() for part in (*panels, *drawing.legends)]
+    drawing.set_canvas(canvas)
+    points, height = 72 / drawing.dpi, 72 * drawing.get_figheight()
+    views = []
+    for number, box in enumerate(boxes, 1):
+        x, y = points * box.x0 - 3, height - points * box.y1 - 3
+        view = f"{x:.1f} {y:.1f} {points * box.width + 6:.1f} {points * box.height + 6:.1f}"
+        label = html.escape(one_line(f"{plot.title}, part {number}. {plot.alt * (number == 1)}"))
+        views.append(
+            f'<svg viewBox="{view}" xmlns="http://www.w3.org/2000/svg" role="img" '
+            f'aria-label="{label}"><use href="#{plot.id}-drawing"/></svg>'
+        )
+    return views
