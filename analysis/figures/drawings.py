@@ -184,7 +184,11 @@ def _draw_cells(axes: Axes, rows: pd.DataFrame) -> str:
     axes.set_xticks(np.arange(len(values)) + 0.5, map(str, values))
     axes.set_yticks(np.arange(len(lines)) + 0.5, map(str, lines))
     axes.tick_params(length=0)
-    return " The numbers are gaps in per cent; the smallest is framed. The table has intervals."
+    has_intervals = bool(rows.gap_low.notna().any())
+    return (
+        " The numbers are gaps in per cent; the smallest is framed."
+        + " The table has intervals." * has_intervals
+    )
 
 
 _FEW: Any = {"markersize": 3, "alpha": 0.6}
@@ -335,7 +339,7 @@ def draw_saved(study: Study) -> Parts | None:
     if not parts:
         return None
     shape, most_rows = style.grid(len(parts)), max(map(len, parts))
-    line, size = (0.2, 6) if style.is_narrow() else (0.42, 7)  # inches, points
+    line, size = (0.17, 6) if style.is_narrow() else (0.42, 7)  # inches, points
     height = shape[0] * (0.3 + line * most_rows)
     drawing, panels = style.panels(shape, (style.TWO, height), len(parts))
     looks = looks_in(study, rows.method)
@@ -360,7 +364,7 @@ def draw_saved(study: Study) -> Parts | None:
             for x, value in zip(at, ticks.round(), strict=True):
                 text = f"{value:+.0f}".replace("-", "−") if value else "0"
                 axes.text(x + 0.25, -place, text, va="center", fontsize=size, bbox=paper)
-        style.name_rows(axes, [name_in_figure(study, label) for label in part.method])
+        style.name_rows(axes, [name_in_figure(study, label, 24) for label in part.method])
         axes.set_xticks(at, [*(f"goal {goal}" for goal in goals), "sum"])
         axes.set_xlim(0.6, at[-1] + 0.75)
         axes.tick_params(axis="x", length=0, pad=1)
@@ -664,7 +668,8 @@ def draw_learning_curves(study: Study) -> Parts | None:
         handles.append(style.legend_line(name, **style.INITIAL))
     if known := [task.name for task in tasks if task.name in study.optima]:
         handles.append(style.legend_line(reference(study, known), **style.OPTIMUM))
-    style.legend(drawing, handles, 2)
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    style.legend(drawing, handles, 2 if longest <= 34 else 1)
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(study, ends, "{task}, {title}: {best:.0f}")
     alt = f"Reward against trial. Mean best reward at the end: {words}."

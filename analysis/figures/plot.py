@@ -131,14 +131,15 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     return looks
 
 
-def name_in_figure(study: Study, method: str) -> str:
+def name_in_figure(study: Study, method: str, longest: int = _LONGEST_NAME) -> str:
     """Return the name of a method (a label) for the figure that is being drawn.
 
-    It is the method's title, or its short name in a narrow figure. A long name has several lines.
+    It is the method's title, or its short name in a narrow figure. A name of more than ``longest``
+    letters, or of 24 in a narrow figure, has several lines.
     """
     if style.is_narrow():
         return "\n".join(textwrap.wrap(study.methods.short[method], _LONGEST_NAME // 2))
-    return "\n".join(textwrap.wrap(study.methods.title[method], _LONGEST_NAME))
+    return "\n".join(textwrap.wrap(study.methods.title[method], longest))
 
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
@@ -257,8 +258,8 @@ def panels_for_page(plot: Plot) -> list[str]:
     points, height = 72 / drawing.dpi, 72 * drawing.get_figheight()
     views = []
     for number, box in enumerate(boxes, 1):
-        x, y = points * box.x0 - 3, height - points * box.y1 - 3
-        view = f"{x:.1f} {y:.1f} {points * box.width + 6:.1f} {points * box.height + 6:.1f}"
+        x, y = points * box.x0 - 1, height - points * box.y1 - 1
+        view = f"{x:.1f} {y:.1f} {points * box.width + 2:.1f} {points * box.height + 2:.1f}"
         label = html.escape(one_line(f"{plot.title}, part {number}. {plot.alt * (number == 1)}"))
         views.append(
             f'<svg viewBox="{view}" xmlns="http://www.w3.org/2000/svg" role="img" '

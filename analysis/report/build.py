@@ -38,6 +38,8 @@ from coartic.runs.store import lock
 from coartic.tasks.task import shipped_tasks
 
 HERE = Path(__file__).parent
+LONG = 10
+"""Most rows of a table that the page does not fold."""
 
 
 def write_report(
@@ -166,7 +168,8 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
     tables = []
     for table in section.tables:
         if len(frame := _rows_shown(study, table)):
-            folded = table not in section.unfolded and (has_figure or not section.figures)
+            is_long = table not in section.unfolded or len(frame) > LONG
+            folded = is_long and (has_figure or not section.figures)
             words = {"id": table.id, "caption": caption_of(table, study), "rows": len(frame)}
             tables.append({**words, "html": html_of(table, study, frame), "folded": folded})
     return {

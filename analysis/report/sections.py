@@ -97,8 +97,8 @@ class Section:
     single: bool = True
     """True for sections about individual tasks. A study of many random tasks leaves them out."""
     unfolded: tuple[Table, ...] = ()
-    """Tables that the page does not fold, because no figure shows their numbers. If the section has
-    figures, but the folder has no runs for them, no table is folded."""
+    """Tables that the page does not fold unless they are long, because no figure shows their
+    numbers. If the section has figures, but none can be drawn, no table is folded."""
 
 
 SECTIONS = (
@@ -110,26 +110,31 @@ SECTIONS = (
         sentence="""\
 {% if parameters %}
 {% for best in leading(rows)[:1] %}
-The best setting is {{ best.title }}: its gap to the {{ reference }} is \
-{{ interval(best, "gap", scale=100, unit=" %") }}.
-{%- for next in others[1].to_dict("records")[:1] %}
+{% set tied = (rows.gap == best.gap).sum() %}
+{{ "The best setting is %s: its" % best.title if tied == 1 else "The smallest" }} gap to the \
+{{ reference }} is {{ interval(best, "gap", scale=100, unit=" %") }}\
+{{ ", which %s settings have" % tied if tied > 1 }}.
+{%- for next in others[1].to_dict("records")[:1] if tied == 1 %}
  The gap of {{ next.title }} is larger by {{ interval(next, "difference", scale=100) }} percentage \
 points{{ ", which %s chance (%s)" % ("exceeds" if next.p_holm < LEVEL else "may be", \
 p_value(next.p_holm)) if next.p_holm >= 0 else few(next) }}.
 {%- endfor %}
-{%- for row in rows[rows.method.isin(papers)].to_dict("records") if row.method != best.method %}
+{%- set said = [best.method] + others[1].method[:1].tolist() %}
+{% for row in rows[rows.method.isin(papers)].to_dict("records") if row.method not in said %}
  The gap of {{ row.title }} is {{ interval(row, "gap", scale=100, unit=" %") }}.
 {%- endfor %}
 {%- set useless = (rows.share <= 0).sum() %}
 {% if useless %}
- {{ useless }} of {{ rows | length }} settings gain nothing\
+ {{ "None of the settings gains anything" if useless == rows | length else \
+"%d of %d settings gain%s nothing" % (useless, rows | length, "s" if useless == 1 else "") }}\
 {{ " in %s trials" % number(budget) if budget }}.
 {%- endif %}
 {% if interaction < LEVEL %}
  The effect of {{ parameters[0] }} depends on {{ parameters[1] }} ({{ p_value(interaction) }}).
 {%- endif %}
 {% if parameters | length > 2 %}
- There is no picture, because {{ parameters | listed }} vary, and a picture shows two parameters.
+ There is no picture, because a picture shows at most two parameters, and \
+{{ parameters | listed }} vary.
 {%- endif %}
 
 {% endfor %}
@@ -224,7 +229,7 @@ ascending=[true, false]) %}
 {{ row.title }} needs {{ interval(row, "trials_to_half", 0) }}{{ " trials for half of the gain" if loop.first }}\
 {% else %}
 {{ row.title }} does not {{ "get there" if loop.index > 1 else "reach half of the gain" }} in \
-{{ row.trials | number }}\
+{{ row.trials | number }}{{ " trials" if loop.first }}\
 {% endif %}
 {{ "." if loop.last else "; " }}
 {%- endfor %}""",
