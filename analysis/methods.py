@@ -9,7 +9,7 @@ import itertools
 import json
 import tomllib
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -156,19 +156,19 @@ def methods_of(
     import pandas as pd  # other parts of this module are used without pandas
 
     rows, by_label = dict[str, dict[str, Any]](), dict([*runs.groupby("label", sort=False)])
-    varied, values = parameter_varied(runs)
+    varied = parameters_varied(runs)
     titles = Counter(map(title_of, declared.values()))
     for label, of_method in by_label.items():
         base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
         named = setting
-        if label in values:
+        if label in varied.index:
             default_note = ", the paper's" if base in LEARNERS else ", default"
-            named = in_words({varied: values[label]}) + default_note * (not setting)
+            named = in_words(varied.loc[label].to_dict()) + default_note * (not setting)
         info = declared[base]
         facts = KNOWN_METHODS.get(base) if info.is_ours else None
         default = base if setting else facts.ablation_of if facts else ""
         called = info if titles[title_of(info)] == 1 else base  # ids, if titles are the same
-        under = default if default in by_label and label not in values else ""
+        under = default if default in by_label and label not in varied.index else ""
         rows[label] = {
             "base": base,
             "condition": CONDITION_OF.get(base, ""),
@@ -198,34 +198,42 @@ def methods_of(
     return pd.DataFrame([rows[label] for label in ordered], ordered).rename_axis("method")
 
 
-def parameter_varied(runs: pd.DataFrame) -> tuple[str, dict[str, Any]]:
-    """Return the parameter that a study varies, and its values by label.
+def parameters_varied(runs: pd.DataFrame) -> pd.DataFrame:
+    """Return the values of the parameters that a study varies.
 
-    A study varies a parameter if, apart from searches for the optimum,
+    A study varies parameters if, apart from searches for the optimum, all runs are of one method,
+    each of its settings was run on all tasks, and there are at least two settings.
 
-    - all runs are of one method;
-    - this parameter has at least two values, and each value was run on all tasks;
-    - all other parameters are equal.
+    Parameters
+    ----------
+    runs : DataFrame
+        As in :func:`methods_of`.
 
-    Otherwise name and values are empty. Values that are all numbers are in ascending order.
-    ``runs`` are as in :func:`methods_of`.
+    Returns
+    -------
+    DataFrame
+        A row for each label and a column for each parameter with at least two values. The parameter
+        with most values comes first. Rows are in ascending order of the columns that have only
+        numbers. The frame is empty if the study does not vary parameters.
     """
+    import pandas as pd
+
     runs = runs[~runs.method.isin(SEARCHES)]
-    tasks = runs.groupby("label", sort=False).task.nunique()
+    tasks = runs.groupby("label").task.nunique()
+    if runs.method.nunique() != 1 or (tasks < runs.task.nunique()).any():
+        return pd.DataFrame()
     texts = runs.drop_duplicates("label").set_index("label").parameters
-    by_label = {str(label): json.loads(text) for label, text in texts.items()}
-    names = {name for parameters in by_label.values() for name in parameters}
-    differ = [
-        name
-        for name in names
-        if len({repr(parameters.get(name)) for parameters in by_label.values()}) > 1
-    ]
-    if len({*runs.method}) != 1 or len(differ) != 1 or (tasks < runs.task.nunique()).any():
-        return "", {}
-    values = {label: parameters.get(differ[0]) for label, parameters in by_label.items()}
-    if all(type(value) in (int, float) for value in values.values()):
-        values = dict(sorted(values.items(), key=lambda item: item[1]))
-    return differ[0], values
+    values = pd.DataFrame([*map(json.loads, texts)], texts.index.astype(str), dtype=object)
+    counts = values.map(repr).nunique().sort_values(ascending=False, kind="stable")
+    varied = [*counts.index[counts > 1]]
+    numbers = [name for name in varied if are_numbers(values[name])]
+    values = values[varied].where(values[varied].notna(), None)
+    return values.sort_values(numbers, kind="stable") if numbers else values if varied else pd.DataFrame()
+
+
+def are_numbers(values: Iterable[object]) -> bool:
+    """Return True if all values are integers or floats, and not booleans."""
+    return all(type(value) in (int, float) for value in values)
 
 
 def _group_of(runs: pd.DataFrame) -> str:

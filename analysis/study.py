@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from coartic import Execution, Movement, NotApplicableError, Task, hand_sequences, initial_hands
-from coartic.analysis.methods import methods_of, parameter_varied, ranked_as
+from coartic.analysis.methods import methods_of, parameters_varied, ranked_as
 from coartic.analysis.optima import BestKnown, best_known, gap_share, restrictions
 from coartic.analysis.signatures import SIGNATURES, Solutions
 from coartic.analysis.words import titled_apart
@@ -185,13 +185,13 @@ class Study:
         return title, description
 
     @cached_property
-    def varied(self) -> tuple[str, dict[str, Any]]:
-        """Name of the parameter that the study varies, and its values by label.
+    def varied(self) -> pd.DataFrame:
+        """Values of the parameters that the study varies (:func:`.parameters_varied`).
 
-        Both are empty unless all runs, except searches, are of one method, and only this parameter
-        differs (:func:`.parameter_varied`).
+        It has a row for each label and a column for each parameter. It is empty if the study does
+        not vary parameters.
         """
-        return parameter_varied(self.runs)
+        return parameters_varied(self.runs)
 
     @cached_property
     def tasks(self) -> dict[str, Task]:

@@ -318,7 +318,8 @@ def _number_text(column: Column, value: float, *spread: float) -> str:
 def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
     """Return a table as HTML, made by pandas' Styler.
 
-    - The cell in row 2 and column 3 has the id ``T_ID_row2_col3``, where ``ID`` is the table's id.
+    - If the table has gaps on tasks, whose runs can be played, the cell in row 2 and column 3 has
+      the id ``T_ID_row2_col3``, where ``ID`` is the table's id.
     - Cells without a value are empty.
     - Cells of columns that are not numbers have the class ``text``.
     - Rows of methods from files have the class ``own``, unless all methods are from files.
@@ -334,7 +335,9 @@ def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
     kinds = {name: "" if column.is_number else "text" for name, column in columns.items()}
     cells = pd.DataFrame(texts)
     classes = pd.DataFrame({name: own + kind for name, kind in kinds.items()})
-    styler = Styler(cells, uuid=table.id, uuid_len=len(table.id)).hide(axis="index")
+    has_ids = any(column.name == "on " for column in table.columns)  # ids are half of the page
+    styler = Styler(cells, uuid=table.id, uuid_len=len(table.id), cell_ids=has_ids)
+    styler.hide(axis="index")
     styler.set_td_classes(classes).format(escape="html")
     styler.set_table_styles(
         {name: [{"selector": "th", "props": "text-align: left"}]
@@ -589,7 +592,7 @@ def list_differences(study: Study) -> Rows:
     on which the reference method solved all runs. The reference method is
 
     - :attr:`.Study.against`, if it is not empty;
-    - otherwise, if the study varies one parameter, the first method of the ranking;
+    - otherwise, if the study varies parameters, the first method of the ranking;
     - otherwise each method from a file. It is then compared only with the built-in methods that
       use the reward in the same way.
 
@@ -605,7 +608,7 @@ def list_differences(study: Study) -> Rows:
     methods, rows = study.methods, standings(study)
     solved_some = [label for label in rows.index if solved_tasks(study, str(label))]
     chosen = [study.against] if study.against else []
-    if study.varied[0] and not study.against:
+    if not study.varied.empty and not study.against:
         chosen = [*rows.index[rows.why == ""][:1]]
     own = [label for label in solved_some if not methods.built_in[label]]
     for against in chosen or own:
@@ -676,14 +679,14 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
     lean[]                  | lean (share of the way to the next posture)           | 2 | tex
     lean_start              | lean at the start
     lean_runs               | runs of the lean
-    next_apart              | distance of the next postures                         | 2
-    standardised_difference | standardised posture difference (SD of the runs)      | 1
+    next_apart
+    standardised_difference
     p_holm                  | p (corrected)                                         | p | tex
     control                 | random search                                         | 2 | tex
     control_runs            | its runs
     p_random_search         | p beyond random search                                | p | tex
-    equivalent | difference that keeps the hand in place (null space, per dimension) | 3
-    other                   | difference that moves the hand (per dimension)        | 3
+    equivalent
+    other
     """,
     with_settings=True,
 )
@@ -849,13 +852,14 @@ def _verdict_of(study: Study, shared: TwoContexts, row: Row) -> str:
     method       | method
     runs         | runs
     by_goal_[*]  | goal {} | 1
+    sum[]        | sum | 1
     """,
 )
 def list_saved(study: Study) -> Rows:
     """Yield how many ticks more than the corrective process each method takes for each goal.
 
     There is a row for each individual task and each method, except searches, that solved a run.
-    ``by_goal_1`` and so on are means over runs: ticks of the run less the ticks of the corrective
+    ``by_goal_1`` and so on, and their ``sum``, are means over runs: ticks of the run less the ticks of the corrective
     process alone with the same hands. Runs with hands with which this process fails are left out;
     if no runs remain, so is the row.
     """
@@ -872,6 +876,7 @@ def list_saved(study: Study) -> Rows:
             row: Row = {"task": task, "method": label, "runs": len(changes)}
             for goal, ticks in enumerate(changes.T, 1):
                 row |= mean(ticks).columns(f"by_goal_{goal}")
+            row |= mean(changes.sum(axis=1)).columns("sum")
             yield f"{task} {label}", row | run_ids(runs)
 
 
@@ -880,6 +885,7 @@ def list_saved(study: Study) -> Rows:
     """
     method         | method                                  |   | tex
     reached        | targets reached (%)                     | 0 | tex
+    trials         | trials                                  | 0
     trials_to_quarter[]          | trials to a quarter of the targets
     trials_to_half[]             | trials to half of the targets | | tex
     forward_kinematics_to_half[] | forward-kinematics evaluations to half of the targets | | tex
@@ -900,7 +906,7 @@ def list_runtimes(study: Study) -> Rows:
         if not all(map(len, times["trials"])):
             continue
         reached = share_reached(times["trials"])
-        row: Row = {"method": method, "reached": reached}
+        row: Row = {"method": method, "reached": reached, "trials": runs.trials.max()}
         for name, spend, share in COSTS:
             is_known = all(map(len, times[spend]))
             cost = budget_for(times[spend], share) if is_known else Estimate(math.nan)

@@ -131,9 +131,8 @@ def test_every_number_of_a_sentence_is_in_the_table_under_it(report):
         table = section.partition("<table")[2].partition("</table>")[0]
         cells = {*numbers_in(re.sub("<[^>]+>", " ", html.unescape(table)))}
         words = html.unescape(" ".join(lines)).replace("95 %", "")
-        counts = {*numbers_in(words.partition("by verdict")[2])}  # how many rows have a verdict
         seen += len(numbers_in(words))
-        assert {*numbers_in(words)} - counts <= cells, words
+        assert {*numbers_in(words)} <= cells, words
     assert seen > 10
 
 
@@ -173,6 +172,7 @@ def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path):
     assert f"{100 * means[best]:.1f} %" in answer
     plot = FIGURES["ranking"](seen)
     assert plot.data.set_index("value").gap.to_dict() == pytest.approx(means.to_dict())
+    assert plot.figure.axes[0].get_xscale() == "linear"  # from 0.02 to 0.1
     write_report(seen, tmp_path / "report", for_paper=False)
     written = (tmp_path / "report" / "report.html").read_text("utf-8")
     assert "<h1>Noise</h1>\n<p>How much exploration noise?</p>" in written

@@ -1,5 +1,7 @@
 """The page in a real browser: Chromium, driven by Playwright."""
 
+import itertools
+
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
@@ -39,8 +41,8 @@ def test_tables_are_searched_sorted_and_unfolded(opened, address):
     page = opened()
     # A table that is folded opens for a link to a cell, and is sorted by its headers.
     assert not page.locator("#T_methods").is_visible()
-    page.goto(f"{address}#T_methods_row2_col0")
-    assert page.locator("#T_methods_row2_col0").is_visible()
+    page.goto(f"{address}#T_methods")
+    assert page.locator("#T_methods").is_visible()
     head = page.locator("#T_methods thead button", has_text="reward").first
     column = page.locator("#T_methods thead th").all_inner_texts()
     place = next(k for k, text in enumerate(column) if text.startswith("reward"))
@@ -71,7 +73,7 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
     shared = shared_goal(traced)
     said = page.locator(".play .beside")
     said.get_by_text(
-        f"{shared.standardised_posture_difference:.1f} standard deviations"
+        f"posture difference is {float(f'{shared.posture_difference:.2f}'):g} "
     ).first.wait_for()
     page.get_by_text("Try more").click()
     tasks = {task.label: name for name, task in traced.tasks.items()}
@@ -97,6 +99,28 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
     part(page, "play").press("Tab")
     expect(part(page, "stored")).to_have_value("")
     expect(part(page, "score")).to_contain_text("The learner")
+
+
+def test_a_phone_shows_the_panels_of_a_figure_one_below_the_other(opened):
+    page = opened(width=390)
+    page.eval_on_selector_all("details", "all => all.forEach((each) => { each.open = true; })")
+    panels = page.eval_on_selector_all(
+        ".drawn.narrow svg",
+        """all => all.map((panel) => {
+            const [frame, drawn] = [panel, panel.firstChild].map((part) => part.getBoundingClientRect());
+            return [panel.closest("figure").id, frame.left, frame.right, frame.top, frame.bottom, drawn.width];
+        })""",
+    )
+    of_figure = {}
+    for figure, left, right, top, bottom, drawn in panels:
+        assert 0 <= left < right <= 390
+        assert drawn > 0
+        of_figure.setdefault(figure, []).append((top, bottom))
+    assert {"figure-saved", "figure-tasks", "figure-runtimes"} <= {*of_figure}
+    for rows in of_figure.values():
+        assert len(rows) > 1
+        assert all(bottom <= top + 1 for (_, bottom), (top, _) in itertools.pairwise(rows))
+    assert not any(drawn.is_visible() for drawn in page.locator("#figure-saved .wide").all())
 
 
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened):

@@ -5,6 +5,7 @@ and -465: in 20 targets, 1.35 and 3.35 ticks apart. The learner's runs on ascend
 has no spread.
 """
 
+import itertools
 import math
 
 import numpy as np
@@ -14,7 +15,7 @@ import pytest
 from coartic import CoarticError, corrective_trial
 from coartic.analysis import FIGURES, TABLES, runtimes
 from coartic.analysis.figures.drawings import learning_curves
-from coartic.analysis.methods import BY_FORMULA, BY_TRIAL, WITHOUT_REWARD
+from coartic.analysis.methods import BY_FORMULA, BY_TRIAL, LEARNERS, WITHOUT_REWARD
 from coartic.analysis.study import Study, solved
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of, study_of_trials
 
@@ -177,8 +178,14 @@ def test_ticks_saved_are_those_of_the_movements_less_those_of_the_corrective_pro
     reference = corrective_trial(traced.tasks["ascending"], runs.hands.iloc[0]).ticks_by_goal()
     expected = by_goal.loc[runs.run_id, [1, 2, 3]].mean() - np.array(reference)
     assert [row[f"by_goal_{goal}"] for goal in (1, 2, 3)] == pytest.approx([*expected])
+    assert row["sum"] == pytest.approx(expected.sum())
     drawn = FIGURES["saved"](traced).data.set_index(["task", "method"])
     assert drawn.by_goal_1["ascending", "dual-process/EC1"] == row.by_goal_1
+    learners = dict(zip(LEARNERS, itertools.repeat("learner")))
+    orders = [[learners.get(method, method) for _, method in of_task.index]
+              for _, of_task in drawn.groupby("task", sort=False)]  # fmt: skip
+    methods = [*dict.fromkeys(itertools.chain(*orders))]
+    assert all(order == [method for method in methods if method in order] for order in orders)
     without = traced.methods.information == WITHOUT_REWARD
     plans = traced.runs[traced.runs.label.map(without)]
     assert len(plans) > 0

@@ -241,3 +241,18 @@ def test_the_page_has_the_calibration_that_is_stored():
             *(pytest.approx(100 * each, abs=0.051) for each in row[1:]),
         )
     assert stored["too often"].idxmin() == "exchange"
+
+
+@pytest.mark.parametrize("population", ["normal", "exponential"])
+def test_the_interaction_of_two_factors_has_its_level_and_is_found(population):
+    """With effects of both factors and unequal spread, on two tasks."""
+    rng, p, planted = np.random.default_rng(4), [], []
+    for _ in range(60):
+        draws = [[[getattr(rng, population)(size=5) * (1 + i) + i + 2 * j for _ in range(2)]
+                  for j in range(2)] for i in range(3)]  # fmt: skip
+        p.append(hypotheses.interaction_test(draws))
+        draws[0][0] = [runs + 8 for runs in draws[0][0]]
+        planted.append(hypotheses.interaction_test(draws))
+    assert np.mean(np.array(p) < 0.05) < 0.05 + 3 * math.sqrt(0.05 * 0.95 / 60)
+    assert np.mean(np.array(planted) < 0.05) > 0.9
+    assert math.isnan(hypotheses.interaction_test([[[np.arange(4.0)]] * 2] * 2))

@@ -13,8 +13,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Rectangle
 from matplotlib.patheffects import withStroke
 
 from coartic import Task
@@ -37,6 +38,7 @@ from coartic.analysis.methods import (
     LEARNERS,
     RANDOM_SEARCH,
     WITHOUT_REWARD,
+    are_numbers,
     headline_methods,
     title_of,
     without_settings,
@@ -70,66 +72,123 @@ from coartic.tasks.task import shipped_tasks
 
 
 def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
-    """Draw the gap of each ranked method, or by value if the study varies one parameter.
+    """Draw the gap of each ranked method, or of each setting if the study varies parameters.
 
-    If fewer than two values of the parameter (:attr:`.Study.varied`) have a gap, the gaps of ranked
-    methods are drawn. Returns None if no method has a gap. For ``how`` see :data:`.DrawsFigure`.
+    Returns None if no method has a gap, and if more than two parameters vary. If fewer than two
+    settings have a gap, the gaps of ranked methods are drawn. For ``how`` see :data:`.DrawsFigure`.
     """
-    plot = _draw_varied(study, **how) or _draw_gaps(study, **how)
+    if len(study.varied.columns) > 2:
+        return None
+    plot = _draw_settings(study, **how) or _draw_gaps(study, **how)
     return plot and replace(plot, id="ranking")
 
 
 @figure(
-    "Gap by value of a parameter",
-    "Gap from the mean reward to the {reference}, as a share of it, with its "
-    f"{style.COVERAGE} bootstrap interval over runs, by the value of the only parameter that is "
-    "varied. n = {n} runs of a value.",
+    "Gap by setting",
+    "Gap from the mean reward to the {reference}, as a share of it, by the values that vary. "
+    "n = {n} runs of a setting.",
 )
-def _draw_varied(study: Study) -> Parts | None:
-    """Draw gaps against the values of the parameter that the study varies.
+def _draw_settings(study: Study) -> Parts | None:
+    """Draw gaps by the values of the one or two parameters that the study varies.
 
-    Returns None if fewer than two values have a gap.
+    The first parameter is on the x axis; each value of the second has a line. If both have at least
+    five values, the gaps are the cells of a heat map. Returns None if fewer than two settings have
+    a gap.
     """
-    name, values = study.varied
-    rows = standings(study).query("why == ''")
-    rows = rows.loc[[label for label in values if label in rows.index]]
-    if len(rows) < 2:
+    rows, tasks = standings(study).query("why == ''"), ranked_tasks(study)
+    varied = study.varied[study.varied.index.isin(rows.index)]
+    if len(varied) < 2:
         return None
-    rows = rows.assign(value=[values[label] for label in rows.index]).reset_index(names="method")
-    is_number = all(type(value) in (int, float) for value in rows.value)
-    places = rows.value.to_numpy(np.float64) if is_number else np.arange(len(rows), dtype=float)
+    first, *others = varied.columns
+    rows = rows.loc[varied.index].reset_index(names="method")
+    rows = rows.assign(value=[*varied[first]], line=[*varied[others[0]]] if others else "")
     drawing, (axes,) = style.panels((1, 1), (style.TWO, 2.6))
-    if is_number and places[0] > 0 and places[-1] >= 5 * places[0]:
+    axes.set_xlabel(first)
+    if others and rows.line.nunique() >= 5:
+        more = _draw_cells(axes, rows)
+        axes.set_ylabel(others[0])
+    else:
+        more = _draw_lines(study, axes, rows, *others)
+        axes.set_ylabel(f"gap to the {reference(study, tasks)} (%)")
+    words = spoken(study, rows.assign(gap=100 * rows.gap), "{title} {gap:.1f} %")
+    alt = f"Gap to the {reference(study, tasks)} by setting: {words}."
+    return drawing, rows, alt, " Means over all tasks." * (len(tasks) > 1) + more
+
+
+def _draw_lines(study: Study, axes: Axes, rows: pd.DataFrame, other: str = "") -> str:
+    """Draw gaps by ``value``, with a line for each ``line``, a value of the parameter ``other``.
+
+    The axis is logarithmic if the values are numbers that span a factor of ten or more. If only one
+    parameter varies, the gaps on each task are drawn, too. Returns further sentences of the
+    caption.
+    """
+    values, tasks = [*dict.fromkeys(rows.value)], ranked_tasks(study)
+    is_number = are_numbers(values)
+    places = np.array(values if is_number else range(len(values)), dtype=np.float64)
+    if is_log := bool(is_number and places[0] > 0 and places[-1] >= 10 * places[0]):
         axes.set_xscale("log")
-    texts = [f"{value:g}" if is_number else str(value) for value in rows.value]
-    papers = rows.is_learner & (rows.setting == "")
-    axes.set_xticks(places, [text + "\n(the paper's)" * paper
-                             for text, paper in zip(texts, papers, strict=True)])  # fmt: skip
+    papers = {*rows.value[rows.is_learner & (rows.setting == "")]} if not other else set()
+    names = [f"{value:g}" if is_number else str(value) for value in values]
+    axes.set_xticks(places, [name + "\n(the paper's)" * (value in papers)
+                             for name, value in zip(names, values, strict=True)])  # fmt: skip
     axes.set_xticks([], minor=True)
-    mean: Any = {"color": style.BLUE, "marker": "o", "markersize": 5, "linewidth": 1.6}
-    shown = rows.assign(place=places)
-    tasks = ranked_tasks(study)
+    axes.margins(x=0.08)
+    lines = [*rows.groupby("line", sort=False)]
+    apart = 0.01 * np.ptp(np.log(places) if is_log else places)  # so that intervals do not overlap
+    is_few = False
+    for number, (line, of_line) in enumerate(lines):
+        at = of_line.value.map(dict(zip(values, places, strict=True))).to_numpy(np.float64)
+        shift = (number - (len(lines) - 1) / 2) * apart
+        at = at * math.exp(shift) if is_log else at + shift
+        color, marker = style.PALETTE[number], "osD^"[number]
+        look: Any = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.6}
+        drawn = of_line.assign(place=at)
+        style.means(axes, drawn, x="place", y="gap", scale=100, bars=1.6, label=str(line), **look)
+        for place, row in zip(at, of_line.to_dict("records"), strict=True):
+            gaps = _gaps_of_few_runs(study, row)
+            axes.plot([place] * len(gaps), gaps, ".", **_FEW, color=color)
+            is_few |= bool(gaps)
+    each_task = tasks if 1 < len(tasks) <= 8 and not other else ()
     gaps_on = [runs_on(study, method, tasks).groupby("task").gap.mean() for method in rows.method]
-    each_task = tasks if 1 < len(tasks) <= 8 else ()
     for task in each_task:
         gaps = [100 * by_task[task] for by_task in gaps_on]
-        axes.plot(places, gaps, color=style.GREY, linewidth=0.8)
-        at: Any = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
-        axes.annotate(marked(study.tasks[task]), (places[-1], gaps[-1]), color=style.GREY, **at)
-        shown[f"on {task}"] = gaps
-    style.means(axes, shown, x="place", y="gap", scale=100, bars=1.6, **mean)
-    few = [(place, gap) for place, row in zip(places, rows.to_dict("records"), strict=True)
-           for gap in _gaps_of_few_runs(study, row)]  # fmt: skip
-    axes.plot(*zip(*few, strict=True) if few else ([], []), ".", **_FEW, color=style.BLUE)
-    lowest = min([0, 100 * shown.gap_low.min(), *(gap for _, gap in few)])
-    axes.set_ylim(bottom=lowest)
-    axes.set_xlabel(name)
-    axes.set_ylabel(f"gap to the {reference(study, tasks)} (%)")
-    words = (f"{row['value']}: {interval(row, 'gap', scale=100, unit=' %')}"
-             for row in rows.to_dict("records"))  # fmt: skip
-    alt = f"Gap to the {reference(study, tasks)} by {name}: {'; '.join(words)}."
-    thin = "; thin: the gap on each" * bool(each_task)
-    return drawing, shown, alt, f" Means over all tasks{thin}." * (len(tasks) > 1)
+        axes.plot(places, gaps, color=style.GREY, linewidth=0.8, zorder=1)
+        text: Any = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
+        axes.annotate(marked(study.tasks[task]), (places[-1], gaps[-1]), color=style.GREY, **text)
+    axes.set_ylim(bottom=min(0, axes.get_ylim()[0]))
+    if other:
+        axes.legend(title=other)
+    return (
+        " Thin: the gap on each." * bool(each_task)
+        + f" Points: runs, if there are fewer than {FEWEST}." * is_few
+        + f" Lines at the means: {style.COVERAGE} bootstrap intervals over runs."
+        * bool(rows.gap_low.notna().any())
+    )
+
+
+def _draw_cells(axes: Axes, rows: pd.DataFrame) -> str:
+    """Draw gaps as a heat map by ``value`` and ``line``, and return a sentence of the caption."""
+    values, lines = [*dict.fromkeys(rows.value)], [*dict.fromkeys(rows.line)]
+    gaps = 100 * rows.pivot(index="line", columns="value", values="gap").loc[lines, values]
+    shades = LinearSegmentedColormap.from_list("", ["#f4f7fa", style.BLUE, "#08306b"])
+    cells = axes.pcolormesh(gaps, cmap=shades, edgecolors=style.BACKGROUND, linewidth=1)
+    size = min(8.0, 96 / len(values))  # points
+    for (y, x), gap in np.ndenumerate(gaps.to_numpy()):
+        color = "#fefefe" if cells.norm(gap) > 0.43 else "#101010"  # also on a dark page
+        at: Any = {"ha": "center", "va": "center", "color": color, "fontsize": size}
+        if not math.isnan(gap):
+            axes.text(x + 0.5, y + 0.5, number(gap, 1), **at)
+    least = rows.loc[rows.gap.idxmin()]
+    corner = values.index(least["value"]), lines.index(least.line)
+    axes.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor=style.INK, linewidth=2))
+    axes.set_xticks(np.arange(len(values)) + 0.5, map(str, values))
+    axes.set_yticks(np.arange(len(lines)) + 0.5, map(str, lines))
+    axes.tick_params(length=0)
+    has_intervals = bool(rows.gap_low.notna().any())
+    return (
+        " The numbers are gaps in per cent; the smallest is framed."
+        + " The table has intervals." * has_intervals
+    )
 
 
 _FEW: Any = {"markersize": 3, "alpha": 0.6}
@@ -151,7 +210,7 @@ def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
 @figure(
     "Gap to the best reward",
     "Gap from the mean reward to the {reference}, as a share of it, with its "
-    f"{style.COVERAGE} bootstrap interval over runs. The axis is logarithmic from 0.1 % on.",
+    f"{style.COVERAGE} bootstrap interval over runs.",
 )
 def _draw_gaps(study: Study) -> Parts | None:
     """Draw the gap of each ranked method, a mean over tasks, with its interval.
@@ -173,16 +232,22 @@ def _draw_gaps(study: Study) -> Parts | None:
     deep = max(name.count("\n") for name in names)
     height = (0.145 if narrow else 0.165) + 0.1 * deep  # inches of a line
     drawing, (axes,) = style.panels((1, 1), (style.TWO, 0.6 + height * len(lines)))
-    gaps = shown[["gap", "gap_low", "gap_high"]]
-    few = [gap for row in shown.to_dict("records") for gap in _gaps_of_few_runs(study, row)]
-    nearest, farthest = min([gaps.min().min(), *few]), max([gaps.max().max(), 0.5, *few])
-    left = min(nearest, 0) if nearest < 0.15 else nearest / 1.3
-    axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
-    steps = (1, 2, 5) if farthest < 100 and not narrow else (1,)
-    ticks = [0, *(n * 10.0**k for k in range(-1, 5) for n in steps)]
-    ticks = [tick for tick in ticks if left <= tick <= 1.1 * farthest]
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    axes.set_xticks([], minor=True)
+    few = {row["method"]: _gaps_of_few_runs(study, row) for row in shown.to_dict("records")}
+    on_tasks = {label: runs_on(study, label, tasks).groupby("task").gap.mean() * 100
+                for label in shown.method if 1 < len(tasks) <= 8}  # fmt: skip
+    gaps = [shown[["gap", "gap_low", "gap_high"]], *few.values(), *on_tasks.values()]
+    gaps = np.concatenate([np.ravel(values) for values in gaps])
+    nearest, farthest = np.nanmin(gaps), max(np.nanmax(gaps), 0.5)
+    left = min(nearest, 0.0)
+    is_log = bool(farthest >= 10 * nearest)
+    if is_log:
+        left = left if nearest < 0.15 else nearest / 1.3
+        axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
+        steps = (1, 2, 5) if farthest < 100 and not narrow else (1,)
+        ticks = [0, *(n * 10.0**k for k in range(-1, 5) for n in steps)]
+        ticks = [tick for tick in ticks if left <= tick <= 1.1 * farthest]
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.set_xticks([], minor=True)
     axes.set_xlim(left, 1.1 * farthest)
     axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
     axes.axvline(0, **style.OPTIMUM)
@@ -208,7 +273,8 @@ def _draw_gaps(study: Study) -> Parts | None:
         size = looks[row["method"]]["markersize"] + learner  # diamonds look smaller
         look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
         axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
-        of_runs = _gaps_of_few_runs(study, row)
+        of_runs, of_tasks = few[row["method"]], on_tasks.get(row["method"], ())
+        axes.plot(of_tasks, [y] * len(of_tasks), "|", color=style.GREY, markersize=4, zorder=1)
         axes.plot(of_runs, [y] * len(of_runs), ".", **_FEW, **look)
         mark = looks[row["method"]]["marker"]
         (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
@@ -225,8 +291,10 @@ def _draw_gaps(study: Study) -> Parts | None:
     bold = ["the paper's learner (diamonds)"] * any(rows.is_learner)
     bold += ["methods from files (larger marks)"] * (not all(rows.built_in))
     more = " Means over all tasks." * (len(tasks) > 1)
+    more += " Grey lines: the gap on each task." * bool(on_tasks)
+    more += " The axis is logarithmic from 0.1 % on." * is_log
     more += " Methods that are run once have no interval." * (not all(rows.stochastic))
-    more += f" Of fewer than {FEWEST} runs each is a small point." * bool(few)
+    more += f" Small points: runs, if there are fewer than {FEWEST}." * any(few.values())
     return drawing, rows, alt, more + (f" Bold: {listed(bold)}." if bold else "")
 
 
@@ -235,65 +303,77 @@ ALONE = KNOWN_METHODS["corrective-alone/given"].algorithm
 
 @figure(
     "Ticks saved, goal by goal",
-    "Ticks that a movement takes more (up) or less (down) than that of the corrective process "
-    "alone with the same hands: what is paid at one goal is saved at later ones. Means over runs. "
-    "Shown are the methods nearest to the {reference}, and those to compare them with. "
+    "Ticks that a movement takes more (up) or fewer (down) than that of the corrective process "
+    "alone with the same hands, and their sum: what is paid at one goal is saved at later ones. "
+    f"Bars are means over runs, lines their {style.COVERAGE} bootstrap intervals. The methods are "
+    "those nearest to the {reference}, the nearest first, and those to compare them with. "
     "n = {n} runs.",
 )
 def draw_saved(study: Study) -> Parts | None:
-    """Draw how many ticks more than the corrective process methods take for each goal.
+    """Draw how many ticks more than the corrective process methods take for each goal, and in sum.
 
-    There is a panel for each task, with a row for each of these methods, the smallest mean gap
-    first: the learner that explores most, random search, the best method of each kind that uses the
-    reward, and methods from files. A row has a bar for each goal: mean ticks of the runs less the
-    ticks of the corrective process alone with the same hands. Returns None if there is nothing to
-    draw.
+    There is a panel for each task, with a row for each of these methods, in the same order in all
+    panels, the smallest mean gap over tasks first: the learner that explores most, random search,
+    the best method of each kind that uses the reward, and methods from files. Returns None if there
+    is nothing to draw.
     """
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
-    drawn, parts = {*headline_methods(single)}, []
-    for _, part in rows[rows.method.isin(drawn)].groupby("task", sort=False):
-        gaps = [
-            solved(study.cells[cell]).gap.mean()
-            for cell in zip(part.task, part.method, strict=True)
-        ]
-        part = part.assign(gap=gaps, use=[methods.information[label] for label in part.method])
-        part = part.sort_values("gap")
-        best = part.drop_duplicates("use").method[part.use != WITHOUT_REWARD]
-        learners = [learner for learner in LEARNERS if learner in {*part.method}]
-        own = single.index[~single.built_in.astype(bool)]
-        part = part[part.method.isin({*best, RANDOM_SEARCH, *learners[-1:], *own})]
-        if len(part):
-            parts.append(part)
+    rows = rows[rows.method.isin(headline_methods(single))]
+    if not len(rows):
+        return None
+    gaps = [solved(study.cells[cell]).gap.mean() for cell in zip(rows.task, rows.method, strict=True)]
+    learners = rows.method.map({label: place for place, label in enumerate(LEARNERS)})
+    most = learners == learners.groupby(rows.task).transform("max")  # that explores most
+    rows = rows.assign(gap=gaps, line=rows.method.mask(most, "learner"))
+    lines = rows.groupby("line").gap.agg(["size", "mean"])
+    lines = lines.sort_values(["size", "mean"], ascending=[False, True])
+    uses = rows.drop_duplicates("line").set_index("line").method.map(methods.information)
+    best = uses[lines.index].drop_duplicates()
+    kept = {*best.index[best != WITHOUT_REWARD], RANDOM_SEARCH, "learner"}
+    kept |= {*single.index[~single.built_in.astype(bool)]}
+    order = [line for line in lines["mean"].sort_values(kind="stable").index if line in kept]
+    rows = rows[rows.line.isin(order)].sort_values("line", key=lambda line: line.map(order.index))
+    parts = [part for _, part in rows.groupby("task", sort=False)]
+    parts.sort(key=lambda part: [*study.tasks].index(part.task.iloc[0]))
     if not parts:
         return None
-    shape, most = style.grid(len(parts)), max(map(len, parts))
-    line, size = (0.17, 6) if style.is_narrow() else (0.3, 7)  # inches, points
-    height = shape[0] * (0.3 + line * most)
+    shape, most_rows = style.grid(len(parts)), max(map(len, parts))
+    line, size = (0.17, 6) if style.is_narrow() else (0.42, 7)  # inches, points
+    height = shape[0] * (0.3 + line * most_rows)
     drawing, panels = style.panels(shape, (style.TWO, height), len(parts))
+    looks = looks_in(study, rows.method)
     paper: Any = {"facecolor": style.BACKGROUND, "linewidth": 0, "pad": 0.6}
     for axes, part in zip(panels, parts, strict=True):
         task = study.tasks[part.task.iloc[0]]
-        goals = np.arange(1, len(task.goals) + 1)
-        ticks = part[[f"by_goal_{goal}" for goal in goals]].to_numpy(np.float64)
-        scale = 0.42 / max(np.abs(ticks).max(), 1.0)
-        for place, of_goals in enumerate(ticks):
+        goals = range(1, len(task.goals) + 1)
+        columns = [*(f"by_goal_{goal}" for goal in goals), "sum"]
+        at = np.array([*goals, len(goals) + 1.2])
+        ends = [f"{column}{end}" for column in columns for end in ("", "_low", "_high")]
+        scale = 0.42 / max(part[ends].abs().max().max(), 1.0)
+        for place, row in enumerate(part.to_dict("records")):
+            color = looks[row["method"]]["color"]
+            ticks = np.array([row[column] for column in columns])
+            low, high = (
+                scale * np.array([row[f"{column}{end}"] for column in columns]) - place
+                for end in ("_low", "_high")
+            )
             axes.axhline(-place, color=style.GREY, linewidth=0.5)
-            colors = np.where(of_goals > 0, style.VERMILLION, style.BLUE)
-            axes.bar(goals, scale * of_goals, 0.5, -place, color=colors, linewidth=0)
-            for goal, value in zip(goals, of_goals.round(), strict=True):
+            axes.bar(at, scale * ticks, 0.4, -place, color=color, alpha=0.55, linewidth=0)
+            axes.vlines(at, low, high, color=style.INK, linewidth=0.9)
+            for x, value in zip(at, ticks.round(), strict=True):
                 text = f"{value:+.0f}".replace("-", "−") if value else "0"
-                axes.text(goal + 0.29, -place, text, va="center", fontsize=size, bbox=paper)
-        style.name_rows(axes, [name_in_figure(study, label) for label in part.method])
-        axes.set_xticks(goals, [f"goal {goal}" for goal in goals])
-        axes.set_xlim(0.6, len(goals) + 0.75)
+                axes.text(x + 0.25, -place, text, va="center", fontsize=size, bbox=paper)
+        style.name_rows(axes, [name_in_figure(study, label, 24) for label in part.method])
+        axes.set_xticks(at, [*(f"goal {goal}" for goal in goals), "sum"])
+        axes.set_xlim(0.6, at[-1] + 0.75)
         axes.tick_params(axis="x", length=0, pad=1)
         axes.spines[["left", "bottom"]].set_visible(False)
         axes.set_title(marked(task))
     style.letters(panels)
-    data = pd.concat(parts, ignore_index=True).drop(columns=["run_ids", "gap", "use"])
-    words = spoken(study, data, "{task}, {title}: {by_goal_1:+.0f}")
-    alt = f"Ticks more or less than by the corrective process, at goal 1: {words}."
+    data = pd.concat(parts, ignore_index=True).drop(columns=["run_ids", "gap", "line"])
+    words = spoken(study, data, "{task}, {title}: {by_goal_1:+.0f} and {sum:+.0f}")
+    alt = f"Ticks more or fewer than by the corrective process, at goal 1 and in sum: {words}."
     return drawing, data, alt, ""
 
 
@@ -345,9 +425,10 @@ DOTS = {
 
 @figure(
     "Postures at the shared goal, by method",
-    "Distance between the mean postures at the goal that two tasks share, and lean: the share of "
-    "the way to the next posture that is already made there. 0: the posture does not depend on "
-    f"the next goal. Lines: {style.COVERAGE} bootstrap intervals over runs, from five runs on.",
+    "Posture difference: the distance between the mean postures at the goal that two tasks share "
+    "(length units and rad). Lean: the share of the way to the next posture that is already made "
+    "there. Both are 0 if the posture does not depend on the next goal. Lines are "
+    f"{style.COVERAGE} bootstrap intervals over runs, if there are five runs.",
 )
 def draw_shared_goal(study: Study) -> Parts | None:
     """Draw the posture difference and the lean of each method at the goal of :func:`shared_goal`.
@@ -508,6 +589,7 @@ def draw_runtimes(study: Study) -> Parts | None:
         axes.set_xlim(edge, most)
         axes.set_ylim(-2, 102)
         axes.set_title(f"By {PANELS[spend]}")
+        axes.tick_params(labelleft=True)  # a phone shows one panel below the other
         axes.set_xlabel(PANELS[spend])
     panels[0].set_ylabel("targets reached (%)")
     at, grey = panels[0].get_yaxis_transform(), style.GREY
@@ -586,7 +668,8 @@ def draw_learning_curves(study: Study) -> Parts | None:
         handles.append(style.legend_line(name, **style.INITIAL))
     if known := [task.name for task in tasks if task.name in study.optima]:
         handles.append(style.legend_line(reference(study, known), **style.OPTIMUM))
-    style.legend(drawing, handles, min(len(handles), 4))
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    style.legend(drawing, handles, 2 if longest <= 34 else 1)
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(study, ends, "{task}, {title}: {best:.0f}")
     alt = f"Reward against trial. Mean best reward at the end: {words}."

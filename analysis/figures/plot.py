@@ -131,14 +131,15 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     return looks
 
 
-def name_in_figure(study: Study, method: str) -> str:
+def name_in_figure(study: Study, method: str, longest: int = _LONGEST_NAME) -> str:
     """Return the name of a method (a label) for the figure that is being drawn.
 
-    It is the method's title, or its short name in a narrow figure. A long name has several lines.
+    It is the method's title, or its short name in a narrow figure. A name of more than ``longest``
+    letters, or of 24 in a narrow figure, has several lines.
     """
     if style.is_narrow():
         return "\n".join(textwrap.wrap(study.methods.short[method], _LONGEST_NAME // 2))
-    return "\n".join(textwrap.wrap(study.methods.title[method], _LONGEST_NAME))
+    return "\n".join(textwrap.wrap(study.methods.title[method], longest))
 
 
 def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
@@ -196,7 +197,8 @@ def for_page(plot: Plot) -> str:
       ``--paper``, if the page has it. Grey is ``--grey``, blue ``--blue``, and colours of methods
       have their names.
     - Marks with a :func:`~.style.tip` show its text.
-    - Ids begin with the plot's id, so that a page can have several figures.
+    - Ids begin with the plot's id, so that a page can have several figures. The id of the whole
+      drawing ends in ``-drawing``.
     - Each ``style`` attribute becomes a class, named by a hash of the style.
     """
 
@@ -232,8 +234,35 @@ def for_page(plot: Plot) -> str:
     rules = "".join(f".{name}{{{look}}}" for look, name in looks.items())
     return (
         f'<svg {view[0]} xmlns="http://www.w3.org/2000/svg" role="img" '
-        f'aria-label="{html.escape(one_line(plot.alt))}"><g stroke-linejoin="round" '
-        'stroke-linecap="butt" fill="currentColor">'
+        f'aria-label="{html.escape(one_line(plot.alt))}"><g id="{plot.id}-drawing" '
+        'stroke-linejoin="round" stroke-linecap="butt" fill="currentColor">'
         f"<style>{rules}</style>"
         f"{body.replace('xlink:href', 'href').strip().removesuffix('</svg>')}</g></svg>"
     )
+
+
+def panels_for_page(plot: Plot) -> list[str]:
+    """Return the panels and legends of a figure as ``<svg>`` elements, for a narrow page.
+
+    They show parts of :func:`for_page`, which must be on the page, and be called before. The list
+    is empty if there is only one panel, or a panel lacks the names of its rows.
+    """
+    drawing, canvas = plot.figure, plot.figure.canvas
+    panels = [axes for axes in drawing.axes if axes.has_data()]
+    named = [axes.yaxis.get_tick_params()["labelleft"] for axes in panels if axes.axison]
+    if len(panels) < 2 or not all(named):
+        return []
+    FigureCanvasSVG(drawing)  # measures its fonts
+    boxes = [part.get_tightbbox() for part in (*panels, *drawing.legends)]
+    drawing.set_canvas(canvas)
+    points, height = 72 / drawing.dpi, 72 * drawing.get_figheight()
+    views = []
+    for number, box in enumerate(boxes, 1):
+        x, y = points * box.x0 - 1, height - points * box.y1 - 1
+        view = f"{x:.1f} {y:.1f} {points * box.width + 2:.1f} {points * box.height + 2:.1f}"
+        label = html.escape(one_line(f"{plot.title}, part {number}. {plot.alt * (number == 1)}"))
+        views.append(
+            f'<svg viewBox="{view}" xmlns="http://www.w3.org/2000/svg" role="img" '
+            f'aria-label="{label}"><use href="#{plot.id}-drawing"/></svg>'
+        )
+    return views

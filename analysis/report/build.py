@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import html
 import os
-from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Sequence
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any
@@ -15,8 +13,8 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from coartic import CoarticError
-from coartic.analysis.figures.drawings import draw_ranking, draw_shared_goal
-from coartic.analysis.figures.plot import Plot, for_page, picture
+from coartic.analysis.figures.drawings import draw_ranking, draw_shared_goal, draw_tasks
+from coartic.analysis.figures.plot import Plot, for_page, panels_for_page, picture
 from coartic.analysis.figures.style import ONE
 from coartic.analysis.report import sections
 from coartic.analysis.report.player import player
@@ -32,13 +30,16 @@ from coartic.analysis.tables import (
     is_setting,
     latex_of,
 )
-from coartic.analysis.words import id_of, listed, number
+from coartic.analysis.words import id_of, listed, marked, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of
 from coartic.runs.store import lock
+from coartic.tasks.task import shipped_tasks
 
 HERE = Path(__file__).parent
+LONG = 10
+"""Most rows of a table that the page does not fold."""
 
 
 def write_report(
@@ -152,29 +153,28 @@ def _rows_shown(study: Study, table: Table) -> pd.DataFrame:
     return frame if table.with_settings else frame[~is_setting(study, frame)]
 
 
-def _parts_of(study: Study, section: Section, lead: Plot | None) -> dict[str, Any]:
+def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str, Any]:
     """Return the values of a section that the page's template needs, by name.
 
     - ``finding``: a list of lines;
-    - ``figures``: for each figure except ``lead``, the one at the top of the page, a tuple of the
-      plot, its SVG and, for the ranking, a narrow SVG for phones (otherwise empty);
+    - ``figures``: for each figure except ``first``, those at the top of the page, a tuple of the
+      plot, its SVG and the SVGs of its panels for phones (:func:`.panels_for_page`);
     - ``shown``: for each table with rows, a dictionary of its ``id``, ``caption``, number of
-      ``rows`` and ``html``.
+      ``rows`` and ``html``, and whether it is ``folded``.
     """
+    draws = [draw for draw in section.figures if id_of(draw) not in {plot.id for plot in first}]
+    figures = [plot for draw in draws if (plot := draw(study)) is not None]
+    has_figure = bool(figures) or len(draws) < len(section.figures)
     tables = []
     for table in section.tables:
         if len(frame := _rows_shown(study, table)):
-            caption, page = caption_of(table, study), html_of(table, study, frame)
-            tables.append({"id": table.id, "caption": caption, "rows": len(frame), "html": page})
-    draws = [draw for draw in section.figures if not lead or id_of(draw) != lead.id]
-    figures = [plot for draw in draws if (plot := draw(study)) is not None]
-    on_phones = [draw(study, width=ONE) for draw in draws if section.id == "ranking"]
-    narrow = {
-        plot.id: for_page(replace(plot, id=f"{plot.id}-narrow")) for plot in on_phones if plot
-    }
+            is_long = table not in section.unfolded or len(frame) > LONG
+            folded = is_long and (has_figure or not section.figures)
+            words = {"id": table.id, "caption": caption_of(table, study), "rows": len(frame)}
+            tables.append({**words, "html": html_of(table, study, frame), "folded": folded})
     return {
         "finding": sections.finding(study, section),
-        "figures": [(plot, for_page(plot), narrow.get(plot.id, "")) for plot in figures],
+        "figures": [(plot, for_page(plot), panels_for_page(plot)) for plot in figures],
         "shown": tables,
     }
 
@@ -184,6 +184,30 @@ def stamp(runs: pd.DataFrame) -> str:
     return hash_of(sorted(zip(runs.run_id, runs.result, strict=True)))
 
 
+def _first_figures(study: Study) -> list[Plot]:
+    """Return the figures at the top of the page, as wide as a column of a journal.
+
+    They are the ranking and
+
+    - the postures at a goal that two tasks share, if all individual tasks are shipped;
+    - otherwise, or if there is no such goal, the tasks;
+    - nothing else if the study varies parameters.
+    """
+    draws = [draw_tasks]
+    if study.individual_tasks.keys() <= shipped_tasks().keys():
+        draws.insert(0, draw_shared_goal)
+    others = (draw(study, width=ONE) for draw in draws if study.varied.empty)
+    return [plot for plot in (draw_ranking(study, width=ONE), next(filter(None, others), None))
+            if plot]  # fmt: skip
+
+
+def _heading_of(study: Study) -> str:
+    """Return a heading that names the tasks, or the suite if there are more than three tasks."""
+    tasks = [marked(task) for task in study.tasks.values()]
+    subject = listed(tasks) if len(tasks) <= 3 else f"suite {study.suite}"
+    return f"Coarticulation of a simulated robot: {subject}"
+
+
 def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[str], object]) -> str:
     """Return the page as HTML, which needs no other file and no network.
 
@@ -191,12 +215,11 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
     made are added to ``failures``, by the name of the part. ``watch`` is called with the title of
     each section.
     """
-    draw = draw_ranking if study.varied[0] else draw_shared_goal
-    lead = sections.attempt(failures, "Picture", partial(draw, width=ONE), study)
+    first = sections.attempt(failures, "Pictures", _first_figures, study) or []
     shown = []
     for section in sections.visible_sections(study):
         watch(section.title)
-        parts = sections.attempt(failures, section.title, _parts_of, study, section, lead)
+        parts = sections.attempt(failures, section.title, _parts_of, study, section, first)
         parts = parts or {"finding": [], "figures": [], "shown": []}
         failure = failures.get(section.title, "")
         if failure or parts["figures"] or parts["shown"]:
@@ -220,13 +243,13 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         links = []
     made_with = study.made_with
     return environment.get_template("page.html.jinja").render(
-        title=study.question[0] or f"Coarticulation of a simulated robot: suite {study.suite}",
+        title=study.question[0] or _heading_of(study),
         question=study.question[1],
         styles=(HERE / "page.css").read_text("utf-8") + part_of_page("play.css"),
         player=sections.attempt(failures, "Film", player, study) or "",
         script=(HERE / "page.js").read_text("utf-8"),
         sections=shown,
-        lead=lead and (lead, for_page(lead)),
+        first=[(plot, for_page(plot)) for plot in first],
         stage=stage,
         suite=study.suite,
         home=home,

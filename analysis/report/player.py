@@ -22,7 +22,7 @@ def player(study: Study) -> str:
     - There is a preset for each individual task that a method with straight movements solved. It
       shows, for each such method, the run whose reward is nearest to the median.
     - If goal 1 is the :func:`.shared_goal`, and such a method solved both tasks, this goal is the
-      first preset. It has the standardised posture difference of random search, if there is one.
+      first preset. It has the posture difference of random search, if there is one.
 
     The method that is shown first is
 
@@ -41,7 +41,7 @@ def player(study: Study) -> str:
         }
         both["runs"] = methods_played(study, [up.name, down.name])
         control = contexts_of_control(study, shared)
-        by_chance = control.standardised_posture_difference if control else math.nan
+        by_chance = control.posture_difference if control else math.nan
         presets.append(both | {"by_chance": by_chance if math.isfinite(by_chance) else None})
     single_presets = {
         name: preset_of(task) | {"runs": methods_played(study, [name])}

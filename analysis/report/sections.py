@@ -12,6 +12,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 import pandas as pd
 from jinja2 import Environment, StrictUndefined
 
@@ -35,7 +36,15 @@ from coartic.analysis.methods import (
     joined_label,
     title_of,
 )
-from coartic.analysis.standings import ranked_tasks, reference, runs_on, solved_tasks, standings
+from coartic.analysis.standings import (
+    ranked_tasks,
+    ranking_budget,
+    reference,
+    runs_on,
+    solved_tasks,
+    standings,
+)
+from coartic.analysis.statistics import interaction_test
 from coartic.analysis.study import Study
 from coartic.analysis.tables import (
     Table,
@@ -89,9 +98,8 @@ class Section:
     sentence: str = ""
     """Jinja template of the finding in words, or empty. It can use
 
-    - ``every``: the first table;
-    - ``rows``: the first table with the ``title`` of each method, and with its ``subject``
-      (:func:`subject_of`), without settings and ablations;
+    - ``rows``: the first table with ``title`` and ``information`` of each method and its
+      ``subject`` (:func:`subject_of`), without settings and ablations;
     - ``others``: a list of the other tables, likewise;
     - further names that :func:`.finding` defines.
     """
@@ -99,8 +107,9 @@ class Section:
     """Explanation of figures and tables."""
     single: bool = True
     """True for sections about individual tasks. A study of many random tasks leaves them out."""
-    folded: bool = False
-    """True if the page folds the tables."""
+    unfolded: tuple[Table, ...] = ()
+    """Tables that the page does not fold unless they are long, because no figure shows their
+    numbers. If the section has figures, but none can be drawn, no table is folded."""
 
 
 SECTIONS = (
@@ -110,19 +119,34 @@ SECTIONS = (
         (list_ranking, list_not_ranked, list_differences),
         (draw_ranking,),
         sentence="""\
-{% if varied %}
+{% if parameters %}
 {% for best in leading(rows)[:1] %}
-{{ best.subject }} comes nearest to the {{ reference }}: its gap is \
-{{ interval(best, "gap", scale=100, unit=" %") }}.
-{%- for next in others[1].to_dict("records")[:1] %}
- Next is {{ next.subject.removesuffix(",") }}, \
-{{ interval(next, "difference", scale=100) }} percentage points behind\
-{{ ": %s chance (%s)" % ("beyond" if next.p_holm < LEVEL else "not beyond", p_value(next.p_holm)) \
-if next.p_holm >= 0 else few(next) }}.
+{% set tied = (rows.gap == best.gap).sum() %}
+{{ "The best setting is %s: its" % best.title if tied == 1 else "The smallest" }} gap to the \
+{{ reference }} is {{ interval(best, "gap", scale=100, unit=" %") }}\
+{{ ", which %s settings have" % tied if tied > 1 }}.
+{%- for next in others[1].to_dict("records")[:1] if tied == 1 %}
+ The gap of {{ next.subject.removesuffix(",") }} is larger by {{ interval(next, "difference", scale=100) }} percentage \
+points{{ ", which %s chance (%s)" % ("exceeds" if next.p_holm < LEVEL else "may be", \
+p_value(next.p_holm)) if next.p_holm >= 0 else few(next) }}.
 {%- endfor %}
-{%- for row in rows[rows.method.isin(papers)].to_dict("records") if row.method != best.method %}
- {{ row.subject | capital }} leaves {{ interval(row, "gap", scale=100, unit=" %") }}.
+{%- set said = [best.method] + others[1].method[:1].tolist() %}
+{% for row in rows[rows.method.isin(papers)].to_dict("records") if row.method not in said %}
+ The gap of {{ row.subject.removesuffix(",") }} is {{ interval(row, "gap", scale=100, unit=" %") }}.
 {%- endfor %}
+{%- set useless = (rows.share <= 0).sum() %}
+{% if useless %}
+ {{ "None of the settings gains anything" if useless == rows | length else \
+"%d of %d settings gain%s nothing" % (useless, rows | length, "s" if useless == 1 else "") }}\
+{{ " in %s trials" % number(budget) if budget }}.
+{%- endif %}
+{% if interaction < LEVEL %}
+ The effect of {{ parameters[0] }} depends on {{ parameters[1] }} ({{ p_value(interaction) }}).
+{%- endif %}
+{% if parameters | length > 2 %}
+ There is no picture, because a picture shows at most two parameters, and \
+{{ parameters | listed }} vary.
+{%- endif %}
 
 {% endfor %}
 {% else %}
@@ -130,23 +154,23 @@ if next.p_holm >= 0 else few(next) }}.
 {% set of_use = rows[rows.information == use] %}
 {% for row in leading(of_use) %}
 {% set place = (of_use.gap < row.gap).sum() + 1 %}
-{% set tied = (of_use.gap == row.gap).sum() > 1 %}
-{% if loop.first %}
-{{ use | capital }}, {{ row.subject }} leaves \
-{{ "a" if loop.last or tied else "the smallest" }} gap to the {{ reference }}\
-{{ " of" if loop.last or tied else "," }} \
+{% set gap = interval(row, "gap", scale=100, unit=" %") %}
+{% if of_use | length == 1 %}
+The only method {{ use }} is {{ row.title }}; its gap to the {{ reference }} is {{ gap }}\
+{% elif loop.first %}
+Among methods {{ use }}, the smallest gap to the {{ reference }} is {{ gap }} ({{ row.title }})\
 {% else %}
-{{ row.subject }} leaves {% endif %}
-{{ interval(row, "gap", scale=100, unit=" %") }}\
-{{ " (place %d of %d)" % (place, of_use | length) if place > loop.index }}\
-{{ "." if loop.last else "; " }}
+{{ ". Others: " if loop.index == 2 else "; " }}{{ row.title }} {{ gap }}\
+{{ ", place %d of %d" % (place, of_use | length) if place > loop.index }}\
+{% endif %}
+{{ "." if loop.last }}
 {%- endfor %}
 
 {% endfor %}
 {% endif %}
-{% for against, group in others[1].groupby("against", sort=False) if not varied %}
-{{ subjects[against] }} against {{ rivals }} methods, percentage points by which its gap is \
-smaller on the tasks that it solved: \
+{% for against, group in others[1].groupby("against", sort=False) if not parameters %}
+On the tasks that it solved, {{ subjects[against] }} has a smaller gap than these {{ rivals }} \
+methods, by so many percentage points (negative: a larger gap): \
 {% for row in leading(group) %}
 {{ row.title }} {{ interval(row, "difference", scale=100) }}\
 {{ " (%s)" % p_value(row.p_holm) if row.p_holm >= 0 else few(row) }}\
@@ -154,17 +178,17 @@ smaller on the tasks that it solved: \
 {%- endfor %}
 
 {% endfor %}""",
-        note="Methods are grouped by their use of the reward: its value after each trial, its "
-        "formula, or nothing. The gap is from the mean reward to the {reference}, as a "
-        "share of it. Share of the gain: 0 % is the corrective process alone with its "
-        "best hands (with the task's initial hands where there are over 4096 hand sequences), "
-        "100 % the {reference}; tasks on which both are equal have none. Intervals describe "
-        "new runs on the same tasks. Better on, worse on: number of tasks on which the mean reward "
-        "differs significantly from that of the paper's learner (EC1 with one arm, EC4 with two), "
-        "by two-tailed tests, corrected for the tasks of the method. Empty: the runs are too few, "
-        f"or too alike, to tell. {NEEDS_RUNS} Ranked are the methods that solved all tasks in as "
-        "many trials as were asked for; planners count with any number. What an own method uses is "
-        "as its author declares; own methods are bold.",
+        note="The gap goes from the mean reward to the {reference}, and is a share of it. The share "
+        "of the gain is 0 % for the corrective process alone with its best hands (with the task's "
+        "initial hands if there are more than 4096 hand sequences), and 100 % for the {reference}; "
+        "tasks on which both are equal have none. Intervals describe new runs on the same tasks. "
+        "Better and worse: the number of tasks on which the mean reward differs significantly from "
+        "that of the paper's learner (EC1 with one arm, EC4 with two), by two-tailed tests, "
+        "corrected over the tasks of the method; empty if the runs are too few, or too alike, for "
+        f"a test. {NEEDS_RUNS} A method is ranked if it solved all tasks in as many trials as were "
+        "asked for; planners have no trials. The author of an own method declares how it uses the "
+        "reward; own methods are bold.",
+        unfolded=(list_not_ranked, list_differences),
         single=False,
     ),
     Section(
@@ -173,31 +197,35 @@ smaller on the tasks that it solved: \
         (list_contexts, list_signatures),
         (draw_shared_goal, draw_postures, draw_saved),
         sentence="""\
-{% set of_best = rows[rows.method == first] if varied else rows[:0] %}
+{% set of_best = rows[rows.method == first] if parameters else rows[:0] %}
 {% for row in (of_best if of_best | length else rows).head(1).to_dict("records") %}
 {{ row.subject }} hits {{ row.place }} {{ {
 "different postures": "in postures that depend on the next goal",
-"no more than random search": "in postures that differ no more than those of random search",
-"no significant difference": "in postures without significant difference",
-"different, negligible": "in postures with a negligible difference",
-"the same posture": "in the same posture", "too few runs": "in too few runs to test (make 5)",
-}.get(row.verdict, "in postures that differ, without random search to compare them with") }}: \
-posture difference {{ row.distance | number(2) }} (length units and rad; {{ row.runs }} runs)\
-{{ "; random search: %s" % number(row.control, 2) if row.control >= 0 }}\
-{{ " (%s)" % p_value(row.p_random_search) if row.p_random_search >= 0 }}.
-{% endfor %}
-Methods at shared goals by verdict: {{ every.verdict | commonest(none) | listed }}.""",
+"no more than random search": "in postures that differ, but no more than those of random search",
+"no significant difference": "in postures that do not differ significantly",
+"different, negligible": "in postures that hardly differ",
+"the same posture": "in the same posture",
+"too few runs": "in postures that cannot be tested with fewer than 5 runs",
+}.get(row.verdict, "in postures that differ; no random search was run to compare them with") }}. \
+The posture difference is {{ row.distance | number(2) }} (length units and rad; \
+{{ row.runs }} runs){{ "; that of random search is %s" % number(row.control, 2) \
+if row.control >= 0 }}{{ " (%s)" % p_value(row.p_random_search) if row.p_random_search >= 0 }}.
+{%- if row.lean == row.lean %}
+ The lean is {{ interval(row, "lean", 2) }}: the share of the way to the next posture that is \
+already made there.
+{%- endif %}
+{% endfor %}""",
         note="Postures are compared in length units and rad. Ticks are compared with those of the "
-        "corrective process with the same hands. A first movement that gets slower while the whole "
-        "task gets faster is sacrificed for it. Idle hand nearer: share of the path to its next "
-        "goal that a hand covers while idle. Random search is the learner without its memory: the "
-        "best of as many trials is selected. What exceeds it is more than one selection, but much"
-        " of that can be gain (docs/findings.md has rows at equal gain). A row has the runs with "
-        "one hand sequence (of at least a tenth of a method's runs); random search has the same "
-        "hands, and all its runs count. The choice of hands, in rows without a sequence, is "
-        "compared with random search that tries every sequence. p is one-tailed, and uncorrected "
-        "unless it says so; empty: no such random search.",
-        folded=True,
+        "corrective process with the same hands. If the first movement gets slower and the whole "
+        "task faster, the first movement is sacrificed. Idle hand nearer: the share of the path to "
+        "its next goal that a hand covers while it is idle. Random search is the learner without "
+        "its memory: it selects the best of as many trials. What exceeds random search is more "
+        "than one selection explains, but much of it can be gain (docs/findings.md compares at "
+        "equal gain). A row has the runs with one hand sequence, if at least a tenth of a method's "
+        "runs have it; random search has the same hands, and all its runs count. Rows without a "
+        "sequence have the choice of hands, next to random search that tries every sequence. p is "
+        "one-tailed, and not corrected unless the heading says so; it is empty if there is no such "
+        "random search.",
     ),
     Section(
         "cost",
@@ -205,20 +233,22 @@ Methods at shared goals by verdict: {{ every.verdict | commonest(none) | listed 
         (list_runtimes,),
         (draw_runtimes, draw_learning_curves),
         sentence="""\
-{% for row in leading(rows.dropna(subset="trials_to_half").sort_values("reached", \
-ascending=False)) %}
-{{ row.subject }} reaches {{ (100 * row.reached) | number(0) }} %\
-{{ " of the reward targets from the corrective process alone to the " ~ \
-reference if loop.first }}, {{ "never half" if \
-row.trials_to_half == infinite else "half of them after %s trials" % \
-interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them without a trial" }}\
+{% set by_trial = rows[rows.information == uses[0]].sort_values(["trials_to_half", "reached"], \
+ascending=[true, false]) %}
+{% for row in leading(by_trial) %}
+{% if row.trials_to_half < infinite %}
+{{ row.subject }} needs {{ interval(row, "trials_to_half", 0) }}{{ " trials for half of the gain" if loop.first }}\
+{% else %}
+{{ row.subject }} does not {{ "get there" if loop.index > 1 else "reach half of the gain" }} in \
+{{ row.trials | number }}{{ " trials" if loop.first }}\
+{% endif %}
 {{ "." if loop.last else "; " }}
 {%- endfor %}""",
-        note="The empirical distribution (ECDF) of the costs of reaching reward targets. The "
-        "figure shows methods that learn, random search and the best planner. The number of "
-        "forward-kinematics evaluations is a cost that is the same on every machine. ∞: not "
-        "reached within the budget of trials. Gain: improvement over the corrective process alone.",
-        folded=True,
+        note="The gain is the improvement over the corrective process alone. Half of it is reached "
+        "when half of the reward targets are, over runs and tasks; ∞ means that they are not "
+        "reached. The figure is the empirical distribution (ECDF) of the costs of reaching the "
+        "targets, for methods that learn, random search and the best planner. The number of "
+        "forward-kinematics evaluations is the same on every machine.",
     ),
     Section(
         "random-tasks",
@@ -227,7 +257,7 @@ interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them with
         (draw_gaps_by_family,),
         sentence="""\
 {% for row in leading(rows.dropna(subset="gap")) %}
-{{ ("Mean gap to the %s over families with two arms: " % reference) if loop.first }}\
+{{ ("The mean gaps to the %s over families with two arms are: " % reference) if loop.first }}\
 {{ row.title }} {{ interval(row, "gap", scale=100, unit=" %") }}{{ "." if loop.last else "; " }}
 {%- endfor %}""",
         note="Intervals describe other tasks of the families.",
@@ -238,25 +268,25 @@ interval(row, "trials_to_half", 0) if row.trials_to_half else "half of them with
         "Tasks",
         (list_tasks,),
         (draw_tasks,),
-        note="Initial, best hands: the corrective process alone, with the task's initial hands and "
-        "with the best of all hand sequences. Best known: the optimum where the proven bound "
-        "equals it. Proven bound: a reward that no solution can exceed.",
+        note="Initial and best hands are the rewards of the corrective process alone, with the "
+        "task's initial hands and with the best of all hand sequences. No solution can exceed the "
+        "proven bound; if the best known reward equals it, it is the optimum.",
+        unfolded=(list_tasks,),
     ),
     Section(
         "methods",
         "All methods and runs",
         (list_methods,),
-        note="Every method works on the same robot. Its movements are scored by one function, "
-        "which no method can reach. Times are seconds of solving.",
-        folded=True,
+        note="Every method works on the same robot, and one function scores the movements of all. "
+        "Times are seconds of solving.",
     ),
     Section(
         "failed",
         "Failed runs",
         (list_failed,),
-        note="A failed run bars its method from means over tasks.",
+        note="A method with a failed run has no mean over tasks.",
         single=False,
-        folded=True,
+        unfolded=(list_failed,),
     ),
 )
 
@@ -299,7 +329,7 @@ def finding(study: Study, section: Section) -> list[str]:
     The template ``sentence`` is filled in from the section's tables. The list is empty if the
     section has no sentence, or its first table has no rows.
     """
-    if not section.sentence or not len(frame := section.tables[0](study)):
+    if not section.sentence or not len(section.tables[0](study)):
         return []
     methods = study.methods
     built_in = methods.index[methods.built_in.astype(bool)]
@@ -321,24 +351,25 @@ def finding(study: Study, section: Section) -> list[str]:
     def named(table: Table) -> pd.DataFrame:
         all_rows = table(study)
         rows: pd.DataFrame = all_rows[~is_setting(study, all_rows)]
-        titles, subject = rows.method.map(methods.title), rows.method.map(subjects)
-        return rows.assign(title=titles, subject=subject, own=~rows.method.isin(built_in))
+        of_method = {name: rows.method.map(methods[name]) for name in ("title", "information")}
+        subject = rows.method.map(subjects)
+        return rows.assign(**of_method, subject=subject, own=~rows.method.isin(built_in))
 
     rows, *others = map(named, section.tables)
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": number, "commonest": commonest, "listed": listed}
-    environment.filters["capital"] = capital
+    environment.filters |= {"number": number, "listed": listed, "capital": capital}
     environment.globals |= {
         "interval": interval, "number": number, "p_value": p_value, "leading": leading, "few": few,
         "infinite": math.inf,
         "uses": GROUPS, "first": next(iter(standings(study).index), ""),
         "subjects": subjects,
         "reference": reference(study, ranked_tasks(study)),
-        "LEVEL": LEVEL, "varied": study.varied[0] and not study.against,
+        "LEVEL": LEVEL, "parameters": [] if study.against else [*study.varied.columns],
+        "interaction": _interaction(study), "budget": ranking_budget(study),
         "papers": methods.index[methods.is_learner & (methods.setting == "")],
         "rivals": "other" if study.against else "built-in",
     }  # fmt: skip
-    text = environment.from_string(section.sentence).render(rows=rows, every=frame, others=others)
+    text = environment.from_string(section.sentence).render(rows=rows, others=others)
     return [capital(shown(line.strip())) for line in text.split("\n") if line.strip()]
 
 
@@ -361,6 +392,26 @@ def subject_of(method: Mapping[str, Any]) -> str:
     article = "" if method["algorithm"] in _WITHOUT_ARTICLE else "the "
     comma = "," if "," in title.partition("(")[0] else ""
     return f"{article}{title}{comma}"
+
+
+@lru_cache(maxsize=4)
+def _interaction(study: Study) -> float:
+    """Return p of the interaction of two varied parameters (:func:`.interaction_test`).
+
+    It is NaN unless two parameters vary and each combination of their values is ranked.
+    """
+    varied, rows = study.varied, standings(study).query("why == ''")
+    if len(varied.columns) != 2 or not {*varied.index} <= {*rows.index}:
+        return math.nan
+    keys = pd.MultiIndex.from_frame(varied.map(repr))
+    labels, tasks = pd.Series([*varied.index], keys).unstack(0), ranked_tasks(study)
+    if labels.isna().any(axis=None):
+        return math.nan
+    gaps = [[[of_task.to_numpy(np.float64)
+              for _, of_task in runs_on(study, label, tasks).groupby("task").gap]
+             for label in line]
+            for line in labels.to_numpy()]  # fmt: skip
+    return interaction_test(gaps)
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
@@ -441,6 +492,6 @@ def notes_of(study: Study, columns: Iterable[str]) -> list[str]:
         )
     if own and "gap" in columns:
         notes.append(
-            f"Of {listed(own)} the best of this folder is all that is known: gaps are to it."
+            f"For {listed(own)} only the best reward of this folder is known, and gaps are to it."
         )
     return notes

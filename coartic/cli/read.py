@@ -84,12 +84,13 @@ def report(
 def say_ranking(study: Study, folder: Path) -> None:
     """Print the ranking of a study, with these notes:
 
+    - the answer in words, if the study varies parameters;
     - which methods are not ranked, and why;
     - the reference of the gaps;
     - how many runs failed, and why;
     - the command that writes the report of ``folder``.
     """
-    from coartic.analysis.report.sections import limits
+    from coartic.analysis.report.sections import SECTIONS, finding, limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
     from coartic.estimates import FEWEST
@@ -111,7 +112,9 @@ def say_ranking(study: Study, folder: Path) -> None:
         for row in ranked.to_dict("records")
     ]  # fmt: skip
     say_table(headings, cells)
-    pairs = [
+    answer = finding(study, SECTIONS[0])[:1] if not study.varied.empty else []
+    pairs = [("Answer", sentence) for sentence in answer]
+    pairs += [
         ("Not ranked", f"{why}: {'; '.join(of_reason['name'])}")
         for why, of_reason in unranked.groupby("why", sort=False)
     ]

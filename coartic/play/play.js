@@ -52,15 +52,12 @@ function read(link, first) {
   return state;
 }
 
-/* Posture difference of two samples: their means, the distance between the means, and this distance in pooled standard
-   deviations, null if no runs differ. */
+/* Posture difference of two samples: their means, the distance between the means (length units and rad), and the number
+   of runs. */
 function posture_difference(samples) {
   const means = samples.map((runs) => runs[0].map((_, j) => runs.reduce((sum, q) => sum + q[j], 0) / runs.length));
   const distance = distance_of(...means);
-  const squares = samples.reduce((sum, runs, k) => sum + runs.reduce((part, q) => part + distance_of(q, means[k]) ** 2, 0), 0);
-  const [n, m] = samples.map((runs) => runs.length);
-  const deviation = n > 1 && m > 1 ? Math.sqrt(squares / (n + m - 2)) : 0;
-  return { means, distance, deviations: deviation ? distance / deviation : null, runs: Math.min(n, m) };
+  return { means, distance, runs: Math.min(...samples.map((runs) => runs.length)) };
 }
 
 /* A film of what one robot does: its rows, and ticks at which goals are hit. */
@@ -573,17 +570,17 @@ class Play {
     }
     if (main.length > 1 && main[0].trial.hands[0] !== main[1].trial.hands[0]) return ["They hit goal 1 with different hands."];
     if (!difference) return [""];
-    const { deviations, distance, runs } = difference;
+    const { distance, runs } = difference;
     if (distance < 0.005) return ["At goal 1 both robots have the same posture."];
     const hasRuns = state.who === "learner" || (this.stored(state.who) && runs > 1);
     if (!hasRuns) return [`At goal 1 the posture difference is ${short(distance)}.`, far];
     const by_chance = this.stored(state.who) && this.preset.by_chance;
-    const random = Number.isFinite(by_chance) ? ` (random search: ${by_chance.toFixed(1)})` : "";
+    const random = Number.isFinite(by_chance) ? ` (random search: ${short(by_chance)})` : "";
     const saved = this.first_trials.map(({ reward }, k) => main[k].trial.reward - reward);
     const pays = saved.length && Math.min(...saved) > 0 ? `Practice saves blue ${counted(saved[0], "tick")} and orange ${saved[1]}. ` : "";
     return [
-      `${pays}At goal 1 the posture difference is ${deviations === null ? "…" : deviations.toFixed(1)} standard deviations${random}.`,
-      `One standard deviation is the typical distance of a run (thin) from the mean (thick, ${counted(runs, "run")} each).${random && " Random search takes the best of as many random trials."}`,
+      `${pays}At goal 1 the posture difference is ${short(distance)}${random}.`,
+      `It is the distance between the mean postures (thick; ${counted(runs, "run")} each, thin), in length units and rad.${random && " Random search takes the best of as many random trials."}`,
     ];
   }
 
