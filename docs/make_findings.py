@@ -19,8 +19,9 @@ import finding_figures
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import by_task, load, mean
+from coartic.analysis import Study, by_task, load, mean
 from coartic.analysis.figures import picture
+from coartic.analysis.statistics import task_mean
 from common.judging import Verdict
 from common.writing import fill_page
 
@@ -119,6 +120,57 @@ def early_less_late(family: str) -> dict[str, float]:
     return mean((tasks[0] - tasks[1]).dropna()).columns("more")
 
 
+FOREIGN = ["task", "method", "setting", "run", "trials", "reward", "best_known", "gap"]
+POSTURE = ["at_x", "at_y", *(f"at_{joint}" for joint in range(1, 5))]
+"""Columns of the posture at goal 1 of the one-armed tasks: base and joints of the right arm."""
+
+
+def foreign_rows(study: Study) -> pd.DataFrame:
+    """Return the runs of suite ``foreign`` or ``tuning``, a row each; on the paper's one-armed
+    tasks with the posture at goal 1."""
+    runs = study.runs[study.runs.status == "ok"]
+    runs = runs.assign(method=runs.method.replace(r"dual-process/EC\d", "learner", regex=True))
+    rows = runs.set_index("run_id")[FOREIGN].reindex(columns=[*FOREIGN, *POSTURE])
+    for task, label in study.cells:
+        if task in ("ascending", "descending"):
+            executed = study.executed(task, label)
+            arm = executed.task.robot.joints("right")
+            for run_id, q in zip(executed.run_ids, executed.configurations[:, 0], strict=True):
+                rows.loc[run_id, POSTURE] = [*q[:2], *q[arm]]
+    return rows.set_index("task")
+
+
+def foreign_gaps() -> pd.DataFrame:
+    """Return the gaps of suite ``foreign``, per cent, a row for each method and setting: on the
+    paper's tasks with intervals over runs, on random tasks (``random``) with intervals over tasks,
+    and the posture difference at the first goal of ascending and descending."""
+    runs = pd.read_csv(STORED / "foreign" / "runs.csv").fillna({"setting": ""})
+    names = (runs.method + " " + runs.setting).str.strip()
+    table = {}
+    for name, of_method in runs.groupby(names, sort=False):
+        is_random = of_method.task.str.contains("/")
+        paper, drawn = of_method[~is_random], of_method[is_random]
+        row = task_mean([100 * gaps for _, gaps in paper.groupby("task").gap]).columns("gap")
+        row |= mean(100 * drawn.gap).columns("random") if len(drawn) else {}
+        hits = [paper[paper.task == task][POSTURE].mean() for task in ("ascending", "descending")]
+        table[name] = row | {"difference": float(((hits[0] - hits[1]) ** 2).sum() ** 0.5)}
+    return pd.DataFrame.from_dict(table, orient="index")
+
+
+def shipped_gaps(method: str) -> dict[str, float]:
+    """Return what :func:`foreign_gaps` has, of a method of the shipped suites on the same tasks: a
+    mean of their three runs on each random task."""
+    paper = row("comparison", "ranking", method)
+    tasks = table("families", "by-task").reset_index()
+    tasks = tasks[tasks.task.str[-4:].isin(["i000", "i001", "i002"])]
+    one, others = ("dual-process/EC1", "dual-process/EC4") if "dual" in method else (method, method)
+    wanted = tasks.task.str.startswith("one-armed/").map({True: one, False: others})
+    drawn = tasks[(tasks.method == wanted) & ~tasks.task.str.startswith("many-goals/")]
+    gaps = {f"gap{end}": 100 * paper[f"gap{end}"] for end in ("", "_low", "_high")}
+    gaps["difference"] = table("comparison", "contexts").set_index("method").distance[one]
+    return gaps | mean(100 * drawn.gap).columns("random")
+
+
 def filled_pages() -> dict[str, str]:
     """Every page that is made from a template, by its path below ``docs``."""
     replication = STUDIES / "replication"
@@ -134,6 +186,8 @@ def filled_pages() -> dict[str, str]:
         "p_of_shares": p_of_shares,
         "gain_of_best_hands": gain_of_best_hands,
         "early_less_late": early_less_late,
+        "foreign_gaps": foreign_gaps,
+        "shipped_gaps": shipped_gaps,
         "published": published["general"],
         "readings": table("reconstruction", "readings"),
         "goal_sets": pd.read_csv(replication / "sets.csv"),
@@ -158,6 +212,11 @@ def store(results: Path) -> None:
 
     What is stored of a suite without a report there stays as it is.
     """
+    for suite, name in (("foreign", "runs"), ("tuning", "tuning")):
+        if (results / suite).is_dir():
+            rows = foreign_rows(load(results / suite)).dropna(axis="columns", how="all")
+            file = STORED / "foreign" / f"{name}.csv"
+            rows.to_csv(file, float_format="%.6g", lineterminator="\n")
     for suite, (tables, figures) in KEPT.items():
         report, kept = results / suite / "report", STORED / suite
         if not report.is_dir():

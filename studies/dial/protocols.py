@@ -3,9 +3,9 @@
     python studies/dial/protocols.py results/dial
 
 writes ``runs.csv``, a row for each run of the learner, ``others.csv``, a row for each run of
-another method, ``shifts.csv``, a row for each goal before a goal that is moved, and ``named.csv``,
-a row for each named setting on a task of the paper. A task is done at a time; what is done is not
-done again. It takes about an hour on two cores.
+another method, ``shifts.csv``, a row for each goal before a goal that is moved, and
+``named_runs.csv``, a row for each run of a named setting on a task of the paper. A task is done at
+a time; what is done is not done again. It takes about an hour on two cores.
 """
 
 import csv
@@ -33,7 +33,7 @@ COLUMNS = [
     *(f"reward_{trials}" for trials in AFTER), "quarter", "half",
 ]  # fmt: skip
 NAMED_RUNS = 20
-NAMED_COLUMNS = ["row", "task", "setting", "runs", *(f"after_{trials}" for trials in AFTER[1:])]
+NAMED_COLUMNS = ["task", "setting", "run", *(f"after_{trials}" for trials in AFTER[1:])]
 MISSED = -(10**9)
 """Reward of a trial that misses a goal: less than any other."""
 OTHERS = {
@@ -101,13 +101,14 @@ def run_others(name):
 
 
 def run_named(name):
-    """Run the named settings on a task; rows of :data:`NAMED_COLUMNS`, of mean best rewards."""
+    """Run the named settings on a task; rows of :data:`NAMED_COLUMNS`, of best rewards so far."""
     task, rows = load_task(name), []
     for setting, fields in NAMED.items():
         condition = replace(base_of(task), **fields)
         runs = learn_many(task, condition, seeds=range(NAMED_RUNS), trials=TRIALS, jobs=1)
-        best = [np.fmax.accumulate(run.rewards)[np.array(AFTER[1:]) - 1] for run in runs]
-        rows.append([f"{name} {setting}", name, setting, NAMED_RUNS, *np.mean(best, axis=0)])
+        for number, run in enumerate(runs):
+            best = np.maximum.accumulate(run.rewards.filled(MISSED))
+            rows.append([name, setting, number, *(int(best[n - 1]) for n in AFTER[1:])])
     return rows
 
 
@@ -115,7 +116,7 @@ PARTS = {
     "runs": (run_task, COLUMNS, (*TASKS, *INSTANCES)),
     "others": (run_others, COLUMNS, (*TASKS, *(name for name in INSTANCES if name[-3:] < "010"))),
     "shifts": (run_shifts, SHIFT_COLUMNS, SHIFT_TASKS),
-    "named": (run_named, NAMED_COLUMNS, TASKS),
+    "named_runs": (run_named, NAMED_COLUMNS, TASKS),
 }
 """Files, the function that makes the rows of a task, their columns, and the tasks."""
 

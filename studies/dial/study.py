@@ -57,6 +57,15 @@ def tabulate(runs):
     return table.rename(columns={"rows": "units"})
 
 
+def tabulate_named(runs):
+    """Tabulate the named settings: mean best rewards over the runs of each on a task."""
+    groups = runs.groupby(["task", "setting"], sort=False)
+    table = groups[[name for name in runs if name.startswith("after_")]].mean()
+    table.insert(0, "runs", groups.size())
+    table = table.reset_index()
+    return table.set_index((table.task + " " + table.setting).rename("row"))
+
+
 def judge_claims(runs):
     """The claims, as they were registered before any random test task was run."""
 
@@ -127,15 +136,17 @@ def draw(table):
 
 def measure(folder):
     """Return the tables by name; each becomes a CSV file."""
-    runs, others, shifts, named = (pd.read_csv(Path(folder) / f"{name}.csv")
-                                   for name in ("runs", "others", "shifts", "named"))  # fmt: skip
+    parts = ("runs", "others", "shifts", "named_runs")
+    runs, others, shifts, named = (pd.read_csv(Path(folder) / f"{name}.csv") for name in parts)
+    named = named.sort_values("task", kind="stable")
     stored = pd.concat([runs, others], ignore_index=True)
     runs, moved, shifts = measure_runs(stored), shifts.set_index("task"), measure_shifts(shifts)
     return {
         "runs": stored.set_index("task").sort_index(kind="stable"),
         "moved": moved.sort_index(kind="stable"),
         "results": tabulate(runs),
-        "named": named.sort_values("task", kind="stable").set_index("row"),
+        "named": tabulate_named(named),
+        "named_runs": named.set_index("task"),
         "claims": judge_claims(runs),
         "shifts": tabulate_shifts(shifts),
         "shift_claims": judge_shifts(shifts),

@@ -37,6 +37,15 @@ LEVEL, RESAMPLES = 0.05, 9_999
 VALUE_KEYS = ["measure", "model", "sample", "task"]
 NOT_BEYOND = "it is not shown to exceed random search"
 FEWEST_TASKS = 10
+POWER = 0.9
+EFFECTS_WITH_POWER = {
+    "two-ahead learner slope norm at distance 2": "value",
+    "both-directions learner slope norm at distance -1": "over_random_search",
+    "horizon-grows learner rise of the slope norm at distance 2": "value",
+    "serial-where-it-may learner benefit correlation": "value",
+    "bends-away learner bow slope": "value",
+}
+"""Effects whose smallest size is stated that a test would find, with the column that is tested."""
 MARKS = {
     "agrees": ("+", figures.PALETTE[0]), "disagrees": ("−", figures.PALETTE[3]),
     "undecided": ("?", figures.GREY), "silent": ("·", figures.GREY), "no cases": ("", figures.GREY),
@@ -337,7 +346,32 @@ def judge_all(effects, values):
     body = pd.read_csv(HERE / "body.csv", index_col=0)
     verdicts = correct(pd.concat([effects, body]), values)
     same = on_the_same_tasks(values, "slope norm at distance 2", "all goals ahead")
-    return {"results": tabulate(verdicts), "verdicts": verdicts, "same": same}
+    power = tabulate_power(effects, int(verdicts.judged.sum()))
+    return {"results": tabulate(verdicts), "verdicts": verdicts, "same": same, "power": power}
+
+
+def tabulate_power(effects, judged):
+    """Return the smallest effects that a test finds with 90 % power: a row for each effect.
+
+    ``least``: by a single test of the finding. ``least_corrected``: after the correction over
+    ``judged`` verdicts, by the smallest p. ``larger``: by how much the distance from the bound has
+    to be larger after the correction, as a share.
+    """
+    rows, of_power = {}, stats.norm.ppf(POWER)
+    for name, column in EFFECTS_WITH_POWER.items():
+        of = effects.loc[name]
+        tests = ((effects.finding == of.finding) & (effects.model == of.model)).sum()
+        bound = abs(float(of.bound.split()[1])) if column == "value" else 0.0
+        single, corrected = (
+            stats.norm.ppf(1 - LEVEL / tests / verdicts / 2) for verdicts in (1, judged)
+        )
+        error = (of[f"{column}_high"] - of[f"{column}_low"]) / (2 * single)
+        rows[name] = {
+            "least": bound + (single + of_power) * error,
+            "least_corrected": bound + (corrected + of_power) * error,
+            "larger": (corrected + of_power) / (single + of_power) - 1,
+        }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
 
 
 def on_the_same_tasks(values, measure, model):

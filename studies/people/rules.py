@@ -145,6 +145,21 @@ def sign_flips(values):
     return float((signs @ values >= values.sum() - 1e-12).mean())
 
 
+def needed(values):
+    """Return what the test would have needed to reject: ``mean_needed``, the smallest mean with
+    these deviations, and ``spread_needed``, the largest share of these deviations with this mean.
+    NaN where none is enough."""
+    mean = np.mean(values)
+    away = np.asarray(values, float) - mean
+    found = {
+        "mean_needed": (shift for shift in np.arange(0, 1, 0.001)
+                        if sign_flips(away + shift) <= LEVEL),
+        "spread_needed": (share for share in np.arange(1, 0, -0.01)
+                          if sign_flips(mean + share * away) <= LEVEL),
+    }  # fmt: skip
+    return {name: next(values, np.nan) for name, values in found.items()}
+
+
 def power(shift, n, studies=20_000):
     """Return the share of studies in which the test rejects, for n normal values of SD 1."""
     values = np.random.default_rng(1).normal(shift, size=(studies, n))
@@ -168,9 +183,10 @@ def spreads(contexts):
 
     ``repeats``: what the variance of the repeats within contexts explains. ``at right angles``:
     the spread between people of the same difference, end less start, on the three directions at
-    right angles to n_A − n_B, in which no lean counts; the mean over people is taken out.
+    right angles to n_A − n_B, in which no lean counts; the mean over people is taken out. ``as
+    vectors``: the same, but a person's differences are averaged over targets as vectors.
     """
-    variances, across = {}, {}
+    variances, across, vectors = {}, {}, {}
     for of_target in contexts.values():
         ways = {
             person: both[0][:, 2].mean(axis=0) - both[1][:, 2].mean(axis=0)
@@ -188,9 +204,18 @@ def spreads(contexts):
             basis *= np.sign(np.diag(triangle))
             difference = moved[0].mean(axis=0) - moved[1].mean(axis=0)
             across.setdefault(person, []).append(basis[:, 1:].T @ difference)
+            vectors.setdefault(person, []).append(basis[:, 1:] @ across[person][-1])
     within = [np.sum(each) / len(each) ** 2 for each in variances.values()]
-    between = np.array([np.mean(each, axis=0) for each in across.values()]).var(axis=0, ddof=1)
-    return {"repeats": float(np.mean(within)) ** 0.5, "at right angles": between.mean() ** 0.5}
+    between, joined = (
+        np.array([np.mean(each, axis=0) for each in of.values()]).var(axis=0, ddof=1)
+        for of in (across, vectors)
+    )
+    directions = basis.shape[1] - 1
+    return {
+        "repeats": float(np.mean(within)) ** 0.5,
+        "at right angles": between.mean() ** 0.5,
+        "as vectors": (joined.sum() / directions) ** 0.5,
+    }
 
 
 def tabulate_power(contexts):

@@ -18,6 +18,7 @@ from rules import (
     contexts_of,
     leans,
     left_out,
+    needed,
     people,
     read,
     sign_flips,
@@ -49,6 +50,7 @@ def over_people(values):
         "people": n, "more": center, "low": center - half, "high": center + half, "sd": sd,
         "p": sign_flips(values.more), "at_end": values.at_end.mean(),
         "at_start": values.at_start.mean(), "smallest": smallest_shift(n) * sd,
+        **needed(values.more),
     }  # fmt: skip
 
 

@@ -1,5 +1,7 @@
 """The rules of study people on planted data, its refusals, and its table from made-up files."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -170,3 +172,11 @@ def test_the_table_comes_from_files(tmp_path):
     (tmp_path / "S05_trajs.mat").unlink()
     with pytest.raises(SystemExit, match=r"S05_trajs.mat does not exist\. Get .* from https://"):
         MAKE_TABLE.make_table(tmp_path)
+
+
+def test_the_guide_has_the_plan_of_the_study():
+    """How many repeats a lab needs is a table of the how-to, too."""
+    page = (ROOT / "docs" / "howto" / "people.md").read_text("utf-8")
+    rows = re.findall(r"\| (\d+) \| (\d+) % \| (\d+) \| (\d+) \|", page)
+    plan = pd.read_csv(FOLDER / "plan.csv").assign(lean=lambda table: 100 * table.lean)
+    assert np.array(rows, float) == pytest.approx(plan.to_numpy(float))
