@@ -90,7 +90,7 @@ def _answer(path: Path, method: str, question: str, *arguments: Any) -> Any:
     except CoarticError:
         raise
     except BaseException as error:
-        raise CoarticError(f"{path}: cannot be used: {error_line(error)}") from None
+        raise CoarticError(f"{path} cannot be used: {error_line(error)}") from None
 
 
 def check_code(info: MethodInfo) -> None:
@@ -118,7 +118,7 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
     try:
         module, loaded = load_file(path)
     except BaseException as error:
-        raise CoarticError(f"{shown}: cannot be imported: {error_line(error)}") from None
+        raise CoarticError(f"{shown} cannot be imported: {error_line(error)}") from None
     methods = methods_in(module)
     if not methods:
         unfinished = [
@@ -127,8 +127,7 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
         ]
         missing = f" that is complete: {', '.join(unfinished)}" if unfinished else ""
         raise CoarticError(
-            f"{shown}: the file must define a subclass of coartic.Method or coartic.Optimiser"
-            f"{missing}"
+            f"{shown} must define a subclass of coartic.Method or coartic.Optimiser{missing}"
         )
     files = _user_files(loaded)
     packages, infos = _packages_of({path, *files}), list[MethodInfo]()

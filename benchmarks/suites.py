@@ -157,7 +157,7 @@ def check_kind(name: str, *kinds: str) -> None:
     """
     kind = kind_of(name)
     if kind and kind not in kinds:
-        raise CoarticError(f"{name} is a {kind}: {_TAKEN_BY[kind].format(quote(name))}")
+        raise CoarticError(f"{name} is a {kind}: use `{_TAKEN_BY[kind].format(quote(name))}`")
 
 
 def suites() -> dict[str, Suite]:

@@ -357,11 +357,10 @@ def new(
     """Write a small working method into a file, to start your own."""
     from coartic.benchmarks import template
     from coartic.benchmarks.registry import check_id, registry
-    from coartic.internal.files import write_output
+    from coartic.internal.files import check_ending, write_output
 
     path = Path(given.file_name(name)) if out is None else out
-    if path.suffix != ".py":
-        raise CoarticError(f"--out {path}: the name must end in .py.")
+    check_ending(path, [".py"])
     check_id(name, "coartic new", registry())
     text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)

@@ -130,7 +130,9 @@ def write_output(path: Path, data: bytes, *, replace: bool) -> None:
 def check_ending(path: Path, endings: Collection[str]) -> None:
     """Raise CoarticError if the suffix of a path, in lower case, is not one of ``endings``."""
     if path.suffix.lower() not in endings:
-        raise CoarticError(f"{path}: the name must end in {' or '.join(endings)}")
+        *others, last = endings
+        allowed = f"{', '.join(others)} or {last}" if others else last
+        raise CoarticError(f"the name {path} must end in {allowed}")
 
 
 def check_output(path: Path, *, replace: bool) -> None:

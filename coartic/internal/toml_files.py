@@ -19,7 +19,7 @@ def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> 
         return tomllib.loads(read_bytes(path, error=error).decode("utf-8-sig"))
     except ValueError as failure:  # wrong TOML or UTF-8
         shown = plain(str(path), LONGEST_LINE)
-        raise error(f"{shown}: is not valid TOML in UTF-8: {plain(str(failure), 80)}") from None
+        raise error(f"{shown} is not valid TOML in UTF-8: {plain(str(failure), 80)}") from None
 
 
 def read_bytes(path: str | Path, *, error: type[CoarticError] = CoarticError) -> bytes:
@@ -31,4 +31,4 @@ def read_bytes(path: str | Path, *, error: type[CoarticError] = CoarticError) ->
         return Path(path).read_bytes()
     except OSError as failure:
         shown = plain(str(path), LONGEST_LINE)
-        raise error(f"{shown}: cannot be read: {failure.strerror}") from None
+        raise error(f"{shown} cannot be read: {failure.strerror}") from None

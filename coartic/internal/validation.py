@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import fields
 from functools import wraps
@@ -14,6 +15,7 @@ from coartic.internal.limits import brief_value, plain_values
 from coartic.internal.text import did_you_mean, plain
 
 T = TypeVar("T")
+_UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 
 def in_sentences(kind: type[T]) -> type[T]:
@@ -65,7 +67,9 @@ class FileData(BaseModel):
 
 
 def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool = False) -> str:
-    """Return a sentence on the first problem of a validation error, with its key and value.
+    """Return a sentence on a problem of a validation error, with its key and value.
+
+    It is the first unknown key, or else the first problem.
 
     Parameters
     ----------
@@ -81,7 +85,10 @@ def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool =
     -------
     str
     """
-    problem = error.errors(include_url=False)[0]
+    problems = error.errors(include_url=False)
+    # A misspelt key explains a missing one.
+    unknown = (each for each in problems if each["type"] in _UNKNOWN_KEY)
+    problem = next(unknown, problems[0])
     message = problem["msg"].removeprefix("Value error, ")
     root, *parts = problem["loc"] or [""]
     key = str(dict[int | str, str](enumerate(keys)).get(root, root))
@@ -93,10 +100,12 @@ def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool =
     match problem["type"]:
         case "missing" | "missing_argument" | "missing_keyword_only_argument":
             message = f"{key} is missing"
-        case "extra_forbidden" | "unexpected_keyword_argument":
+        case kind if kind in _UNKNOWN_KEY:
             message = f"{key} is an unknown key{did_you_mean(str((root, *parts)[-1]), keys)}"
         case kind if key and kind != "sentence":
-            message = f"{key} is {brief_value(problem['input'])}: {message}"
+            wanted = re.sub(r"^([A-Z][a-z]+ )?should ", "; it should ", message)
+            found = f"{key} is {brief_value(problem['input'])}"
+            message = f"{found}: {message}" if wanted == message else f"{found}{wanted}"
     return plain(message)
 
 

@@ -305,7 +305,9 @@ class Task(FileData):
         """
         file = folder_named(path, "the name of a task's file")
         if file.suffix != ".toml":
-            raise CoarticError(f"cannot write {file}: the name of a task file must end in .toml")
+            raise CoarticError(
+                f"{file} cannot be written: the name of a task file must end in .toml"
+            )
         write_output(file, task_text(self).encode(), replace=replace)
 
     def _repr_html_(self) -> str:
