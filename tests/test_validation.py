@@ -74,25 +74,25 @@ def changed(good, old, new):
 task, family, suite, method = (partial(changed, text) for text in (GOOD, FAMILY, SUITE, METHOD))
 
 TASKS = [
-    (task("[5.0, 2.0]", "[nan, 2.0]"), "goals[1][0] is nan: "),
-    (task("[[5.0, 1.0], [5.0, 2.0]]", "[]"), "goals is []: "),
+    (task("[5.0, 2.0]", "[nan, 2.0]"), "goals[1][0] is nan; "),
+    (task("[[5.0, 1.0], [5.0, 2.0]]", "[]"), "goals is []; "),
     ('locked_base = ["x", "y"]\n' + task("[5.0, 2.0]", "[5.0, 20.0]"), "out of reach"),
     ("goal = 1\nrobots = 1\n" + GOOD, "goal is an unknown key; did you mean 'goals'?"),
     (task('"RR"', '"RRR"'), "initial_hands: "),
     (task("right = [0.0, 0.0, 0.0, 0.0]", "right = [0.0, 0.0]"), "start.right"),
-    (task('"mine"', '"my task"'), "name is 'my task': "),
+    (task('"mine"', '"my task"'), "name is 'my task'; "),
     (task("goals = [[", "goals = [[["), "line"),
 ]
 FAMILIES = [
-    (family("[2, 3]", "[1, 3]"), "goals[0] is 1: "),
-    (family("[-5, 5]", "[-5, 5]\nscale = [0.5, 1.5]"), "scale is [0.5, 1.5]: "),
+    (family("[2, 3]", "[1, 3]"), "goals[0] is 1; "),
+    (family("[-5, 5]", "[-5, 5]\nscale = [0.5, 1.5]"), "scale is [0.5, 1.5]; "),
     ("reach = 4.0001" + FAMILY, "4.0001"),
 ]
 SUITES = [
     (suite("EC1", "EC3"), "task 'ascending' has no left hand"),
     (SUITE + "parameters = {noise = 1.0}", "noise is an unknown key; did you mean 'noise_sd'?"),
-    (SUITE + "grid = {noise_sd = [nan]}", "grid.noise_sd[0] is nan: "),
-    (suite("runs = 1", "runs = 1.5"), "runs is 1.5: "),
+    (SUITE + "grid = {noise_sd = [nan]}", "grid.noise_sd[0] is nan; "),
+    (suite("runs = 1", "runs = 1.5"), "runs is 1.5; "),
     (SUITE + "move = {goal = 4, by = [[0, 1]]}", "asks for goal 4"),
 ]
 METHODS = [
@@ -130,8 +130,8 @@ def test_a_file(read, name, text, words, tmp_path):
         ({"tasks": ["ascendin"]}, "did you mean 'ascending'?"),
         ({"method_file": "a.py"}, "method_file is an unknown key; did you mean 'method_files'?"),
         ({"runs": "3"}, "runs is '3'"),
-        ({"seed": True}, "seed is True: "),
-        ({"time_limit_s": float("nan")}, "time_limit_s is nan: "),
+        ({"seed": True}, "seed is True; "),
+        ({"time_limit_s": float("nan")}, "time_limit_s is nan; "),
         ({"folder": ""}, "the name of a folder is empty"),
     ],
 )
@@ -259,7 +259,7 @@ def test_a_name_and_a_path_stand_for_the_task(call):
         (lambda: Movement(1, "right", "planned", MASKED), "target is "),
         (lambda: Movement(1, "right", "path", waypoints=[MASKED]), "waypoints is "),
         (lambda: make_trials(TASK, "RRR", [[MASKED] * 3]), "masked"),
-        (lambda: reach_goals(3, [TASK.q0], [0], [], 1.0), "robot is 3: .* Robot"),
+        (lambda: reach_goals(3, [TASK.q0], [0], [], 1.0), "robot is 3; .* Robot"),
         (lambda: interval({"a": "x", "a_low": 0, "a_high": 1}, "a"), "a_l"),
         (lambda: mean([1e101, 0.0, 1.0]), "1e100"),
         (lambda: holm([0.1, 1.01]), "p-values"),
