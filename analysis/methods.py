@@ -228,7 +228,13 @@ def parameters_varied(runs: pd.DataFrame) -> pd.DataFrame:
     varied = [*counts.index[counts > 1]]
     numbers = [name for name in varied if are_numbers(values[name])]
     values = values[varied].where(values[varied].notna(), None)
-    return values.sort_values(numbers, kind="stable") if numbers else values if varied else pd.DataFrame()
+    return (
+        values.sort_values(numbers, kind="stable")
+        if numbers
+        else values
+        if varied
+        else pd.DataFrame()
+    )
 
 
 def are_numbers(values: Iterable[object]) -> bool:

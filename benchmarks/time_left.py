@@ -59,7 +59,7 @@ class TimeLeft:
             self._waiting[kind] -= 1
             if times.wall_s is not None:
                 self._done_s += times.wall_s
-                weight = math.exp(-times.wall_s / max(_RECENT * self._done_s, 1e-9))
+                weight = math.e ** (-times.wall_s / max(_RECENT * self._done_s, 1e-9))
                 group = _group_of(kind[0])
                 self._took_s[group] = weight * self._took_s[group] + times.wall_s
                 self._usual_s[group] = weight * self._usual_s[group] + _shipped_s(kind)

@@ -377,7 +377,11 @@ def test_two_parameters_are_answered_with_a_line_for_each_value_of_the_second(in
     (axes,) = plot.figure.axes
     assert axes.get_xlabel() == "noise_sd"
     assert axes.get_xscale() == "linear"
-    drawn = {line.get_label(): line.get_ydata().tolist() for line in axes.lines if len(line.get_xdata()) == 3}
+    drawn = {
+        line.get_label(): line.get_ydata().tolist()
+        for line in axes.lines
+        if len(line.get_xdata()) == 3
+    }
     gaps = plot.data.set_index(["line", "value"]).gap
     assert drawn == {str(line): pytest.approx([100 * gaps[line, noise] for noise in sorted(NOISE)])
                      for line in EPSILON}  # fmt: skip

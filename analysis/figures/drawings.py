@@ -139,7 +139,7 @@ def _draw_lines(study: Study, axes: Axes, rows: pd.DataFrame, other: str = "") -
     for number, (line, of_line) in enumerate(lines):
         at = of_line.value.map(dict(zip(values, places, strict=True))).to_numpy(np.float64)
         shift = (number - (len(lines) - 1) / 2) * apart
-        at = at * math.exp(shift) if is_log else at + shift
+        at = at * math.e**shift if is_log else at + shift
         color, marker = style.PALETTE[number], "osD^"[number]
         look: Any = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.6}
         drawn = of_line.assign(place=at)
@@ -322,7 +322,9 @@ def draw_saved(study: Study) -> Parts | None:
     rows = rows[rows.method.isin(headline_methods(single))]
     if not len(rows):
         return None
-    gaps = [solved(study.cells[cell]).gap.mean() for cell in zip(rows.task, rows.method, strict=True)]
+    gaps = [
+        solved(study.cells[cell]).gap.mean() for cell in zip(rows.task, rows.method, strict=True)
+    ]
     learners = rows.method.map({label: place for place, label in enumerate(LEARNERS)})
     most = learners == learners.groupby(rows.task).transform("max")  # that explores most
     rows = rows.assign(gap=gaps, line=rows.method.mask(most, "learner"))

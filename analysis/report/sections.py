@@ -205,7 +205,7 @@ methods, by so many percentage points (negative: a larger gap): \
 "no significant difference": "in postures that do not differ significantly",
 "different, negligible": "in postures that hardly differ",
 "the same posture": "in the same posture",
-"too few runs": "in postures that cannot be tested with fewer than 5 runs",
+"too few runs": "in postures of too few runs to test",
 }.get(row.verdict, "in postures that differ; no random search was run to compare them with") }}. \
 The posture difference is {{ row.distance | number(2) }} (length units and rad; \
 {{ row.runs }} runs){{ "; that of random search is %s" % number(row.control, 2) \
