@@ -163,7 +163,8 @@ def methods_of(
         named = setting
         if label in varied.index:
             default_note = ", the paper's" if base in LEARNERS else ", default"
-            named = in_words(varied.loc[label].to_dict()) + default_note * (not setting)
+            named = in_words(dict(zip(varied.columns, varied.loc[label], strict=True)))
+            named += default_note * (not setting)
         info = declared[base]
         facts = KNOWN_METHODS.get(base) if info.is_ours else None
         default = base if setting else facts.ablation_of if facts else ""
@@ -220,7 +221,7 @@ def parameters_varied(runs: pd.DataFrame) -> pd.DataFrame:
 
     runs = runs[~runs.method.isin(SEARCHES)]
     tasks = runs.groupby("label").task.nunique()
-    if runs.method.nunique() != 1 or (tasks < runs.task.nunique()).any():
+    if len({*runs.method}) != 1 or (tasks < runs.task.nunique()).any():
         return pd.DataFrame()
     texts = runs.drop_duplicates("label").set_index("label").parameters
     values = pd.DataFrame([*map(json.loads, texts)], texts.index.astype(str), dtype=object)

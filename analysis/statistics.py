@@ -250,8 +250,9 @@ def interaction_test(cells: Sequence[Sequence[Sequence[Array]]]) -> float:
         return np.asarray((left**2).sum(axis=(1, 2)) / variances.sum(axis=1))
 
     def moments(drawn: Sequence[Array]) -> tuple[Array, Array]:
-        return (np.stack([runs.mean(axis=-1) for runs in drawn], axis=-1),
-                np.stack([runs.var(axis=-1) / runs.shape[-1] for runs in drawn], axis=-1))  # fmt: skip
+        means = np.stack([runs.mean(axis=-1) for runs in drawn], axis=-1)
+        variances = np.stack([runs.var(axis=-1) / runs.shape[-1] for runs in drawn], axis=-1)
+        return means, variances
 
     null = [
         centred(runs)[rng.integers(len(runs), size=(FEWER_RESAMPLES, len(runs)))]

@@ -859,8 +859,9 @@ def list_saved(study: Study) -> Rows:
     """Yield how many ticks more than the corrective process each method takes for each goal.
 
     There is a row for each individual task and each method, except searches, that solved a run.
-    ``by_goal_1`` and so on, and their ``sum``, are means over runs: ticks of the run less the ticks of the corrective
-    process alone with the same hands. Runs with hands with which this process fails are left out;
+    ``by_goal_1`` and so on, and their ``sum``, are means over runs: ticks of the run less the ticks
+    of the corrective process alone with the same hands. Runs with hands with which this process
+    fails are left out;
     if no runs remain, so is the row.
     """
     for (task, label), runs in study.cells.items():

@@ -107,8 +107,10 @@ def test_a_phone_shows_the_panels_of_a_figure_one_below_the_other(opened):
     panels = page.eval_on_selector_all(
         ".drawn.narrow svg",
         """all => all.map((panel) => {
-            const [frame, drawn] = [panel, panel.firstChild].map((part) => part.getBoundingClientRect());
-            return [panel.closest("figure").id, frame.left, frame.right, frame.top, frame.bottom, drawn.width];
+            const frame = panel.getBoundingClientRect();
+            const drawn = panel.firstChild.getBoundingClientRect().width;
+            const figure = panel.closest("figure").id;
+            return [figure, frame.left, frame.right, frame.top, frame.bottom, drawn];
         })""",
     )
     of_figure = {}

@@ -359,7 +359,7 @@ NOISE, EPSILON = [0.05, 0.02, 0.1], [0.2, 0.1]
 
 @pytest.mark.parametrize("interacts", [True, False])
 def test_two_parameters_are_answered_with_a_line_for_each_value_of_the_second(interacts):
-    """The paper's values are in the names, too, and an interaction is said if the runs decide it."""
+    """Names have the paper's values, too, and an interaction is said if the runs decide it."""
     seen = grid(
         lambda noise, epsilon: int(100 * noise) + (epsilon == 0.1) * (
             20 if noise == 0.1 or not interacts else 3),
@@ -392,7 +392,7 @@ def test_settings_that_gain_nothing_are_counted():
     seen = grid(lambda noise, epsilon: 27 if noise > 0.02 else 20, noise_sd=NOISE, epsilon=EPSILON)
     seen.runs["corrective_best"] = -319.0
     (answer, *_) = said(seen, "ranking")
-    assert "4 of 6 settings gain nothing in 10 trials" in answer
+    assert "4 of 6 settings gain nothing" in answer
 
 
 def test_parameters_of_many_values_are_a_heat_map():

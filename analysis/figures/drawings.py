@@ -136,17 +136,17 @@ def _draw_lines(study: Study, axes: Axes, rows: pd.DataFrame, other: str = "") -
     lines = [*rows.groupby("line", sort=False)]
     apart = 0.01 * np.ptp(np.log(places) if is_log else places)  # so that intervals do not overlap
     is_few = False
-    for number, (line, of_line) in enumerate(lines):
+    for place, (line, of_line) in enumerate(lines):
         at = of_line.value.map(dict(zip(values, places, strict=True))).to_numpy(np.float64)
-        shift = (number - (len(lines) - 1) / 2) * apart
+        shift = (place - (len(lines) - 1) / 2) * apart
         at = at * math.e**shift if is_log else at + shift
-        color, marker = style.PALETTE[number], "osD^"[number]
+        color, marker = style.PALETTE[place], "osD^"[place]
         look: Any = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.6}
-        drawn = of_line.assign(place=at)
-        style.means(axes, drawn, x="place", y="gap", scale=100, bars=1.6, label=str(line), **look)
-        for place, row in zip(at, of_line.to_dict("records"), strict=True):
+        drawn = of_line.assign(x=at)
+        style.means(axes, drawn, x="x", y="gap", scale=100, bars=1.6, label=str(line), **look)
+        for x, row in zip(at, of_line.to_dict("records"), strict=True):
             gaps = _gaps_of_few_runs(study, row)
-            axes.plot([place] * len(gaps), gaps, ".", **_FEW, color=color)
+            axes.plot([x] * len(gaps), gaps, ".", **_FEW, color=color)
             is_few |= bool(gaps)
     each_task = tasks if 1 < len(tasks) <= 8 and not other else ()
     gaps_on = [runs_on(study, method, tasks).groupby("task").gap.mean() for method in rows.method]
@@ -169,17 +169,19 @@ def _draw_lines(study: Study, axes: Axes, rows: pd.DataFrame, other: str = "") -
 def _draw_cells(axes: Axes, rows: pd.DataFrame) -> str:
     """Draw gaps as a heat map by ``value`` and ``line``, and return a sentence of the caption."""
     values, lines = [*dict.fromkeys(rows.value)], [*dict.fromkeys(rows.line)]
-    gaps = 100 * rows.pivot(index="line", columns="value", values="gap").loc[lines, values]
+    gap_of = dict(zip(zip(rows.line, rows.value, strict=True), 100 * rows.gap, strict=True))
+    gaps = np.array([[gap_of.get((line, value), math.nan) for value in values] for line in lines])
     shades = LinearSegmentedColormap.from_list("", ["#f4f7fa", style.BLUE, "#08306b"])
-    cells = axes.pcolormesh(gaps, cmap=shades, edgecolors=style.BACKGROUND, linewidth=1)
+    axes.pcolormesh(gaps, cmap=shades, edgecolors=style.BACKGROUND, linewidth=1)
     size = min(8.0, 96 / len(values))  # points
-    for (y, x), gap in np.ndenumerate(gaps.to_numpy()):
-        color = "#fefefe" if cells.norm(gap) > 0.43 else "#101010"  # also on a dark page
+    for (y, x), gap in np.ndenumerate(gaps):
+        is_dark = gap > np.nanmin(gaps) + 0.43 * np.ptp(rows.gap * 100)
+        color = "#fefefe" if is_dark else "#101010"  # also on a dark page
         at: Any = {"ha": "center", "va": "center", "color": color, "fontsize": size}
         if not math.isnan(gap):
             axes.text(x + 0.5, y + 0.5, number(gap, 1), **at)
-    least = rows.loc[rows.gap.idxmin()]
-    corner = values.index(least["value"]), lines.index(least.line)
+    least = int(rows.gap.argmin())
+    corner = values.index(rows.value.iloc[least]), lines.index(rows.line.iloc[least])
     axes.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor=style.INK, linewidth=2))
     axes.set_xticks(np.arange(len(values)) + 0.5, map(str, values))
     axes.set_yticks(np.arange(len(lines)) + 0.5, map(str, lines))
@@ -235,11 +237,11 @@ def _draw_gaps(study: Study) -> Parts | None:
     few = {row["method"]: _gaps_of_few_runs(study, row) for row in shown.to_dict("records")}
     on_tasks = {label: runs_on(study, label, tasks).groupby("task").gap.mean() * 100
                 for label in shown.method if 1 < len(tasks) <= 8}  # fmt: skip
-    gaps = [shown[["gap", "gap_low", "gap_high"]], *few.values(), *on_tasks.values()]
-    gaps = np.concatenate([np.ravel(values) for values in gaps])
-    nearest, farthest = np.nanmin(gaps), max(np.nanmax(gaps), 0.5)
+    drawn = [shown[["gap", "gap_low", "gap_high"]].to_numpy(), *few.values(), *on_tasks.values()]
+    gaps = np.concatenate([np.ravel(np.asarray(values, np.float64)) for values in drawn])
+    nearest, farthest = float(np.nanmin(gaps)), max(float(np.nanmax(gaps)), 0.5)
     left = min(nearest, 0.0)
-    is_log = bool(farthest >= 10 * nearest)
+    is_log = farthest >= 10 * nearest
     if is_log:
         left = left if nearest < 0.15 else nearest / 1.3
         axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
@@ -298,6 +300,11 @@ def _draw_gaps(study: Study) -> Parts | None:
     return drawing, rows, alt, more + (f" Bold: {listed(bold)}." if bold else "")
 
 
+def _width_of(shape: tuple[int, int]) -> float:
+    """Return the usual width of a figure with these rows and columns of panels, inches."""
+    return style.TWO if shape[1] > 1 else style.ONE
+
+
 ALONE = KNOWN_METHODS["corrective-alone/given"].algorithm
 
 
@@ -343,7 +350,7 @@ def draw_saved(study: Study) -> Parts | None:
     shape, most_rows = style.grid(len(parts)), max(map(len, parts))
     line, size = (0.17, 6) if style.is_narrow() else (0.42, 7)  # inches, points
     height = shape[0] * (0.3 + line * most_rows)
-    drawing, panels = style.panels(shape, (style.TWO, height), len(parts))
+    drawing, panels = style.panels(shape, (_width_of(shape), height), len(parts))
     looks = looks_in(study, rows.method)
     paper: Any = {"facecolor": style.BACKGROUND, "linewidth": 0, "pad": 0.6}
     for axes, part in zip(panels, parts, strict=True):
@@ -634,7 +641,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
     tasks = [study.tasks[name] for name in data.task.unique()]
     labels = [label for label in study.methods.index if label in {*data.method}]
     rows, columns = style.grid(len(tasks))
-    size = style.TWO, min(2.2 * rows + 0.5, style.TALLEST)
+    size = _width_of((rows, columns)), min(2.2 * rows + 0.5, style.TALLEST)
     if style.is_narrow():
         size = style.ONE, 1.4 * rows + 0.4
     drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)

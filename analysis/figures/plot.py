@@ -253,14 +253,14 @@ def panels_for_page(plot: Plot) -> list[str]:
     if len(panels) < 2 or not all(named):
         return []
     FigureCanvasSVG(drawing)  # measures its fonts
-    boxes = [part.get_tightbbox() for part in (*panels, *drawing.legends)]
+    boxes = filter(None, [part.get_tightbbox() for part in (*panels, *drawing.legends)])
     drawing.set_canvas(canvas)
     points, height = 72 / drawing.dpi, 72 * drawing.get_figheight()
     views = []
-    for number, box in enumerate(boxes, 1):
+    for place, box in enumerate(boxes, 1):
         x, y = points * box.x0 - 1, height - points * box.y1 - 1
         view = f"{x:.1f} {y:.1f} {points * box.width + 2:.1f} {points * box.height + 2:.1f}"
-        label = html.escape(one_line(f"{plot.title}, part {number}. {plot.alt * (number == 1)}"))
+        label = html.escape(one_line(f"{plot.title}, part {place}. {plot.alt * (place == 1)}"))
         views.append(
             f'<svg viewBox="{view}" xmlns="http://www.w3.org/2000/svg" role="img" '
             f'aria-label="{label}"><use href="#{plot.id}-drawing"/></svg>'

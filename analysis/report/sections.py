@@ -178,10 +178,10 @@ methods, by so many percentage points (negative: a larger gap): \
 {%- endfor %}
 
 {% endfor %}""",
-        note="The gap goes from the mean reward to the {reference}, and is a share of it. The share "
-        "of the gain is 0 % for the corrective process alone with its best hands (with the task's "
-        "initial hands if there are more than 4096 hand sequences), and 100 % for the {reference}; "
-        "tasks on which both are equal have none. Intervals describe new runs on the same tasks. "
+        note="The gap goes from the mean reward to the {reference}, and is a share of it. The "
+        "share of the gain is 0 % for the corrective process alone with its best hands (with the "
+        "task's initial hands if there are more than 4096 hand sequences), and 100 % for the "
+        "{reference}; tasks on which both are equal have none. Intervals describe new runs on the same tasks. "
         "Better and worse: the number of tasks on which the mean reward differs significantly from "
         "that of the paper's learner (EC1 with one arm, EC4 with two), by two-tailed tests, "
         "corrected over the tasks of the method; empty if the runs are too few, or too alike, for "
@@ -205,7 +205,7 @@ methods, by so many percentage points (negative: a larger gap): \
 "no significant difference": "in postures that do not differ significantly",
 "different, negligible": "in postures that hardly differ",
 "the same posture": "in the same posture",
-"too few runs": "in postures of too few runs to test",
+"too few runs": "in postures that cannot be compared, because the runs are too few",
 }.get(row.verdict, "in postures that differ; no random search was run to compare them with") }}. \
 The posture difference is {{ row.distance | number(2) }} (length units and rad; \
 {{ row.runs }} runs){{ "; that of random search is %s" % number(row.control, 2) \
@@ -237,7 +237,8 @@ already made there.
 ascending=[true, false]) %}
 {% for row in leading(by_trial) %}
 {% if row.trials_to_half < infinite %}
-{{ row.subject }} needs {{ interval(row, "trials_to_half", 0) }}{{ " trials for half of the gain" if loop.first }}\
+{{ row.subject }} needs {{ interval(row, "trials_to_half", 0) }}\
+{{ " trials for half of the gain" if loop.first }}\
 {% else %}
 {{ row.subject }} does not {{ "get there" if loop.index > 1 else "reach half of the gain" }} in \
 {{ row.trials | number }}{{ " trials" if loop.first }}\
@@ -403,14 +404,15 @@ def _interaction(study: Study) -> float:
     varied, rows = study.varied, standings(study).query("why == ''")
     if len(varied.columns) != 2 or not {*varied.index} <= {*rows.index}:
         return math.nan
-    keys = pd.MultiIndex.from_frame(varied.map(repr))
-    labels, tasks = pd.Series([*varied.index], keys).unstack(0), ranked_tasks(study)
-    if labels.isna().any(axis=None):
+    labels = {tuple(values): str(label) for label, *values in varied.map(repr).itertuples()}
+    firsts, seconds = (dict.fromkeys(values) for values in zip(*labels, strict=True))
+    if len(labels) < len(firsts) * len(seconds):
         return math.nan
+    tasks = ranked_tasks(study)
     gaps = [[[of_task.to_numpy(np.float64)
-              for _, of_task in runs_on(study, label, tasks).groupby("task").gap]
-             for label in line]
-            for line in labels.to_numpy()]  # fmt: skip
+              for _, of_task in runs_on(study, labels[first, second], tasks).groupby("task").gap]
+             for second in seconds]
+            for first in firsts]  # fmt: skip
     return interaction_test(gaps)
 
 
