@@ -126,8 +126,8 @@ SECTIONS = (
 {{ reference }} is {{ interval(best, "gap", scale=100, unit=" %") }}\
 {{ ", which %s settings have" % tied if tied > 1 }}.
 {%- for next in others[1].to_dict("records")[:1] if tied == 1 %}
- The gap of {{ next.subject.removesuffix(",") }} is larger by {{ interval(next, "difference", scale=100) }} percentage \
-points{{ ", which %s chance (%s)" % ("exceeds" if next.p_holm < LEVEL else "may be", \
+ The gap of {{ next.subject.removesuffix(",") }} is larger by \
+{{ interval(next, "difference", scale=100) }} percentage points{{ ", which %s chance (%s)" % ("exceeds" if next.p_holm < LEVEL else "may be", \
 p_value(next.p_holm)) if next.p_holm >= 0 else few(next) }}.
 {%- endfor %}
 {%- set said = [best.method] + others[1].method[:1].tolist() %}
@@ -181,7 +181,8 @@ methods, by so many percentage points (negative: a larger gap): \
         note="The gap goes from the mean reward to the {reference}, and is a share of it. The "
         "share of the gain is 0 % for the corrective process alone with its best hands (with the "
         "task's initial hands if there are more than 4096 hand sequences), and 100 % for the "
-        "{reference}; tasks on which both are equal have none. Intervals describe new runs on the same tasks. "
+        "{reference}; tasks on which both are equal have none. Intervals describe new runs on the "
+        "same tasks. "
         "Better and worse: the number of tasks on which the mean reward differs significantly from "
         "that of the paper's learner (EC1 with one arm, EC4 with two), by two-tailed tests, "
         "corrected over the tasks of the method; empty if the runs are too few, or too alike, for "
