@@ -14,19 +14,19 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from coartic.analysis.figures import dots, styled
-from coartic.analysis.methods import COLORS
+from coartic.analysis.methods import COLORS, KNOWN_METHODS, MARKS
 
 Table = Callable[[str, str], pd.DataFrame]
 """Function that returns a stored table of a suite or a study by their names."""
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 LEARNER, RANDOM = "dual-process (EC1, EC4)", "random-search"
 METHODS = {
-    "cma-es/bandit": ("CMA-ES", "forest", "s"),
-    "hill-climbing": ("hill climbing", "amber", "v"),
-    LEARNER: ("the paper's learner", "navy", "D"),
-    RANDOM: ("random search", "silver", "o"),
+    "cma-es/bandit": ("CMA-ES", "cma-es/bandit"),
+    "hill-climbing": ("hill climbing", "hill-climbing"),
+    LEARNER: ("the paper's learner", "dual-process/EC4"),
+    RANDOM: ("random search", RANDOM),
 }
-"""Name, colour and marker of the methods of finding 4."""
+"""Name of the methods of finding 4, and the method that has their look."""
 NOTHING = (math.nan, math.nan, math.nan)
 _NUMBER = r"(−?\d+(?:\.\d+)?)"
 
@@ -94,9 +94,9 @@ def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]])
     return draw(
         FAMILIES,
         {
-            "informed exploration,\n100 trials (%)": drift,
-            "the paper's learner,\n10,000 trials (%)": paper,
-            "difference\n(percentage points)": more,
+            "gain, informed learner,\n100 trials (%)": drift,
+            "gain, paper's learner,\n10,000 trials (%)": paper,
+            "a less b\n(percentage points)": more,
         },
     )
 
@@ -105,13 +105,14 @@ def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]])
 def gaps(table: Table) -> Figure:
     """Draw finding 4: gaps on the paper's tasks and in each family of random tasks."""
     ranking, families = table("comparison", "ranking"), table("families", "family-gaps")
-    panels = {"the paper's\ntasks (%)": [estimate(ranking.loc[m], "gap", 100) for m in METHODS]}
+    panels = {"paper's tasks\ngap (%)": [estimate(ranking.loc[m], "gap", 100) for m in METHODS]}
     for family in (*FAMILIES, "many-goals"):
         column = f"in {family}/v1"
-        label = "fourteen\ngoals (%)" if family == "many-goals" else f"{family}\n(%)"
+        label = f"{'14 goals' if family == 'many-goals' else family}\ngap (%)"
         panels[label] = [estimate(families.loc[m], column, 100) for m in METHODS]
-    looks = [(COLORS[color], marker) for _, color, marker in METHODS.values()]
-    return draw([name for name, *_ in METHODS.values()], panels, looks)
+    looks = [KNOWN_METHODS[method].look for _, method in METHODS.values()]
+    names = [name for name, _ in METHODS.values()]
+    return draw(names, panels, [(COLORS[color], MARKS[mark][0]) for color, mark in looks])
 
 
 @styled
@@ -121,7 +122,8 @@ def rewards(table: Table) -> Figure:
     cells = cells[cells.hands.isna() & cells.difference.notna()]
     label = "our mean reward less the published one (% of it; dashed: ± 1 %)"
     values = [estimate(row, "difference", -100 / row.published) for _, row in cells.iterrows()]
-    return draw([*cells.index], {label: values}, at={label: (-1, 1)})
+    names = [f"{name} †" if "two-armed" in name else name for name in cells.index]
+    return draw(names, {label: values}, at={label: (-1, 1)})
 
 
 @styled
@@ -167,7 +169,7 @@ def goals_ahead(table: Table) -> Figure:
             "gain of the last goal seen,\n% of the whole task": [
                 estimate(row, "gain", 100) for row in many
             ],
-            "% of a movement that\nhas it ahead": [NOTHING, *of_movement],
+            "gain of the last goal seen,\n% of a movement": [NOTHING, *of_movement],
         },
     )
 

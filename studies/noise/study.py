@@ -17,6 +17,7 @@ import pandas as pd
 import why
 
 from coartic.analysis import figures, load
+from coartic.analysis.methods import COLORS, KNOWN_METHODS, MARKS
 from common.writing import write_study
 
 GROUPS = {"paper": "the paper's tasks", "families": "200 random tasks"}
@@ -85,16 +86,16 @@ def draw(results):
     results = results.reset_index()
     for axes, (group, title) in zip(panels, GROUPS.items(), strict=True):
         of_group = results[(results.group == group) & ~results.signal_dependent]
-        for number, name in enumerate(dict.fromkeys(order.NAMES.values())):
-            repeats, color = divmod(number, len(figures.PALETTE))
-            look = {"color": figures.PALETTE[color], "marker": "os"[repeats], "label": name}
-            look |= {"linestyle": "--"} if repeats else {}
+        for name, method in {name: method for method, name in order.NAMES.items()}.items():
+            color, mark = KNOWN_METHODS[method].look
+            marker, dash = MARKS[mark]
+            look = {"color": COLORS[color], "marker": marker, "linestyle": dash, "label": name}
             figures.means(axes, of_group[of_group.name == name], x="motor_noise", y="gap", **look)
         axes.set(title=title, xlabel="motor noise s (rad, length units)", yscale="log")
         axes.set_xticks([0, 0.005, 0.01, 0.02])
         axes.set_yticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
         axes.set_yticks([], minor=True)
-    panels[0].set_ylabel("gap (%), log scale")
+    panels[0].set_ylabel("gap (%), log scale; lower is better")
     figures.legend(figure, panels[0].get_legend_handles_labels()[0], 4)
     return figure
 
