@@ -18,8 +18,8 @@ _Kind = tuple[str, str, int]
 """Method, task and number of trials (0 without trials). Runs of a kind take about equally long."""
 _EARLY = 0.1
 """Share of the work before which there is no estimate, because processes are starting."""
-_RECENT = 0.2
-"""Share of the finished work after which an earlier run counts 1/e, because the load of a machine
+_RECENT = 0.15
+"""Share of the finished work after which an earlier run counts half, because the load of a machine
 changes."""
 
 
@@ -59,7 +59,7 @@ class TimeLeft:
             self._waiting[kind] -= 1
             if times.wall_s is not None:
                 self._done_s += times.wall_s
-                weight = math.e ** (-times.wall_s / max(_RECENT * self._done_s, 1e-9))
+                weight = 0.5 ** (times.wall_s / max(_RECENT * self._done_s, 1e-9))
                 group = _group_of(kind[0])
                 self._took_s[group] = weight * self._took_s[group] + times.wall_s
                 self._usual_s[group] = weight * self._usual_s[group] + _shipped_s(kind)
