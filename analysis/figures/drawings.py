@@ -229,7 +229,7 @@ def _draw_gaps(study: Study) -> Parts | None:
     for group in [group for group in GROUPS if group in by_group.groups]:
         lines += [capital(group), *by_group.get_group(group).to_dict("records")]
     narrow = style.is_narrow()
-    names = [line if isinstance(line, str) else name_in_figure(study, line["method"])
+    names = ["" if isinstance(line, str) else name_in_figure(study, line["method"])
              for line in lines]  # fmt: skip
     deep = max(name.count("\n") for name in names)
     height = (0.145 if narrow else 0.165) + 0.1 * deep  # inches of a line
@@ -253,23 +253,11 @@ def _draw_gaps(study: Study) -> Parts | None:
     axes.set_xlim(left, 1.1 * farthest)
     axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
     axes.axvline(0, **style.OPTIMUM)
-    # Headings are longer than names. In a narrow figure they are on the right.
-    style.name_rows(axes, [name * (isinstance(line, dict) or not narrow)
-                           for name, line in zip(names, lines, strict=True)])  # fmt: skip
-    places: Any = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
-    places |= {"va": "center_baseline"}
-
-    def write_right(y: int, gap: str, n: str, color: str) -> None:
-        axes.annotate(gap, (1, y), (8, 0), color=color, **places)
-        axes.annotate(n, (1, y), (96, 0), color=color, ha="right", **places)
-
-    if not narrow:
-        write_right(1, f"gap (%) [{style.COVERAGE}]", "runs", style.GREY)
+    style.name_rows(axes, names)
     for place, (row, label) in enumerate(zip(lines, axes.get_yticklabels(), strict=True)):
         if isinstance(row, str):
-            label.set_color(style.GREY)
-            if narrow:
-                axes.annotate(row, (0, -place), (2, 0), color=style.GREY, **places)
+            at: Any = {"transform": axes.get_yaxis_transform(), "va": "center_baseline"}
+            axes.text(0.01, -place, row, color=style.GREY, **at)
             continue
         learner, y = row["is_learner"], -place
         size = looks[row["method"]]["markersize"] + learner  # diamonds look smaller
@@ -283,8 +271,6 @@ def _draw_gaps(study: Study) -> Parts | None:
         name = row["title"]
         style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
         label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
-        if not narrow:
-            write_right(y, interval(row, "gap"), number(row["runs"]), style.INK)
     axes.spines["left"].set_visible(False)
     to = reference(study, tasks)
     where = "" if len(tasks) > 1 else marked(study.tasks[tasks[0]]) + (":\n" if narrow else ": ")
@@ -319,10 +305,10 @@ ALONE = KNOWN_METHODS["corrective-alone/given"].algorithm
 def draw_saved(study: Study) -> Parts | None:
     """Draw how many ticks more than the corrective process methods take for each goal, and in sum.
 
-    There is a panel for each task, with a row for each of these methods, in the same order in all
-    panels, the smallest mean gap over tasks first: the learner that explores most, random search,
-    the best method of each kind that uses the reward, and methods from files. Returns None if there
-    is nothing to draw.
+    There is a panel for each task, and a row for each of these methods: the learner that explores
+    most, random search, the best method of each kind that uses the reward, and methods from files.
+    All panels have the same order: methods on most tasks first, then those with the smallest mean
+    gap. Returns None if there is nothing to draw.
     """
     rows, methods = list_saved(study), study.methods
     single = methods[methods.index.isin(rows.method) & (methods.algorithm != ALONE)]
@@ -335,16 +321,15 @@ def draw_saved(study: Study) -> Parts | None:
     learners = rows.method.map({label: place for place, label in enumerate(LEARNERS)})
     most = learners == learners.groupby(rows.task).transform("max")  # that explores most
     rows = rows.assign(gap=gaps, line=rows.method.mask(most, "learner"))
-    lines = rows.groupby("line").gap.agg(["size", "mean"])
-    lines = lines.sort_values(["size", "mean"], ascending=[False, True])
+    by_line = rows.groupby("line").gap.agg(["size", "mean"])
+    lines = by_line.sort_values(["size", "mean"], ascending=[False, True]).index
     uses = rows.drop_duplicates("line").set_index("line").method.map(methods.information)
-    best = uses[lines.index].drop_duplicates()
-    kept = {*best.index[best != WITHOUT_REWARD], RANDOM_SEARCH, "learner"}
-    kept |= {*single.index[~single.built_in.astype(bool)]}
-    order = [line for line in lines["mean"].sort_values(kind="stable").index if line in kept]
-    rows = rows[rows.line.isin(order)].sort_values("line", key=lambda line: line.map(order.index))
-    parts = [part for _, part in rows.groupby("task", sort=False)]
-    parts.sort(key=lambda part: [*study.tasks].index(part.task.iloc[0]))
+    best = uses[lines].drop_duplicates()
+    own = single.index[~single.built_in.astype(bool)]
+    kept = {*best.index[best != WITHOUT_REWARD], RANDOM_SEARCH, "learner", *own}
+    rows = rows[rows.line.isin(kept)]
+    parts = [part.sort_values("line", key=lambda line: line.map(lines.get_loc))
+             for _, part in rows.groupby("task", sort=False)]  # fmt: skip
     if not parts:
         return None
     shape, most_rows = style.grid(len(parts)), max(map(len, parts))
@@ -678,7 +663,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
     if known := [task.name for task in tasks if task.name in study.optima]:
         handles.append(style.legend_line(reference(study, known), **style.OPTIMUM))
     longest = max(len(str(handle.get_label())) for handle in handles)
-    style.legend(drawing, handles, 2 if longest <= 34 else 1)
+    style.legend(drawing, handles, 2 if longest <= 40 else 1)
     ends = data.groupby(["task", "method"], sort=False).tail(1)
     words = spoken(study, ends, "{task}, {title}: {best:.0f}")
     alt = f"Reward against trial. Mean best reward at the end: {words}."
