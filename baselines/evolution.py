@@ -139,7 +139,8 @@ class EvolutionStrategy:
 
     @property
     def costs(self) -> Array:
-        """Costs of the last generation that was told, sorted, shape ``(size,)``; empty before."""
+        """Sorted costs of the last generation, shape ``(size,)``; empty before the first
+        :meth:`tell`."""
         return self._costs
 
     def ask(self) -> Array:

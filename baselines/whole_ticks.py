@@ -57,7 +57,7 @@ class Rounding:
         """Round each segment to the nearest number of steps, and the last segment up.
 
         The last segment is first made as short as the other segments allow. To first order all
-        roundings of a shortest path (:meth:`every`) take equally many ticks.
+        roundings of a shortest path (:meth:`every`) take the same number of ticks.
 
         Returns
         -------
@@ -191,7 +191,7 @@ class Rounding:
             Goals, from 0, that take no movement.
         deep : sequence of int
             Goals, from 0, into whose discs the hands move as deep as ``lengths`` allow. If there
-            are any, the path is not made short.
+            are any, the path is not shortened.
         """
         instance = self._instance
         if merged:
@@ -225,10 +225,10 @@ def movements(
     configurations : ndarray, shape (G, dof)
         Configuration at each goal.
     steps : tuple of int, optional
-        Most steps to each goal. The target of a movement is then beyond the configuration, on the
-        same line, so that the movement hits within these steps. If no such target is found, the
-        target is the configuration. With 0 steps the movement is corrective; it is not made if the
-        hand is already in the goal.
+        Largest number of steps to each goal. The target of a movement is then beyond the
+        configuration, on the same line, so that the movement hits within these steps. If no such
+        target is found, the target is the configuration. With 0 steps the movement is corrective;
+        it is not made if the hand is already in the goal.
 
     Returns
     -------
