@@ -86,9 +86,10 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
 def _solve_level(
     level: int, hessian: Array, gradient: Array, rows: Array, least: Array
 ) -> tuple[Array, int]:
-    """Minimise ½ vᵀ H v + gᵀ v under the constraints of a level; return v and the iterations.
+    """Minimise ½ vᵀ H v + gᵀ v under the constraints of a level.
 
-    H is ``hessian`` and g is ``gradient``; v is (s, x) at level 1 and x at level 2.
+    H is ``hessian`` and g is ``gradient``; v is (s, x) at level 1 and x at level 2. Return v and
+    the number of iterations. Raises MethodError if the solver fails.
     """
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))

@@ -168,7 +168,7 @@ class EvolutionStrategy:
         points : ndarray, shape (size, dim)
             The points of the last :meth:`ask`.
         costs : ndarray, shape (size,)
-            Their costs, all finite. The strategy minimises the cost.
+            Costs of the points, all finite. The strategy minimises the cost.
         """
         self._generation += 1
         self._note_costs(costs)

@@ -394,7 +394,7 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Linearise the hand of the postures that are still far from (x, y); return their number.
+    """Linearise the hand in postures that are far from (x, y), and return their number.
 
     ``far`` has indices of rows of ``postures``. The indices of postures whose hand is farther than
     ``tolerance`` from (x, y) are moved to the beginning of ``far``. For each of them, one entry of

@@ -83,9 +83,10 @@ def _sample_postures(
 
 
 class Beginning(NamedTuple):
-    """The first goals of a hand sequence, with the cheapest chain to each pair of end nodes.
+    """The first goals of a hand sequence, with their cheapest chains of nodes.
 
-    A chain has a node for each goal. A pair of end nodes has one node for each hand.
+    A chain has a node for each goal. There is a cheapest chain to each pair of end nodes, one node
+    for each hand.
     """
 
     hands: HandSequence

@@ -388,11 +388,12 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
 def _hand_jerks(
     robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
 ) -> Any:
-    """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column.
+    """Return the integral of a hand's squared jerk over each of G segments.
 
-    The joints move along quintics from the start ``q0`` by the changes ``steps``, ``(dof, G)``, in
-    the ``durations``, ``(G,)``. ``rates`` are velocities and accelerations at start and goals,
-    ``(dof, G + 1)`` each. The integral is by Gauss-Legendre quadrature with 6 nodes.
+    The result is a CasADi column. The joints move along quintics from the start ``q0`` by the
+    changes ``steps``, ``(dof, G)``, in the ``durations``, ``(G,)``. ``rates`` are velocities and
+    accelerations at start and goals, ``(dof, G + 1)`` each. The integral is by Gauss-Legendre
+    quadrature with 6 nodes.
     """
     import casadi
 

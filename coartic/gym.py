@@ -97,9 +97,9 @@ class TaskEnv(gymnasium.Env):
 
     Notes
     -----
-    Joints are the base coordinates (length unit) and the angles of the arms (rad) that can move.
-    The arms are in the order of the task's ``hands``. In a family each arm has the largest number
-    of links that an arm of the family can have.
+    Joints are the base coordinates (in length units) and the angles of the arms (in rad) that can
+    move. The arms are in the order of the task's ``hands``. In a family each arm has the largest
+    number of links that an arm of the family can have.
 
     An observation, float32 of shape ``(O,)``, has
 
@@ -351,8 +351,8 @@ class SharesOfTicks(gymnasium.RewardWrapper):
     """Wrapper that divides rewards by the ticks of the corrective process.
 
     The divisor is the number of ticks that the process takes for the whole task with the initial
-    hands, at least 1. If the process cannot complete the task, it is 1,000,000. The result is at
-    least -2.
+    hands, at least 1. If the process cannot complete the task, the divisor is 1,000,000. The result
+    is at least -2.
     """
 
     def __init__(self, env: gymnasium.Env) -> None:
@@ -645,7 +645,7 @@ def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int = 1) 
 
 
 def _wrapped_trial(act: Callable[[Any], ArrayLike], env: Any, number: int, seed: int) -> float:
-    """Make one trial of a task in a wrapped environment, and return its total reward (in ticks).
+    """Make one trial in a wrapped environment, and return its total reward (in ticks).
 
     ``act`` maps observations ``(N, O)`` to actions ``(N, A)``. In a vector environment the first
     environment makes the trial. The result is NaN if the trial failed or was truncated. ``number``

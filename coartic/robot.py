@@ -29,7 +29,8 @@ Hand = Literal["left", "right"]
 """Name of a hand: ``"left"`` or ``"right"``."""
 Array = NDArray[np.float64]
 Configs = NDArray[np.float64]
-"""Configurations, shape ``(..., dof)``: base x and y (length unit), then joint angles (rad)."""
+"""Configurations, shape ``(..., dof)``: base x and y (in length units), then joint angles (in
+rad)."""
 Points = NDArray[np.float64]
 """Points in the plane, shape ``(..., 2)``: x and y in length units."""
 Hands = NDArray[np.int64]
@@ -120,10 +121,11 @@ class Robot:
     1). That the shoulders are on the top corners of the box is inferred: only a height of +0.1
     gives the published initial rewards of the one-armed tasks (docs/model.md).
 
-    A configuration ``q`` has shape ``(dof,)``: x and y of the base (length unit), the joint angles
-    of the left arm and the joint angles of the right arm (rad, each from the link before). Methods
-    that take arrays accept one configuration or many, shape ``(..., dof)``. They raise ValueError
-    if ``q`` has another shape or is not finite, or if a hand is neither ``"left"`` nor ``"right"``.
+    A configuration ``q`` has shape ``(dof,)``: x and y of the base (in length units), the joint
+    angles of the left arm and the joint angles of the right arm (in rad, each measured from the
+    link before). Methods that accept arrays accept one configuration or many, shape ``(..., dof)``.
+    They raise ValueError if ``q`` has another shape or is not finite, or if a hand is neither
+    ``"left"`` nor ``"right"``.
     """
 
     left_links: _Lengths = (1.0, 1.0, 1.0, 1.0)

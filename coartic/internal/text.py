@@ -65,9 +65,10 @@ def counted(count: int, thing: str) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return a hint such as ``; did you mean 'a'?`` with the most similar of ``names``.
+    """Return a hint, such as ``; did you mean 'a'?``, with the most similar name.
 
-    Upper and lower case are not distinguished. Return an empty string if no name is similar.
+    The hint names the entry of ``names`` that is most similar to ``name``, ignoring case. Return an
+    empty string if no name is similar.
     """
     by_lower_case = {known.lower(): known for known in names}
     nearest = difflib.get_close_matches(name.lower(), by_lower_case, 1)

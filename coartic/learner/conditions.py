@@ -113,8 +113,9 @@ class ExplorationCondition:
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
     """Standard deviation of the noise η (published), in length units (base) and rad (joints)."""
     corrects: bool = True
-    """True if **A** corrects a goal that a movement to a stored target misses. If False, such a
-    trial fails, and **A** acts only in trial 0 and for states and hands without a stored target."""
+    """True if the corrective process **A** acts when a movement to a stored target misses its goal.
+    If False, such a trial fails, and **A** acts only in trial 0 and for states and hands without a
+    stored target."""
     learned: Literal["best", "replay"] = "best"
     """Solution of a run: its best trial (``"best"``), or the noiseless greedy trial after the last
     one (``"replay"``)."""
@@ -236,7 +237,7 @@ EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """Return the exploration condition with an id such as ``"EC4"`` or ``"dual-process/EC4"``.
+    """Return an exploration condition by its id, such as ``"EC4"`` or ``"dual-process/EC4"``.
 
     A condition is returned unchanged. Raises CoarticError for an unknown id, and TypeError for an
     object that is neither a string nor a condition.

@@ -1,10 +1,11 @@
 """The dual-process learner: trial and error on top of the corrective process.
 
-This is the paper's section *The Learning Process* and Figure 3. At each goal of a trial the learner
-chooses a hand, perturbs the stored target configuration and moves there; the corrective process
-finishes where the goal was missed (:mod:`coartic.motion.trial`). If the trial is better than any
-earlier trial that passed through the same state and hand, it replaces what is stored there. Trials
-are compared by their total reward or, in an ablation, by the return of the goal.
+The module implements the paper's section *The Learning Process* and Figure 3. At each goal of a
+trial the learner chooses a hand, perturbs the stored target configuration and moves there. If the
+goal was missed, the corrective process **A** finishes (:mod:`coartic.motion.trial`). If the trial
+is better than any earlier trial that passed through the same state and hand, it replaces the value
+and the target that are stored for this state and hand. Trials are compared by their total reward
+or, in an ablation, by the return of the goal.
 
 One call of a compiled kernel, by :mod:`coartic.learner.learning`, makes many runs side by side,
 goal by goal and trial by trial. Each run draws from its own NumPy generator (``default_rng(seed)``,
@@ -433,9 +434,10 @@ def make_trial(
 ) -> None:
     """Make one trial in each of N runs. A trial ends at the first goal that is missed.
 
-    This fills ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. If ``initial`` is
-    True, it is trial 0 with the hands and targets of ``learner``. If ``explore`` is False, the
-    trial is greedy, without drift and noise. Other arguments are as in :func:`learn_kernel`.
+    This function fills ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. If
+    ``initial`` is True, the trial is trial 0, with the hands and targets of ``learner``. If
+    ``explore`` is False, the trial is greedy, without drift and noise. Other arguments are as in
+    :func:`learn_kernel`.
     """
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):

@@ -111,9 +111,12 @@ def learn(
     SolutionError
         The first solution breaks the task's rules.
     ValueError
-        The seed is not an integer from 0 to 2^128 - 1, ``trials`` is not from 1 to 10,000,000, a
-        constant of the model is out of bounds, or the task was changed so that it contradicts
-        itself.
+        An argument cannot be used:
+
+        - ``seed`` is not an integer from 0 to 2^128 - 1;
+        - ``trials`` is not from 1 to 10,000,000;
+        - a constant of the model is out of bounds;
+        - the task was changed so that it contradicts itself.
 
     Notes
     -----

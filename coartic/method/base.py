@@ -88,8 +88,11 @@ class Method(ABC):
     name: ClassVar[str]
     """Id, such as ``"random-search"``. The id of another form of the same method adds ``/form``."""
     title: ClassVar[str]
+    """Name in figures and tables."""
     citation: ClassVar[str]
+    """Publications from which the method comes."""
     information: ClassVar[frozenset[Information]]
+    """Information that the method uses."""
     tuned_on: ClassVar[str] = ""
     """Tasks on which the method's parameters were chosen, and among which values; empty if that is
     not known. It tells readers whether results are of tasks that are new to the method. It is not a
@@ -97,6 +100,7 @@ class Method(ABC):
     stochastic: ClassVar[bool] = True
     """True if the seed matters. If False, the method is run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
+    """Class of the method's parameters. By default a method has none."""
     version: ClassVar[int] = 1
     """Version of the method's results. Raise it whenever results change, also if a default changes.
     Runs of different versions are not compared."""
@@ -200,6 +204,8 @@ def run_method(
         The method does not apply to the task, or finds no initial hands.
     SolutionError
         The solution is not a sequence.
+    TaskError, TypeError
+        The task cannot be used, or has another type.
     ValueError
         The seed is not an integer from 0 to 2^128 - 1.
     """

@@ -116,10 +116,29 @@ class Objective:
     Threads can share an objective, which answers their calls one after the other. Copies, and
     trials in a forked process, raise CoarticError, because they would not count for the budget.
 
+    Parameters
+    ----------
+    session : Session
+        Session in which the trials are made and counted.
+    hands : str, optional
+        Hand sequence of the first trial, such as ``"RRLR"``.
+    half_width : float
+        Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
+    trials : int, optional
+        Largest number of trials, including the first ones. By default only the session limits them.
+    task : Task, optional
+        The task. A method does not pass it, because a method cannot see its task.
+
     Raises
     ------
     MethodError
         The corrective process completes none of the sequences tried.
+    BudgetError
+        No trial is left.
+    NotApplicableError
+        There are more than 4096 hand sequences, and no initial one is found.
+    ValueError
+        ``hands`` do not fit the task, or ``half_width`` is not from 1e-9 to 100.
     """
 
     __slots__ = (
@@ -383,7 +402,7 @@ class Objective:
     # Evaluation.
 
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
-        """Return the cost of a point, or of each of the points in columns (in ticks).
+        """Return the cost of a point, or of each point in columns (in ticks).
 
         Parameters
         ----------
@@ -454,8 +473,12 @@ class Objective:
             Fewer trials are left than there are points. The trials that are left are made first,
             for the first points.
         ValueError
-            The shape is wrong, an entry is infinite, a goal has both NaN and other entries, or the
-            hands do not fit the task.
+            An argument cannot be used:
+
+            - ``points`` has the wrong shape;
+            - an entry is infinite;
+            - a goal has both NaN and other entries;
+            - ``hands`` do not fit the task.
         """
         array = _entries_of("points", points)
         if array.ndim != 2 or array.shape[1] != self.dim:
@@ -586,9 +609,13 @@ def objective(
     TaskError
         The task cannot be used.
     ValueError
-        Hands do not fit, the half width is not from 1e-9 to 100, a constant of the model is out of
-        bounds, or the budget is not from 1 to 10,000,000 or is less than the number of hand
-        sequences to choose among.
+        An argument cannot be used:
+
+        - ``hands`` do not fit the task;
+        - ``half_width`` is not from 1e-9 to 100;
+        - a constant of the model is out of bounds;
+        - ``budget`` is not from 1 to 10,000,000, or is less than the number of hand sequences to
+          choose among.
     TypeError
         The model is not a MotionModel, or the task is not a Task, a string or a path.
     MethodError

@@ -48,7 +48,8 @@ class Information(StrEnum):
     JACOBIAN = "Jacobian"
     """Derivative of a hand's position with respect to the entries of a configuration."""
     CORRECTIVE_PROCESS = "corrective process"
-    """A configuration that hits a goal, found by **A**, which uses goal and Jacobian."""
+    """A configuration that hits a goal, found by the corrective process **A**, which uses goal and
+    Jacobian."""
     REWARD_BY_TRIAL = "reward by trial"
     """The total reward of a trial after the trial is made."""
     REWARD_BY_SUBTASK = "reward by subtask"
@@ -254,7 +255,10 @@ class Session:
         return self._task.robot.dof
 
     def joints(self, hand: Hand) -> slice:
-        """Return the slice of a configuration with the joint angles, rad, of a hand's arm."""
+        """Return the slice of a configuration with the angles of a hand's arm (in rad).
+
+        Raises ValueError for an unknown hand.
+        """
         return self._task.robot.joints(hand)
 
     # These have to be declared.

@@ -287,9 +287,13 @@ def correct(
     TypeError
         ``robot`` or ``model`` has another type.
     ValueError
-        A shape is wrong, a number is not finite or beyond 100,000, the hand is unknown,
-        ``locked_base`` has an entry other than ``"x"`` and ``"y"``, or a constant of the model is
-        out of bounds.
+        An argument cannot be used:
+
+        - a shape is wrong;
+        - a number is not finite, or beyond 100,000;
+        - the hand is unknown;
+        - ``locked_base`` has an entry other than ``"x"`` and ``"y"``;
+        - a constant of the model is out of bounds.
 
     Notes
     -----

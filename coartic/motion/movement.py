@@ -308,21 +308,26 @@ def move(
     radius : float
         Radius of the goal (in length units).
     stop_on_arrival : bool
-        True if the movement also ends where the hand is near the position to which the target
-        brings it; False, as in a corrective movement, if it ends only on a hit or at its target.
+        If True, the movement also ends when the hand is near the position to which the target
+        brings it. If False, as in a corrective movement, it ends only on a hit or at its target.
     model : MotionModel
         The constants; only ``step`` and ``arrival_tolerance`` are used.
 
     Returns
     -------
     MoveResult
-        Where the robot stopped, the control ticks it took, and whether the goal is hit.
+        Where the robot stopped, the control ticks of the movement, and whether the goal is hit.
 
     Raises
     ------
     ValueError
-        A shape is wrong, a number is not finite or beyond 100,000, the radius is below 0, the hand
-        is unknown, or a constant of the model is out of bounds.
+        An argument cannot be used:
+
+        - a shape is wrong;
+        - a number is not finite, or beyond 100,000;
+        - the radius is below 0;
+        - the hand is unknown;
+        - a constant of the model is out of bounds.
     TypeError
         ``robot``, ``model`` or ``stop_on_arrival`` has another type.
 
@@ -380,6 +385,8 @@ def follow(
     ------
     ValueError
         A shape is wrong, the hand is unknown, or a number is not finite or out of bounds.
+    TypeError
+        ``model`` is not a MotionModel.
     """
     check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)

@@ -29,7 +29,8 @@ from coartic.tasks.task import Task
 
 Flags = NDArray[np.bool_]
 MOST_CORRECTIONS = 50
-"""Most corrective movements for one goal; an execution with noise that needs more fails."""
+"""Largest number of corrective movements for one goal. An execution with noise that needs more
+fails."""
 _MOST_NOISE = 100.0  # standard deviation, in length units and rad
 _STAYS = 1e-9  # change up to which a coordinate does not move, in length units or rad
 _FIND, _FOLLOW = 4, 5  # further actions: find a correction, follow a path
@@ -211,12 +212,12 @@ class _Robots:
 
     @property
     def due(self) -> Flags:
-        """Executions that go on and have not hit the present goal, shape ``(count,)``."""
+        """True for the robots that have not failed and have not yet hit the present goal, shape
+        ``(count,)``."""
         return ~self.hit & ~np.isnan(self.ticks)
 
     def aim(self, aim: _Aim, misses: Array) -> None:
-        """Move the robots that have not failed and have not yet hit the present goal (:attr:`due`),
-        as ``aim`` says.
+        """Move the robots that are :attr:`due`, as ``aim`` says.
 
         Row n of ``misses``, shape ``(count, dof)``, is added to the target of robot n in the
         coordinates that move. On a path, waypoint k of K is shifted by k/K of the row.

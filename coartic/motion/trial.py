@@ -434,7 +434,8 @@ class Reached(NamedTuple):
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes its iterations + 1."""
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
+    iterations."""
 
 
 @checked_arguments
@@ -624,7 +625,8 @@ class Trials(NamedTuple):
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes its iterations + 1."""
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
+    iterations."""
     targets: Configs
     """Targets of the movements made, shape ``(N, G, dof)``, in length units and rad. A row is NaN
     if no target was passed. For goals after a failure the row is the target as it was passed."""

@@ -110,7 +110,7 @@ class Trajectory:
     def plot(self) -> Figure:
         """Return a figure of the robot at the start (pale) and at each hit.
 
-        It also shows the path of the hand that hits each goal.
+        The figure also shows the path of the hand that hits each goal.
         """
         from matplotlib.figure import Figure
 
@@ -155,6 +155,8 @@ class Trajectory:
         CoarticError
             The file has another suffix, no control tick was made, or the file exists or cannot be
             written.
+        ArgumentError
+            An argument has another type, or ``width`` is out of range.
         """
         from coartic.pictures.film import write_film
 

@@ -253,10 +253,11 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 @cache
 def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
-    """Import a method file, and return the module and the names of the modules that it loaded.
+    """Import a method file, and return its module and the names of loaded modules.
 
-    A process imports the file once for each ``code``, a hash. The folder of the file is added to
-    ``sys.path``. Errors of the file are raised as they are.
+    The names are those of the other modules that the import has loaded. A process imports the file
+    once for each ``code``, a hash. The folder of the file is added to ``sys.path``. Errors of the
+    file are raised as they are.
     """
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:

@@ -394,7 +394,7 @@ class Store:
             return run
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``: a row for each run of the plan that the folder has, in order.
+        """Return view ``runs``: a row for each stored run of the plan, in order.
 
         Returns
         -------
