@@ -42,7 +42,7 @@ class HillClimbingParameters(UninformedParameters):
     - ``"correction"``: there are none; only **A** acts.
     - ``"best"``: as in the learner's table. If a goal has the same hand and the same hand before as
       in the best sequence so far, its target is the centre of that sequence plus noise. At the
-      other goals **A** acts.
+      other goals, and at all goals before the first success, **A** acts.
     """
 
 

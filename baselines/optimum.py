@@ -40,7 +40,7 @@ class OptimumParameters(Parameters):
     nodes: Nodes = 200
     """Largest number of postures for a goal and hand in a graph."""
     graphs: Count = 3
-    """Least number of independent graphs. More are made until there are enough chains."""
+    """Least number of independent graphs. More graphs are made until there are enough chains."""
     chains: Count = 100
     """Least number of chains, over all graphs and hand sequences. With three chains the search
     missed the best known path on 9 of 40 random tasks for one arm."""

@@ -1,8 +1,8 @@
 """Posture QP: a controller that goes straight in joint space to postures that hit the goals.
 
-Unlike null-space control (:mod:`coartic.baselines.nullspace_qp`), it mainly plans postures. The
-priority of the hand rarely binds, because the joints prefer to go straight to a posture that hits
-the goal. The ``details`` of a run count how often it binds.
+Unlike null-space control (:mod:`coartic.baselines.nullspace_qp`), this controller mainly plans
+postures. The priority of the hand rarely binds, because the joints prefer to go straight to a
+posture that hits the goal. The ``details`` of a run count how often the priority binds.
 
 The controller has a **posture** for the current goal and for each goal ahead. The cascade
 (:mod:`coartic.baselines.cascade`) computes both the changes of postures and the control steps:
@@ -86,10 +86,10 @@ class PostureController(Controller):
     ) -> dict[Aim, Array]:
         """Return a posture that hits its goal for each aim.
 
-        A posture of an aim is the one in ``memory``, if there is one. Otherwise descent finds it,
-        beginning at the posture of the aim before, or at ``q`` for the first aim. With more than
-        one aim all postures then move to shorten the path from ``q`` through them. A search that
-        does not converge ends after 400 steps, and its posture may be outside the goal.
+        The posture of an aim is the one in ``memory``, if there is one. Otherwise descent finds the
+        posture, beginning at the posture of the aim before, or at ``q`` for the first aim. With
+        more than one aim all postures then move to shorten the path from ``q`` through them. A
+        search that does not converge ends after 400 steps, and its posture may be outside the goal.
 
         Parameters
         ----------

@@ -47,13 +47,14 @@ class RandomSearchHandsParameters(Parameters):
     (joints). The default is the learner's."""
     stages: Annotated[int, Field(ge=1)] = 1
     """Number r of equal parts of the T trials with a hand sequence. Part k ends after ⌊kT/r⌋
-    trials; then noise is drawn around the best trial so far. With 1 the centre does not move."""
+    trials; then noise is drawn around the best trial so far. With one stage the centre does not
+    move."""
     keep: Literal["postures", "targets"] = "postures"
     """Centre of the noise after a part: the postures in which the best trial hit its goals, or the
-    targets that it aimed at. It has no effect with one stage."""
+    targets that it aimed at. This parameter has no effect with one stage."""
     idle_arm: bool = True
-    """True if an arm gets noise also at goals of the other hand. With False it does not move there,
-    as under the learner's condition EC3."""
+    """True if an arm gets noise also at goals of the other hand. If False, the arm does not move at
+    these goals, as under the learner's condition EC3."""
 
     @model_validator(mode="after")
     def _check_stages(self) -> Self:

@@ -52,8 +52,8 @@ class RecedingHorizonParameters(Parameters):
     """Largest number of postures for a goal of a posture graph. With two hands, each hand has at
     most half as many."""
     graphs: Count = 3
-    """Least number of independent graphs for each window. More are made until there are enough
-    chains."""
+    """Least number of independent graphs for each window. More graphs are made until there are
+    enough chains."""
     chains: Count = 24
     """Least number of chains of each window, over all graphs and hand sequences."""
     starts: Count = 24

@@ -63,7 +63,7 @@ class Attempts:
         """Configurations in which the best trial hit the goals, shape ``(G, dof)``."""
 
     def run_corrective(self, *hands: str) -> Trials:
-        """Make a trial in which only the corrective process acts for each hand sequence.
+        """For each hand sequence, make a trial in which only the corrective process acts.
 
         Parameters
         ----------
@@ -73,7 +73,8 @@ class Attempts:
         Returns
         -------
         Trials
-            Results of the trials, in order. If the budget ends, there are fewer than sequences.
+            Results of the trials, in order. If the budget ends, there are fewer trials than hand
+            sequences.
 
         Raises
         ------
@@ -97,7 +98,7 @@ class Attempts:
         Returns
         -------
         Trials
-            Results of the trials, in order. If the budget ends, there are fewer than N.
+            Results of the trials, in order. If the budget ends, there are fewer than N trials.
 
         Raises
         ------
@@ -126,7 +127,7 @@ class Attempts:
         Returns
         -------
         Trials
-            Results of the trials made, in order. If the budget ends, there are fewer than N.
+            Results of the trials made, in order. If the budget ends, there are fewer than N trials.
 
         Raises
         ------

@@ -62,7 +62,7 @@ class Rounding:
         Returns
         -------
         TickPlan or None
-            None if a solve fails.
+            The rounded plan, or None if a solve fails.
         """
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
@@ -111,7 +111,7 @@ class Rounding:
         Yields
         ------
         tuple of int
-            Numbers of the goals, from 0; first the empty tuple.
+            Numbers (from 0) of the goals that take no movement. The first tuple is empty.
         PathPlan
             Shortest plan found for this choice.
         """
@@ -153,7 +153,7 @@ class Rounding:
         Returns
         -------
         TickPlan or None
-            None if a solve fails.
+            The rounded plan, or None if a solve fails.
         """
         lengths = np.array([*steps, np.nan]) * self._step
         shortest = self.solve_around(plan.configurations, lengths, merged)

@@ -88,7 +88,7 @@ class TaskEnv(gymnasium.Env):
     model : MotionModel
         Constants of movement.
     render_mode : {"rgb_array"}, optional
-        Set it to make :meth:`render` return pictures.
+        ``"rgb_array"`` to make :meth:`render` return pictures.
 
     Raises
     ------
@@ -702,7 +702,7 @@ def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> flo
 def _table(rewards: Mapping[str, Array]) -> pd.DataFrame:
     """Return the table of :func:`score` from the rewards of its rows.
 
-    The rewards have shape ``(tasks, trials)``, in ticks; NaN for a failed trial or an unknown
+    The rewards (in ticks) have shape ``(tasks, trials)``, with NaN for a failed trial or an unknown
     reward. The last row has the best known rewards.
     """
     (*_, best), rows = rewards.values(), {}

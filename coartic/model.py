@@ -31,7 +31,7 @@ class MotionModel(NamedTuple):
     """
 
     gain: float = 0.05
-    """α: step size of the corrective process, ``q += α Jᵀ e`` (published). It has no unit for the
+    """α: step size of the corrective process, ``q += α Jᵀ e`` (published). α has no unit for the
     base; for the joints its unit is rad² per squared length unit."""
 
     correction_tolerance: float | None = None

@@ -94,8 +94,8 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
 def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     """Compute the derivative of a point of an arm with respect to a joint angle.
 
-    A rotation about a joint moves the point at right angles to the line between them. The result is
-    a column of the geometric Jacobian.
+    A rotation about the joint moves the point at right angles to the line between joint and point.
+    The result is a column of the geometric Jacobian.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ PCG64), in this order:
    picks one;
 2. for each goal of each trial after trial 0, if hands are explored: a uniform number that is
    compared with ε;
-3. if it is below ε and the pick is random: a uniform number that picks a hand;
+3. if that number is below ε and a hand is picked at random: a uniform number that picks it;
 4. if a target is stored: a standard normal number per explored joint, in the order of ``q``.
 
 Runs share nothing, so that the result of a run depends neither on the other runs nor on their

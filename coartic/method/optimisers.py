@@ -110,7 +110,7 @@ class Objective:
     - A trial fails if its point has an entry beyond 100,000.
 
     The first trials are made when the objective is created. In them only the corrective process
-    acts, with ``hands`` or with the sequences of :func:`sequences_of` that the budget allows. The
+    acts, with ``hands`` or with as many sequences of :func:`sequences_of` as the budget allows. The
     best sequence becomes the hands of all points for which no other hands are passed.
 
     Threads can share an objective, which answers their calls one after the other. Copies, and
@@ -121,7 +121,8 @@ class Objective:
     session : Session
         Session in which the trials are made and counted.
     hands : str, optional
-        Hand sequence of the first trial, such as ``"RRLR"``.
+        Hand sequence of the first trial, such as ``"RRLR"``. By default the sequences of
+        :func:`sequences_of` are tried, and the best one is used.
     half_width : float
         Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
     trials : int, optional

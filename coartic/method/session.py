@@ -132,9 +132,9 @@ class Meter:
     solver_iterations: int = 0
     """Iterations of a solver."""
     build_s: float = 0.0
-    """Wall time of setting up problems, which is needed once."""
+    """Wall time of setting up problems (in s). Each problem is set up once."""
     solve_s: float = 0.0
-    """Wall time of solving them."""
+    """Wall time of solving problems (in s)."""
 
     COUNTS: ClassVar[tuple[str, ...]]
     """Names of all counters except the times."""
@@ -173,7 +173,8 @@ class Session:
 
     The declaration is enforced: a call that uses information of :data:`METERED` which is not in
     ``information`` raises UndeclaredError. Trials and evaluations are counted. A session is not a
-    sandbox. Threads can share it: they make trials one after the other, from the same budget.
+    sandbox. Threads can share a session: they make trials one after the other, from the same
+    budget.
 
     Parameters
     ----------
@@ -383,7 +384,7 @@ class Session:
         -------
         ndarray, shape (..., 2, dof)
             Derivatives of x and y with respect to each entry of ``q``, in length units per length
-            unit (base) or per rad (joints).
+            unit (base) and per rad (joints).
 
         Raises
         ------

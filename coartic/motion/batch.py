@@ -274,8 +274,8 @@ def squared_distance(run: RunRecord) -> float:
 def start(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
     """Load a run into a slot for a movement, in place.
 
-    In addition to :func:`load`, this copies start and target and the squared joint-space distance
-    between them, so that :func:`move_slots` can make the movement.
+    In addition to what :func:`load` does, this function copies start and target and the squared
+    joint-space distance between them, so that :func:`move_slots` can make the movement.
     """
     load(slots, slot, number, run, arm)
     _copy_arm(slots.start, slot, run.q, arm)

@@ -414,8 +414,8 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
 def segment_lengths(configurations: ArrayLike) -> Array:
     """Return the joint-space distance from each configuration to the next.
 
-    ``configurations`` has shape ``(k, dof)``, the result ``(k - 1,)``, in length units and rad
-    together.
+    ``configurations`` has shape ``(k, dof)``, the result ``(k - 1,)``, in a mix of length units and
+    rad.
     """
     return np.asarray(np.sqrt((np.diff(configurations, axis=0) ** 2).sum(axis=1)))
 

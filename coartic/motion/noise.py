@@ -160,7 +160,7 @@ class _Aim(NamedTuple):
     """Movement to a target of the solution, or along its waypoints."""
 
     action: int
-    """How it is made: ``MOVE``, ``REPEAT`` (corrective) or ``_FOLLOW`` (a path)."""
+    """How the movement is made: ``MOVE``, ``REPEAT`` (corrective) or ``_FOLLOW`` (a path)."""
     points: Configs
     """The target, shape ``(1, dof)``, or the K waypoints, ``(K, dof)``, in length units and rad."""
     moves: Flags

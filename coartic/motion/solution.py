@@ -529,7 +529,7 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
     -------
     tuple of Movement
         A movement for each goal, of kind ``learned``, or ``corrective`` for a row of NaN.
-        :func:`coartic.execute` and :func:`coartic.trajectory` take it.
+        :func:`coartic.execute` and :func:`coartic.trajectory` accept the tuple as a solution.
 
     Raises
     ------
@@ -564,7 +564,7 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     -------
     Execution
         Movements, configurations at the hits, control ticks and reward. If the corrective process
-        does not converge, ``completed`` is False and ``reason`` says so.
+        does not converge, ``completed`` is False, and ``reason`` says at which goal.
 
     Raises
     ------

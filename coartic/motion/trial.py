@@ -643,7 +643,7 @@ class Trials(NamedTuple):
 
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
-    """Return the results of trials from their accounts, which this function changes.
+    """Return the results of trials from their accounts.
 
     ``dof`` is the number of entries of a configuration. The arrays of the result, except
     ``completed``, are views of ``accounts``. This function changes ``accounts``: it sets

@@ -85,9 +85,10 @@ class Trajectory:
 
         - ``goal``: number of the first goal that is hit in this or a later row;
         - ``hand``: the hand that is to hit this goal;
-        - ``base_x`` and ``base_y`` (length unit), ``left_1`` and so on (rad): the configuration;
-        - ``left_x``, ``left_y``, ``right_x`` and ``right_y`` (length unit): the positions of both
-          hands.
+        - ``base_x`` and ``base_y`` (in length units), ``left_1`` and so on (in rad): the
+          configuration;
+        - ``left_x``, ``left_y``, ``right_x`` and ``right_y`` (in length units): the positions of
+          both hands.
 
         ``attrs["units"]`` has the units.
         """

@@ -38,8 +38,8 @@ length units and rad (:func:`coartic.execute_noisy`)."""
 NOISY_EXECUTIONS = 100
 """Number of executions of each solution with motor noise."""
 UNREPEATED = "made_again"
-"""Key of the details of a run under which a difference is stored that was found when the run was
-made again."""
+"""Key in the details of a run. Its value is the difference that was found when the run was made
+again."""
 _MOST_MOVEMENTS = 10_000
 """Largest number of movements of a solution."""
 _MOST_NUMBERS = 400_000
@@ -180,7 +180,7 @@ class Run:
     def early_corrections(self) -> int | None:
         """Corrective movements in the first tenth of a learner's trials after trial 0.
 
-        The value is None if they were not counted.
+        The value is None if the corrections were not counted.
         """
         return self._corrections(1)
 
@@ -188,7 +188,7 @@ class Run:
     def late_corrections(self) -> int | None:
         """Corrective movements in the last tenth of a learner's trials after trial 0.
 
-        The value is None if they were not counted.
+        The value is None if the corrections were not counted.
         """
         return self._corrections(-1)
 
