@@ -1,1 +1,1 @@
-"""Methods the learner is compared with, one concept a file."""
+"""Methods with which the learner is compared, one concept a file."""

@@ -31,14 +31,15 @@ from coartic.method import MethodError
 from coartic.robot import Array
 
 DAMPING = 0.01
-"""λ, length unit per unit of change. It costs about 1e-4 of the task where the singular value of A
-is 1, and keeps changes small where it is 0."""
+"""λ, in length units per unit of change. Damping costs about 1e-4 of the task where the singular
+value of A is 1, and keeps changes small where the singular value is 0."""
 
 LIMIT = 2.0
 """L, the largest absolute change of a joint."""
 
 SLACK = 1e-6
-"""ε, length unit. Without it a single point may remain for level 2 where limits bind."""
+"""ε, in length units. Without this slack, a single point may remain for level 2 where limits
+bind."""
 
 
 class Solution(NamedTuple):
@@ -47,7 +48,7 @@ class Solution(NamedTuple):
     changes: Array
     """Changes of the joints by both levels, shape ``(joints,)``."""
     level_1: Array
-    """Changes of the joints if there were no level 2, shape ``(joints,)``."""
+    """Changes of the joints by level 1 only, shape ``(joints,)``."""
     iterations: int
     """Iterations of the solver in both levels."""
 
@@ -58,9 +59,9 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
     Parameters
     ----------
     rows : ndarray, shape (m, joints)
-        Matrix A of the task, length unit per unit of change.
+        Matrix A of the task, in length units per unit of change.
     least : ndarray, shape (m,)
-        Vector b of the task, length unit: the least values of A x.
+        Vector b of the task: the least values of A x, in length units.
     preferred : ndarray, shape (joints,)
         Preferred change z.
 
@@ -85,9 +86,10 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
 def _solve_level(
     level: int, hessian: Array, gradient: Array, rows: Array, least: Array
 ) -> tuple[Array, int]:
-    """Minimise ½ vᵀ H v + gᵀ v under the constraints of a level; return v and the iterations.
+    """Minimise ½ vᵀ H v + gᵀ v under the constraints of a level.
 
-    H is ``hessian`` and g is ``gradient``; v is (s, x) at level 1 and x at level 2.
+    H is ``hessian`` and g is ``gradient``; v is (s, x) at level 1 and x at level 2. Return v and
+    the number of iterations. Raises MethodError if the solver fails.
     """
     task, joints = rows.shape
     matrix = np.zeros((task + 2 * joints, len(gradient)))

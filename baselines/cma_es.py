@@ -3,8 +3,8 @@
 Each hand sequence has its own evolution strategy (CMA-ES) over the targets of all explored joints:
 
 - It uses only the total reward of each trial. A failed trial ranks last.
-- Its first mean is the postures in which the corrective process **A** alone hits the goals. Finding
-  them takes one trial.
+- Its first mean is made of the postures in which the corrective process **A** on its own hits the
+  goals. Finding these postures takes one trial.
 - Its first step size is ``sigma``.
 - When it stops by its own criteria, it restarts from the first mean with twice the population
   (IPOP).
@@ -78,7 +78,7 @@ class Strategy:
     hands : str
         Hand sequence, such as ``"RRLR"``.
     sigma : float
-        First step size, length unit (base) and rad (joints).
+        First step size, in length units (base) and rad (joints).
     """
 
     def __init__(self, session: Session, attempts: Attempts, hands: str, sigma: float) -> None:
@@ -121,9 +121,10 @@ class Strategy:
 def spend_trials(strategies: Sequence[Strategy], attempts: Attempts, exploration: float) -> None:
     """Let strategies make generations until no trial of ``attempts`` is left.
 
-    The next generation comes from the strategy with the highest upper confidence bound (UCB1). Its
-    c is ``exploration`` times the range of the strategies' first rewards. Strategies whose hand
-    sequence the corrective process did not complete make no generation.
+    The next generation comes from the strategy with the highest upper confidence bound (UCB1). The
+    constant c of UCB1 is ``exploration`` times the range of the strategies' first rewards (at least
+    1 tick). Strategies whose hand sequence the corrective process did not complete make no
+    generation.
     """
     promising = [strategy for strategy in strategies if strategy.reward > -math.inf]
     rewards = [strategy.reward for strategy in promising] or [0.0]
@@ -156,8 +157,8 @@ class CMAES(Method):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left, and return the movements of the best trial.
 
-        Each hand sequence first gets a trial by the corrective process; of more than 4096 sequences
-        only the initial one does. If all of these trials fail, the method stops.
+        Each hand sequence first gets a trial by the corrective process. If there are more than 4096
+        sequences, only the initial one does. If all of these first trials fail, the method stops.
 
         Parameters
         ----------
@@ -186,7 +187,7 @@ class GoalByGoalParameters(UninformedParameters):
     """Parameters of CMA-ES that chooses hands goal by goal."""
 
     epsilon: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """Probability of a random hand, for each goal."""
+    """Probability with which the hand for a goal is random."""
 
 
 class GoalByGoal(Method):

@@ -68,7 +68,7 @@ class Leg(NamedTuple):
 
 
 class _StuckError(Exception):
-    """Error of a hand that does not reach its goal."""
+    """Raised if a hand cannot reach its goal, or gets no nearer to it."""
 
 
 @dataclass
@@ -82,7 +82,7 @@ class Controller(ABC):
     session: Session
     task: Task
     period: int
-    """Most ticks of a control step."""
+    """Largest number of ticks of a control step."""
     solves: int = 0
     """Number of quadratic programmes solved so far."""
 
@@ -200,6 +200,8 @@ class Controller(ABC):
     def error(self, q: Array, aim: Aim) -> Array:
         """Return the vector from a hand to the centre of its goal.
 
+        The session counts an evaluation.
+
         Parameters
         ----------
         q : ndarray, shape (dof,)
@@ -210,7 +212,7 @@ class Controller(ABC):
         Returns
         -------
         ndarray, shape (2,)
-            Vector, length unit. The session counts an evaluation.
+            Vector, in length units.
         """
         return np.asarray(
             self.task.goal_array[aim.goal] - self.session.forward_kinematics(q, aim.hand)
@@ -230,7 +232,7 @@ class ControlParameters(Parameters):
     """Parameters of a controller."""
 
     period: Annotated[int, Field(ge=1, le=20)] = 5
-    """Most ticks of a control step."""
+    """Largest number of ticks of a control step."""
 
 
 class Control(Method):
@@ -257,8 +259,8 @@ class Control(Method):
         """Find the hand sequence that takes the controller the fewest ticks.
 
         The search extends the sequence with the fewest ticks so far by the path to its next goal,
-        until that sequence is complete. Between sequences with equal ticks it chooses the one with
-        the fewest changes of hand, then the first one.
+        until that sequence is complete. Of sequences with equal ticks, it chooses the one with the
+        fewest changes of hand, then the first one.
 
         Parameters
         ----------

@@ -1,8 +1,8 @@
 """The corrective process alone, with the task's hands or with the best hands.
 
-The best hands come from the paper's exhaustive strategy (section *Exploration Condition 3*). It
-tries all 2^G hand sequences for G goals; the corrective process **A** chooses each target, and
-nothing else is explored.
+The best hands come from the paper's exhaustive strategy (section *Exploration Condition 3*). This
+strategy tries all 2^G hand sequences for G goals. The corrective process **A** chooses each target,
+and nothing else is explored.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class BestHands(GivenHands):
     def solve(self, session: Session) -> Result:
         """Make a trial for each hand sequence, and return the movements of the best trial.
 
-        Trials stop when the budget ends. Between trials with equal rewards the one with the fewest
+        Trials stop when the budget ends. Of trials with equal rewards, the one with the fewest
         changes of hand is best.
 
         Parameters

@@ -139,7 +139,8 @@ class EvolutionStrategy:
 
     @property
     def costs(self) -> Array:
-        """Costs of the last generation that was told, sorted, shape ``(size,)``; empty before."""
+        """Sorted costs of the last generation, shape ``(size,)``; empty before the first
+        :meth:`tell`."""
         return self._costs
 
     def ask(self) -> Array:
@@ -167,7 +168,7 @@ class EvolutionStrategy:
         points : ndarray, shape (size, dim)
             The points of the last :meth:`ask`.
         costs : ndarray, shape (size,)
-            Their costs, all finite. The strategy minimises the cost.
+            Costs of the points, all finite. The strategy minimises the cost.
         """
         self._generation += 1
         self._note_costs(costs)

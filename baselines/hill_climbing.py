@@ -1,7 +1,7 @@
 """Hill climbing: Gaussian noise and random hands, with a (1+1) climber for each hand sequence.
 
-Each hand sequence has a centre. The first trial of a sequence is made by the corrective process
-**A** alone (but see ``begin``), and the configurations in which it hits the goals are the first
+Each hand sequence has a centre. In the first trial of a sequence only the corrective process **A**
+acts (but see ``begin``). The configurations in which this trial hits the goals are the first
 centre. Each later trial perturbs all explored joints of the centre at once. A better trial moves
 the centre to the configurations in which it hit the goals, as in the learner. Moving the centre to
 the trial's targets instead would gain more: on the paper's tasks random search with 1,000
@@ -31,13 +31,19 @@ _MOST_DRAWN = 128  # most trials that are drawn before the first of them is made
 
 
 class HillClimbingParameters(UninformedParameters):
-    """Parameters of hill climbing; the defaults are the learner's."""
+    """Parameters of hill climbing.
+
+    The default ``trials`` and ``sigma`` are the learner's; ``begin`` is not.
+    """
 
     begin: Literal["correction", "best"] = "correction"
-    """Where the first trial of a hand sequence begins. ``"correction"``: **A** acts alone.
-    ``"best"``: as in the learner's table, at the centre of the best sequence so far, perturbed, at
-    each goal where both sequences have the same hand and the same hand before; **A** acts at the
-    other goals."""
+    """Targets of the first trial of a hand sequence:
+
+    - ``"correction"``: there are none; only **A** acts.
+    - ``"best"``: as in the learner's table. If a goal has the same hand and the same hand before as
+      in the best sequence so far, its target is the centre of that sequence plus noise. At the
+      other goals, and at all goals before the first success, **A** acts.
+    """
 
 
 class HillClimbing(Method):

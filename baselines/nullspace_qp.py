@@ -65,7 +65,7 @@ class HandController(Controller):
         return solution, preferred, memory
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the preferred joint changes of a control step: zeros, unless a subclass overrides.
+        """Return the preferred joint changes of a control step, which are 0 in this class.
 
         Parameters
         ----------
@@ -94,8 +94,8 @@ class NextGoalController(HandController):
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
         """Return a posture of the next goal as the memory, shape ``(dof,)``.
 
-        It is the posture in which the corrective process from ``q`` hits the first goal ahead for
-        which it converges, or ``q`` if it converges for none.
+        The memory is the posture in which the corrective process, starting from ``q``, hits the
+        first goal ahead for which it converges. If it converges for none, the memory is ``q``.
         """
         for hand, goal in aims[1:]:
             correction = self.session.correct(q, hand, goal + 1)

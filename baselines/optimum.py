@@ -1,4 +1,4 @@
-"""The search for the optimum: the best reward that a global search finds.
+"""The search for the optimum, the best reward that a global search finds.
 
 A trial loses reward in proportion to the length of its path in joint space. So this method
 searches, over hand sequences, for the shortest path that touches the discs of all goals in turn. It
@@ -32,15 +32,15 @@ class OptimumParameters(Parameters):
     """Restriction of the movements, and effort of the search."""
 
     other_arm: Literal["free", "still"] = "free"
-    """``"free"``, or ``"still"`` if the arm whose hand is not chosen for a goal must not move on
-    the way to the goal."""
+    """``"still"`` if the arm whose hand is not chosen for a goal must not move on the way to the
+    goal; otherwise ``"free"``."""
     base: Literal["task", "y", "xy"] = "task"
     """Base coordinates to lock in addition to the task's own locks: ``"y"``, ``"xy"``, or
     ``"task"`` for none."""
     nodes: Nodes = 200
-    """Most postures for a goal and hand in a graph."""
+    """Largest number of postures for a goal and hand in a graph."""
     graphs: Count = 3
-    """Least number of independent graphs. More are made until there are enough chains."""
+    """Least number of independent graphs. More graphs are made until there are enough chains."""
     chains: Count = 100
     """Least number of chains, over all graphs and hand sequences. With three chains the search
     missed the best known path on 9 of 40 random tasks for one arm."""

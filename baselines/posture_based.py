@@ -70,13 +70,14 @@ class PostureBasedParameters(Parameters):
     - 60 and 100 rounds of 60 postures, 40 rounds of 100, first SDs of 0.1 and 0.3, and last SDs of
       0.001 and 0.01 of the first, over 6 seeds on the first two goals of three tasks: within 3
       ticks;
-    - equal weights, and diffusion at all widths in each round, on the same goals: up to 4 ticks.
+    - equal weights, and diffusion at all widths in each round, on the same goals: differences of up
+      to 4 ticks.
     """
 
     stored: Annotated[int, Field(ge=0, le=2000)] = 300
     """Number of random postures in the first store, in addition to the starting posture."""
     rounds: Annotated[int, Field(ge=0)] = 60
-    """Number of rounds of generation for each goal; the last one is the deadline."""
+    """Number of rounds of generation for each goal. The end of the last round is the deadline."""
 
 
 class PostureBased(Method):
@@ -227,7 +228,8 @@ class PosturePlanner:
 
         A posture is made in three steps:
 
-        1. It has the angles of the hand's arm from a stored posture, and all else from ``q``.
+        1. The posture has the angles of the hand's arm from a stored posture, and all other entries
+           from ``q``.
         2. The free base coordinates move by the displacement from the hand to the goal.
         3. Base and arm are corrected (:meth:`correct`). Postures whose hand is still not at the
            goal are left out.
@@ -338,6 +340,8 @@ class PosturePlanner:
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
         """Move a hand towards a goal, by changing postures in place.
 
+        The session counts the evaluations.
+
         Parameters
         ----------
         postures : ndarray, shape (..., dof)
@@ -346,13 +350,12 @@ class PosturePlanner:
             Number of the goal, from 0.
         hand : {"left", "right"}
         steps : int
-            Most steps for a posture.
+            Largest number of steps for a posture.
 
         Returns
         -------
         ndarray of bool, shape (...)
-            True where the hand is then within ``tolerance`` of the goal's centre. The session
-            counts the evaluations.
+            True where the hand is then within ``tolerance`` of the goal's centre.
         """
         flat = postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)
@@ -391,12 +394,13 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Linearise the hand of the postures that are still far from (x, y); return their number.
+    """Linearise the hand in postures that are far from (x, y), and return their number.
 
     ``far`` has indices of rows of ``postures``. The indices of postures whose hand is farther than
-    ``tolerance`` are moved to its beginning. For each of them a row of ``wanted`` gets the hand's
-    step towards (x, y), at most 0.5 long, and a row of ``jacobian`` gets the columns of the arm's
-    joints. ``xs`` and ``ys`` are work space for the points of an arm.
+    ``tolerance`` from (x, y) are moved to the beginning of ``far``. For each of them, one entry of
+    ``wanted`` is set to the hand's step towards (x, y), at most 0.5 long. The same entry of
+    ``jacobian`` is filled in the columns of the arm's joints; the columns of the base stay as they
+    are. ``xs`` and ``ys`` are work space for the points of an arm.
     """
     tip = len(arm.links)
     left = 0

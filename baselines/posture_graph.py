@@ -35,12 +35,13 @@ Nodes = Annotated[int, Field(ge=10, le=1000)]
 Count = Annotated[int, Field(ge=1)]
 """Parameter: a number of graphs, chains or starts."""
 BEAM_WIDTH = 64
-"""Most hand sequences that are planned for each graph. With two hands these are all sequences for
-up to six goals. For more goals a beam search of this width over the goals chooses the sequences."""
+"""Largest number of hand sequences that are planned for each graph. With two hands, these are all
+sequences for up to six goals. For more goals, a beam search of this width over the goals chooses
+the sequences."""
 QUICK = {"nodes": 40, "graphs": 1, "chains": 1}
 """Parameters of a planner for a check that takes seconds."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
-_NARROWEST, _WIDEST = 0.05, 1.5  # SD of samples, length unit (base) and rad (joints)
+_NARROWEST, _WIDEST = 0.05, 1.5  # SD of samples, in length units (base) and rad (joints)
 _NEAR = 2.0  # length unit: at a larger distance the base first moves the hand this near
 
 
@@ -82,24 +83,28 @@ def _sample_postures(
 
 
 class Beginning(NamedTuple):
-    """The cheapest chains of nodes for the beginning of a hand sequence."""
+    """The first goals of a hand sequence, with their cheapest chains of nodes.
+
+    A chain has a node for each goal. There is a cheapest chain to each pair of end nodes, one node
+    for each hand.
+    """
 
     hands: HandSequence
     nodes: dict[Hand, Array]
-    """Nodes of the layer in which each hand was last used, shape ``(n, dof)``. For a hand that was
-    not used yet, it is the start."""
+    """Nodes of the layer in which each hand was last used, shape ``(n, dof)``. A hand that was not
+    used yet has the start as its only node."""
     cost: Array
     """``cost[i, j]`` is the joint-space length of the shortest chain to node i of the hand used
     last and node j of the other hand."""
     back: tuple[NDArray[np.int32], ...]
-    """For each goal, ``back[i, j]`` is the index of the node from which the goal's hand came to
-    this state."""
+    """For each goal an array. Its entry ``[i, j]`` is the index of the node from which the hand
+    came to node i in the cheapest chain to the pair i, j."""
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
     """Sample postures with the hand in the goal, for each goal and hand.
 
-    Half of the samples begin at nodes of the goal before, with either hand, if there are any. The
+    Half of the samples begin at nodes of the goal before, of either hand, if there are any. The
     other samples begin at the task's start.
 
     Parameters
@@ -139,8 +144,8 @@ def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain
     layers : dict
         Nodes, shape ``(n, dof)``, by goal (from 0) and hand.
     most : int, optional
-        Width of the beam search: at each goal it continues with so many cheapest beginnings of
-        sequences. By default it continues with all.
+        Width of the beam search: at each goal the search continues with this many cheapest
+        beginnings of sequences. By default it continues with all.
 
     Returns
     -------
@@ -220,9 +225,9 @@ def cheapest_chains(
     graphs : int
         Least number of graphs.
     chains : int
-        Least number of chains. More graphs are made until there are so many.
+        Least number of chains. More graphs are made until there are this many.
     most : int
-        Most hand sequences of a graph (:func:`chains_of`).
+        Largest number of hand sequences of a graph (:func:`chains_of`).
     spread : bool
         True to yield, after each chain of a task for two hands, a copy in which the idle arm moves
         in equal steps (:func:`move_other_arm`). The copies do not count for ``chains``.

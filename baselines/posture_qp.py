@@ -1,8 +1,8 @@
 """Posture QP: a controller that goes straight in joint space to postures that hit the goals.
 
-Unlike null-space control (:mod:`coartic.baselines.nullspace_qp`), it mainly plans postures. The
-priority of the hand rarely binds, because the joints prefer to go straight to a posture that hits
-the goal. The ``details`` of a run count how often it binds.
+Unlike null-space control (:mod:`coartic.baselines.nullspace_qp`), this controller mainly plans
+postures. The priority of the hand rarely binds, because the joints prefer to go straight to a
+posture that hits the goal. The ``details`` of a run count how often the priority binds.
 
 The controller has a **posture** for the current goal and for each goal ahead. The cascade
 (:mod:`coartic.baselines.cascade`) computes both the changes of postures and the control steps:
@@ -23,16 +23,16 @@ of the polygon's sides and ρ is their distance from c.
   nearer step by step, on any path that suits the joints.
 
 A posture is found once for each goal. Later each control step, except the first step to a goal,
-also makes a step of the postures. The objective decides which posture hits the current goal:
+also moves the postures by a step. The objective decides which posture hits the current goal:
 
 - ``current-goal``: the posture that is nearest to the robot's configuration;
 - ``goals-ahead``: the posture for which the path to it and on to the next goal's posture is
   shortest. The next goal's posture is chosen in the same way, with the goal after it.
 
 The controller was tuned only on thirty development instances (``d000`` to ``d009`` of families
-one-armed, two-armed and aligned): 12 settings of the controller, tabled here, and before that some
-50 settings of a prototype. The table has the mean gap of ``goals-ahead`` to the best known path,
-with one setting changed at a time. A star marks the value that is used:
+one-armed, two-armed and aligned): 12 settings of the controller and, before that, some 50 settings
+of a prototype. The table has the 12 settings, one changed at a time, with the mean gap of
+``goals-ahead`` to the best known path. A star marks the value that is used:
 
 =========================  ====================================================================
 least speed of the hand    0: 2.2 %, 0.03 ★: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
@@ -43,8 +43,8 @@ goals ahead                none: 20.1 %, 1: 5.6 %, 2 ★: 2.3 %, 3: 2.2 %; a pro
 (speed of 0.1)
 =========================  ====================================================================
 
-On the same instances the gap of the corrective process alone with its best hand sequence is 24.8 %,
-and that of ``current-goal`` 20.1 %.
+On the same instances the gap of the corrective process on its own, with its best hand sequence, is
+24.8 %. The gap of ``current-goal`` is 20.1 %.
 
 The remaining gap comes from local minima. Postures are found by descent from the robot's
 configuration, and another branch of the inverse kinematics may be far shorter (35 % on the worst of
@@ -86,10 +86,10 @@ class PostureController(Controller):
     ) -> dict[Aim, Array]:
         """Return a posture that hits its goal for each aim.
 
-        A posture of an aim is the one in ``memory``, if there is one. Otherwise descent finds it,
-        beginning at the posture of the aim before, or at ``q`` for the first aim. With more than
-        one aim all postures then move to shorten the path from ``q`` through them. A search that
-        does not converge ends after 400 steps, and its posture may be outside the goal.
+        The posture of an aim is the one in ``memory``, if there is one. Otherwise descent finds the
+        posture, beginning at the posture of the aim before, or at ``q`` for the first aim. With
+        more than one aim all postures then move to shorten the path from ``q`` through them. A
+        search that does not converge ends after 400 steps, and its posture may be outside the goal.
 
         Parameters
         ----------
@@ -142,8 +142,8 @@ class PostureController(Controller):
         """Move each posture by a step that shortens the path from ``q`` through all of them.
 
         The preferred posture of a step (:meth:`step_nearer`) is the mean of the postures before and
-        after, weighted by inverse distances (Weiszfeld 1937). For the last posture it is the
-        posture before.
+        after, weighted by inverse distances (Weiszfeld 1937). The preferred posture of the last
+        posture is the posture before.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ class PostureController(Controller):
         Returns
         -------
         float
-            Length of the longest step before it was limited, in length unit and rad mixed.
+            Length of the longest step before it was limited, in a mix of length units and rad.
         """
         largest = 0.0
         for k, aim in enumerate(aims):
@@ -190,9 +190,9 @@ class PostureController(Controller):
         Returns
         -------
         ndarray, shape (dof,)
-            Posture after the step, a new array.
+            Posture after the step (a new array).
         float
-            Length of the step before it was limited to 0.1, in length unit and rad mixed.
+            Length of the step before it was limited to 0.1, in a mix of length units and rad.
         """
         rows, outside = self.faces(posture, aim)
         wanted = _POSTURE_GAIN * (preferred - posture)[self.moving]
@@ -208,7 +208,9 @@ class PostureController(Controller):
         return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
     def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
-        """Return the constraint that a hand is in its goal's polygon, A x >= b to first order.
+        """Return the constraint that a hand is in its goal's polygon.
+
+        The constraint is A x >= b, to first order.
 
         Parameters
         ----------
@@ -220,9 +222,9 @@ class PostureController(Controller):
         Returns
         -------
         ndarray, shape (16, joints)
-            Matrix A, length unit per unit of change.
+            Matrix A, in length units per unit of change.
         ndarray, shape (16,)
-            Vector b, length unit.
+            Vector b, in length units.
         """
         jacobian = self.session.jacobian(q, aim.hand)[:, self.moving]
         radius = (self.task.radius - _MARGIN) * _INSET

@@ -1,19 +1,19 @@
 """Random search: the paper's learner without its memory. The solution is the best trial.
 
-The first trials are made by the corrective process alone. Each later trial draws Gaussian noise
-around the postures in which the corrective process hits the goals, by default with the learner's
-standard deviation. With one stage, the default, the noise does not depend on earlier rewards. So
-random search cannot learn to coarticulate: its best trial shows the effect of selecting one of many
-noisy trials by the reward of the whole task. It is the control of signatures of coarticulation
-(:mod:`coartic.analysis.control`).
+In the first trials only the corrective process acts. Each later trial draws Gaussian noise around
+the postures in which the corrective process hits the goals, by default with the learner's standard
+deviation. With one stage, the default, the noise does not depend on earlier rewards. So random
+search cannot learn to coarticulate: its best trial shows the effect of selecting one of many noisy
+trials by the reward of the whole task. Random search is therefore the control for signatures of
+coarticulation (:mod:`coartic.analysis.control`).
 
 With ``stages`` above 1 the trials are divided into equal parts. After each part the centre of the
 noise moves to the best trial so far: to the postures that this trial reached, or to the targets
 that it aimed at (``keep``).
 
-``random-search`` uses the hands with which the corrective process alone does best, or the hands of
-its parameter. ``random-search/hands`` divides its trials equally among all hand sequences. Its
-solution is the best trial of all.
+``random-search`` uses the hands of its parameter or, by default, the hands with which the
+corrective process on its own gets the highest reward. ``random-search/hands`` divides its trials
+equally among all hand sequences. Its solution is the best trial over all sequences.
 """
 
 from __future__ import annotations
@@ -41,19 +41,20 @@ class RandomSearchHandsParameters(Parameters):
     """Parameters of random search with every hand sequence."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run, with those of the corrective process alone."""
+    """Number of trials of a run, including those in which only the corrective process acts."""
     sigma: Annotated[float, Field(gt=0, le=MOST_NOISE)] = 0.05
-    """SD of the noise on each explored joint, length unit (base) and rad (joints). The default is
-    the learner's."""
+    """Standard deviation of the noise on each explored joint, in length units (base) and rad
+    (joints). The default is the learner's."""
     stages: Annotated[int, Field(ge=1)] = 1
     """Number r of equal parts of the T trials with a hand sequence. Part k ends after ⌊kT/r⌋
-    trials; then noise is drawn around the best trial so far. With 1 the centre does not move."""
+    trials; then noise is drawn around the best trial so far. With one stage the centre does not
+    move."""
     keep: Literal["postures", "targets"] = "postures"
     """Centre of the noise after a part: the postures in which the best trial hit its goals, or the
-    targets that it aimed at. It has no effect with one stage."""
+    targets that it aimed at. This parameter has no effect with one stage."""
     idle_arm: bool = True
-    """True if an arm gets noise also at goals of the other hand. With False it does not move there,
-    as under the learner's condition EC3."""
+    """True if an arm gets noise also at goals of the other hand. If False, the arm does not move at
+    these goals, as under the learner's condition EC3."""
 
     @model_validator(mode="after")
     def _check_stages(self) -> Self:
@@ -68,9 +69,9 @@ class RandomSearchParameters(RandomSearchHandsParameters):
     """Parameters of random search."""
 
     hands: str | None = None
-    """Hand sequence, such as ``"RRLR"``. By default the method tries as many sequences as there are
-    trials, and uses the one with which the corrective process alone gets the highest reward. If
-    there are more than 4096 sequences, it uses the task's initial one."""
+    """Hand sequence, such as ``"RRLR"``. By default the method tries the corrective process with
+    each sequence, while trials are left, and uses the sequence with the highest reward. If there
+    are more than 4096 sequences, it uses the task's initial one."""
 
 
 def draw_trials(
@@ -82,14 +83,14 @@ def draw_trials(
     ----------
     session : Session
     hands : str or None
-        Hand sequence. None for the default of :class:`RandomSearchParameters`.
+        Hand sequence, or None for the default of :class:`RandomSearchParameters`.
     parameters : RandomSearchHandsParameters
         Parameters; ``trials`` counts trials of the corrective process and trials with noise.
 
     Returns
     -------
     Attempts
-        Account of the trials, with the best trial.
+        The trials that were made, with the best one.
     int
         Number of trials with noise.
 
@@ -148,18 +149,18 @@ class RandomSearchHands(Method):
     Parameters = RandomSearchHandsParameters
 
     def max_batch(self) -> int:
-        """Return the most sessions of one call of :meth:`solve_together`.
+        """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        It is 72, or fewer if their runs would have more than 4,000,000 trials in all, but at least
-        1.
+        The number is at most 72 and at least 1. Within these limits, the sessions together make at
+        most 4,000,000 trials.
         """
         return runs_at_once(self.parameters.trials)
 
     def solve(self, session: Session) -> Result:
         """Divide the trials among the hand sequences, and return the movements of the best trial.
 
-        Shares differ by at most one trial. If the corrective process fails with a sequence, the
-        rest of its share is not used.
+        The shares of the sequences differ by at most one trial. If the corrective process fails
+        with a sequence, the rest of its share is not used.
 
         Parameters
         ----------

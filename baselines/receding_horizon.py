@@ -1,22 +1,23 @@
 """A planner that looks a fixed number of goals ahead (model predictive control).
 
-Its window is the current goal and ``horizon`` goals after it. It searches, over hand sequences, for
-the shortest movements through the window, makes the first of them, and plans again from its end.
+The window of the planner is the current goal and ``horizon`` goals after it. The planner searches,
+over hand sequences, for the shortest movements through the window, makes the first of them, and
+plans again from its end.
 
-- With ``horizon`` 0 it takes the shortest path to each goal.
+- With ``horizon`` 0 the planner takes the shortest path to each goal.
 - A window that contains the last goal is followed to its end, because planning again would find the
   rest of it.
-- With a horizon of all goals it plans the whole task at once. Its gap to the optimum is then the
-  cost of the smaller search.
+- With a horizon of all goals the planner plans the whole task at once. Its gap to the optimum is
+  then the price of the smaller search.
 
 A window is planned as ``optimum/search`` plans a task (:mod:`.shortest_paths`): chains of posture
 graphs, IPOPT, whole ticks. For speed there are fewer chains, smaller graphs with two hands, and
 IPOPT solves only from the shortest ``starts``.
 
 Movements are rounded to whole ticks in each window. Otherwise each goal would lose half a tick on
-average, at any horizon. With rounding only the last goal of a window loses it: once in the whole
-task, but at each goal with a horizon of 0. ``path_length`` in the details is without this loss: it
-is the sum of the plans before rounding.
+average, at any horizon. With rounding, only the last goal of a window that is followed to its end
+loses half a tick: once in the whole task, or at each goal if the horizon is 0. ``path_length`` in
+the details does not have this loss: it is the sum of the plans before rounding.
 """
 
 from __future__ import annotations
@@ -48,19 +49,21 @@ class RecedingHorizonParameters(Parameters):
     horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
     """Number of goals after the current goal in a window; fewer at the end of a task."""
     nodes: Nodes = 200
-    """Most postures for a goal of a posture graph. Two hands have half as many each."""
+    """Largest number of postures for a goal of a posture graph. With two hands, each hand has at
+    most half as many."""
     graphs: Count = 3
-    """Least number of independent graphs for each window. More are made until there are enough
-    chains."""
+    """Least number of independent graphs for each window. More graphs are made until there are
+    enough chains."""
     chains: Count = 24
     """Least number of chains of each window, over all graphs and hand sequences."""
     starts: Count = 24
-    """Most starts of each window from which IPOPT solves: the shortest chains. With two hands and
-    more than one goal, each chain also counts with the idle arm moving in equal steps."""
+    """Largest number of starts of each window from which IPOPT solves. The starts are the shortest
+    chains. With two hands and more than one goal, they may also be copies of chains in which the
+    idle arm moves in equal steps."""
 
 
 class RecedingHorizon(Method):
-    """Plan the shortest movements through the next goals, make the first, and plan again."""
+    """Planner that plans through the next goals, makes the first movement, and plans again."""
 
     name = "receding-horizon"
     version = 2

@@ -64,7 +64,7 @@ def shortest_plans(
     starts : iterable of tuple
         Hand sequence and configurations, shape ``(G, dof)``, of each start.
     still : bool
-        True if the arm whose hand is not chosen for a goal must not move on the way to the goal.
+        True if, on the way to a goal, the arm whose hand is not chosen must not move.
 
     Returns
     -------
@@ -96,8 +96,8 @@ def fewest_ticks(
 ) -> PlanInTicks:
     """Round plans to whole ticks, and return the rounding with the fewest ticks.
 
-    Each rounding is executed, and must hit every goal. Between roundings with equal ticks the one
-    with the fewest corrections is returned. These roundings are not tried:
+    Each rounding is executed, and must hit every goal. Of roundings with equal ticks, the one with
+    the fewest corrections is returned. Some roundings are not tried:
 
     - roundings of a plan after its nearest 64 (:meth:`.Rounding.every`);
     - roundings whose least number of ticks is not below that of the best rounding so far.
@@ -120,7 +120,7 @@ def fewest_ticks(
     Raises
     ------
     MethodError
-        No rounding is solved and hits every goal.
+        No rounding that could be solved hits every goal.
     """
     best: PlanInTicks | None = None
     fewest: tuple[float, float] = math.inf, math.inf  # ticks and corrections of the best

@@ -50,25 +50,27 @@ SAMPLES = 200  # points of a smooth path from goal to goal; with 800 no reward c
 
 
 class TrajectoryParameters(Parameters):
-    """Hand sequences that are planned, and the starts of each."""
+    """Parameters for the hand sequences that are planned, and for their starts."""
 
     most_sequences: Count = BEAM_WIDTH
-    """Most hand sequences that are planned in a graph. With two hands 64 are all sequences for six
-    goals. If there are more, a beam search of this width over the goals chooses them."""
+    """Largest number of hand sequences that are planned in a graph. With two hands, 64 are all
+    sequences for six goals. If there are more, a beam search of this width over the goals chooses
+    the sequences."""
     nodes: Nodes = 150
-    """Most postures for a goal and hand in a graph."""
+    """Largest number of postures for a goal and hand in a graph."""
     graphs: Count = 3
-    """Least number of independent graphs. Each has at most two starts for a hand sequence. With one
-    graph the best path was missed on 3 of 23 small random tasks."""
+    """Least number of independent graphs. Each graph gives at most two starts for a hand sequence.
+    With one graph the best path was missed on 3 of 23 small random tasks."""
     chains: Count = 30
-    """Least number of chains of all hand sequences. More graphs are made until there are enough."""
+    """Least number of chains, over all hand sequences. More graphs are made until there are
+    enough."""
     noisy_starts: Annotated[int, Field(ge=0)] = 4
-    """Number of further starts for each hand sequence: the first start with Gaussian noise of SD
-    0.1 to 1."""
+    """Number of further starts for each hand sequence. Each is the first start with Gaussian noise,
+    whose standard deviation is drawn from 0.1 to 1."""
 
 
 class SmoothParameters(TrajectoryParameters):
-    """Hand sequences and starts, and whether plans stop at goals."""
+    """Parameters for hand sequences, starts, and whether plans stop at goals."""
 
     stop: Literal[0, 1] = 0
     """1 if the plan stops at each goal: velocities are 0 there, and for jerk also accelerations. 0
@@ -83,8 +85,8 @@ class JerkParameters(SmoothParameters):
     """
 
     noisy_starts: Annotated[int, Field(ge=0)] = 0
-    """Number of further starts for each hand sequence: the first start with Gaussian noise of SD
-    0.1 to 1."""
+    """Number of further starts for each hand sequence. Each is the first start with Gaussian noise,
+    whose standard deviation is drawn from 0.1 to 1."""
 
 
 class HandJerkParameters(JerkParameters):
@@ -95,9 +97,10 @@ class HandJerkParameters(JerkParameters):
     """
 
     graphs: Count = 1
-    """Least number of independent graphs. Each has one start for a hand sequence."""
+    """Least number of independent graphs. Each graph gives one start for a hand sequence."""
     chains: Count = 1
-    """Least number of chains of all hand sequences. More graphs are made until there are enough."""
+    """Least number of chains, over all hand sequences. More graphs are made until there are
+    enough."""
 
 
 def cheapest_plan(
@@ -124,7 +127,7 @@ def cheapest_plan(
     Returns
     -------
     PathPlan
-        The cheapest converged plan. If no plan converged, it is the plan of the last start.
+        The cheapest converged plan. If no plan converged, the plan from the last start is returned.
     """
     plans = [problem.solve(instance, start, stops=stops) for start in starts]
     for plan in plans:

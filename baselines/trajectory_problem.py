@@ -21,14 +21,14 @@ The last three costs are integrals over a movement from rest to rest. The durati
 are free, and their sum is constant.
 
 The integrals over joints are formulas in the rates (velocities and accelerations) at the goals
-(:func:`segment_cost`). The rates are variables, too. Jerk of the hand, which is on its way to a
-goal, is a sum over Gauss-Legendre nodes. It does not determine motion in the null space of the
-hand; the small weight w does.
+(:func:`segment_cost`). The rates are variables, too. Jerk of the hand that is on its way to a goal
+is a sum over Gauss-Legendre nodes. Jerk of the hand does not determine motion in the null space of
+the hand; the joint jerk with its small weight w does.
 
 A programme is compiled for each robot, set of hands, number of goals and cost. The start, the goals
 and the hand sequence are its parameters. A locked base coordinate or a held arm is a bound of
-variables. So one solver serves all hand sequences of a task. It is IPOPT (Wächter & Biegler 2006)
-with exact derivatives from CasADi (Andersson et al. 2019). IPOPT's linear solver is not
+variables. So one solver serves all hand sequences of a task. The solver is IPOPT (Wächter & Biegler
+2006) with exact derivatives from CasADi (Andersson et al. 2019). IPOPT's linear solver is not
 thread-safe: parallelise over processes.
 """
 
@@ -56,11 +56,11 @@ MODEL_BASED = KINEMATICS | {Information.KINEMATIC_MODEL}
 
 Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk", "hand-jerk"]
 JOINT_WEIGHT = 0.1
-"""Weight of joint jerk relative to jerk of the hand, (length unit / rad)²."""
+"""Weight of joint jerk relative to jerk of the hand, in (length unit / rad)²."""
 
 _ONE_AT_A_TIME = RLock()
 """Lock while CasADi builds a programme or IPOPT solves it: threads must not do so at once."""
-_RIM = 1e-7  # solutions stay this far inside the disc, length unit: IPOPT's tolerance
+_RIM = 1e-7  # solutions stay this far inside the disc (in length units): IPOPT's tolerance
 # Least duration of a segment; the mean is 1. It binds where a smooth plan would hit two goals at
 # once. With a smaller value, jerk does not converge for many hand sequences of two-armed-2.
 _SHORTEST: dict[Cost, float] = {"acceleration": 0.01, "jerk": 0.05, "hand-jerk": 0.2}
@@ -93,15 +93,15 @@ class Instance:
     """Parameters of a solve: start, goals, hand of each goal, and joints that cannot move."""
 
     q0: Array
-    """Starting configuration, shape ``(dof,)``, length unit and rad."""
+    """Starting configuration, shape ``(dof,)``, in length units and rad."""
     goals: Array
-    """Goal centres, shape ``(G, 2)``, length unit."""
+    """Goal centres, shape ``(G, 2)``, in length units."""
     hands: tuple[Hand, ...]
     """Hand of each goal."""
     held: NDArray[np.bool_]
     """True for joints that cannot move on the way to a goal, shape ``(G, dof)``."""
     radius: float
-    """Largest distance of a hand from its goal's centre, length unit."""
+    """Largest distance of a hand from its goal's centre (in length units)."""
 
     @classmethod
     def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
@@ -115,7 +115,7 @@ class Instance:
         still : bool
             True if the arm whose hand is not chosen for a goal cannot move on the way to it.
         radius : float
-            Largest distance of a hand from its goal's centre, length unit.
+            Largest distance of a hand from its goal's centre (in length units).
         """
         held = held_joints(task, hands, still=still)
         return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
@@ -159,7 +159,7 @@ class PathPlan:
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
     cost: float
-    """Cost of the plan; if the solve asked for depth, minus the depth in the discs."""
+    """Cost of the plan. If the solve asked for depth, the cost is minus the depth in the discs."""
     durations: Array
     """Durations of the segments, shape ``(G,)``, with mean 1; all 1 for costs without rates."""
     rates: Array
@@ -174,7 +174,8 @@ class PathPlan:
         Returns
         -------
         ndarray, shape (G,)
-            Distances in length unit and rad mixed, also if the plan is curved.
+            Distances, in a mix of length units and rad. They are straight even if the plan is
+            curved.
         """
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]))
 
@@ -275,8 +276,8 @@ class TrajectoryProblem:
         Returns
         -------
         PathPlan
-            Plan, which has converged if IPOPT says so and all constraints hold to within 1e-8. A
-            plan that has not converged is returned, too.
+            The plan. It has converged if IPOPT says so and all constraints hold to within 1e-8. A
+            plan that has not converged is returned as well.
         """
         goals, at = self._goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
@@ -347,8 +348,8 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     """Return the least cost of a segment between two states of the joints.
 
     A cubic minimises ∫|q̈|² and a quintic minimises ∫|q⃛|² (Flash & Hogan 1985). Both integrals are
-    exact formulas in the end states. For jerk of the hand, the cost is that of the joints without
-    its weight. The function is not for path length.
+    exact formulas in the end states. For jerk of the hand, the result is the cost of joint jerk,
+    without its weight. Path length is not a cost of this function.
 
     Parameters
     ----------
@@ -387,11 +388,12 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
 def _hand_jerks(
     robot: Robot, hand: Hand, q0: Any, steps: Any, durations: Any, rates: list[Any]
 ) -> Any:
-    """Return the integral of the squared jerk of a hand over each of G segments, a CasADi column.
+    """Return the integral of a hand's squared jerk over each of G segments.
 
-    The joints move along quintics from the start ``q0`` by the changes ``steps``, ``(dof, G)``, in
-    the ``durations``, ``(G,)``. ``rates`` are velocities and accelerations at start and goals,
-    ``(dof, G + 1)`` each. The integral is by Gauss-Legendre quadrature with 6 nodes.
+    The result is a CasADi column. The joints move along quintics from the start ``q0`` by the
+    changes ``steps``, ``(dof, G)``, in the ``durations``, ``(G,)``. ``rates`` are velocities and
+    accelerations at start and goals, ``(dof, G + 1)`` each. The integral is by Gauss-Legendre
+    quadrature with 6 nodes.
     """
     import casadi
 

@@ -25,10 +25,10 @@ class UninformedParameters(Parameters):
     """Parameters of CMA-ES and hill climbing; the defaults are the learner's."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
-    """Trials of a run."""
+    """Number of trials of a run."""
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
-    """Standard deviation of the perturbations, in CMA-ES of the first ones; length unit (base) and
-    rad (joints)."""
+    """Standard deviation of the perturbations (in CMA-ES, of the first ones), in length units
+    (base) and rad (joints)."""
 
 
 class Attempts:
@@ -39,7 +39,7 @@ class Attempts:
     session : Session
         Session in which the trials are made and counted.
     trials : int
-        Most trials.
+        Largest number of trials.
     """
 
     def __init__(self, session: Session, trials: int) -> None:
@@ -63,7 +63,7 @@ class Attempts:
         """Configurations in which the best trial hit the goals, shape ``(G, dof)``."""
 
     def run_corrective(self, *hands: str) -> Trials:
-        """Make a trial by the corrective process alone for each of some hand sequences.
+        """For each hand sequence, make a trial in which only the corrective process acts.
 
         Parameters
         ----------
@@ -73,7 +73,8 @@ class Attempts:
         Returns
         -------
         Trials
-            Results of the trials, in order. If the budget ends, there are fewer than sequences.
+            Results of the trials, in order. If the budget ends, there are fewer trials than hand
+            sequences.
 
         Raises
         ------
@@ -91,13 +92,13 @@ class Attempts:
         hands : str
             Hand sequence, such as ``"RRLR"``.
         values : ndarray, shape (N, n)
-            Targets of the n explored joints of all goals (True in ``explored``), goal by goal,
-            length unit and rad; N is at least 1. Other joints do not move.
+            Targets of the n explored joints of all goals (True in ``explored``), goal by goal, in
+            length units and rad; N is at least 1. Other joints do not move.
 
         Returns
         -------
         Trials
-            Results of the trials, in order. If the budget ends, there are fewer than N.
+            Results of the trials, in order. If the budget ends, there are fewer than N trials.
 
         Raises
         ------
@@ -118,14 +119,15 @@ class Attempts:
         hands : str or list of str
             Hand sequence of all trials, or of each trial.
         targets : ndarray, shape (N, G, dof)
-            Targets, length unit and rad; NaN for joints that do not move. N is at least 1.
+            Targets, in length units and rad; NaN for joints that do not move. N is at least 1.
         until : ndarray, shape (N,), optional
-            Rewards. The first trial with a reward above its entry is the last trial made.
+            A reward for each trial. The first trial whose reward exceeds its entry is the last
+            trial made.
 
         Returns
         -------
         Trials
-            Results of the trials made, in order. If the budget ends, there are fewer than N.
+            Results of the trials made, in order. If the budget ends, there are fewer than N trials.
 
         Raises
         ------
@@ -146,7 +148,10 @@ class Attempts:
 
     @property
     def solution(self) -> tuple[Movement, ...]:
-        """Movements of the best trial. Raises ValueError before the first success."""
+        """Movements of the best trial.
+
+        Raises ValueError before the first success.
+        """
         return movements_of(self.hands, self.targets)
 
     def result(self, **details: Any) -> Result:

@@ -57,12 +57,12 @@ class Rounding:
         """Round each segment to the nearest number of steps, and the last segment up.
 
         The last segment is first made as short as the other segments allow. To first order all
-        roundings of a shortest path (:meth:`every`) take equally many ticks.
+        roundings of a shortest path (:meth:`every`) take the same number of ticks.
 
         Returns
         -------
         TickPlan or None
-            None if a solve fails.
+            The rounded plan, or None if a solve fails.
         """
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
@@ -111,7 +111,7 @@ class Rounding:
         Yields
         ------
         tuple of int
-            Numbers of the goals, from 0; first the empty tuple.
+            Numbers (from 0) of the goals that take no movement. The first tuple is empty.
         PathPlan
             Shortest plan found for this choice.
         """
@@ -153,7 +153,7 @@ class Rounding:
         Returns
         -------
         TickPlan or None
-            None if a solve fails.
+            The rounded plan, or None if a solve fails.
         """
         lengths = np.array([*steps, np.nan]) * self._step
         shortest = self.solve_around(plan.configurations, lengths, merged)
@@ -191,7 +191,7 @@ class Rounding:
             Goals, from 0, that take no movement.
         deep : sequence of int
             Goals, from 0, into whose discs the hands move as deep as ``lengths`` allow. If there
-            are any, the path is not made short.
+            are any, the path is not shortened.
         """
         instance = self._instance
         if merged:
@@ -225,10 +225,10 @@ def movements(
     configurations : ndarray, shape (G, dof)
         Configuration at each goal.
     steps : tuple of int, optional
-        Most steps to each goal. The target of a movement is then beyond the configuration, on the
-        same line, so that the movement hits within these steps. If no such target is found, the
-        target is the configuration. With 0 steps the movement is corrective; it is not made if the
-        hand is already in the goal.
+        Largest number of steps to each goal. The target of a movement is then beyond the
+        configuration, on the same line, so that the movement hits within these steps. If no such
+        target is found, the target is the configuration. With 0 steps the movement is corrective;
+        it is not made if the hand is already in the goal.
 
     Returns
     -------

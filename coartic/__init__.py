@@ -112,6 +112,6 @@ _HOMES = {
     "pictures.trajectories": ("Trajectory", "trajectory"),
 }
 HOME = {name: f"coartic.{module}" for module, names in _HOMES.items() for name in names}
-"""Module of each public name of ``coartic``, by name."""
+"""Maps each public name of ``coartic`` to the module that defines it."""
 
 __getattr__, __dir__ = import_lazily(__name__, HOME)

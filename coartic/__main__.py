@@ -7,8 +7,10 @@ from coartic.internal.interruption import catch_signals, end_if_interrupted
 
 
 def main() -> None:
-    """Run the command that the command line asks for; exit with code 130 after Ctrl-C, 143 after
-    SIGTERM or SIGHUP."""
+    """Run the command that the command line names.
+
+    Exit with code 130 after Ctrl-C, and with code 143 after SIGTERM or SIGHUP.
+    """
     catch_signals()
     gc.set_threshold(100_000, 50, 1_000)  # imported modules stay: collect garbage rarely
     try:

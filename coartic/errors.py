@@ -20,9 +20,9 @@ class SolutionError(CoarticError):
 class NotApplicableError(CoarticError):
     """A method, an exploration condition or a search for hands does not apply.
 
-    It does not fit the task or the first solution.
+    For example, it does not fit the task or the first solution, or the search finds no hands.
     """
 
 
 class MissingExtraError(CoarticError, ImportError):
-    """A package is not installed that comes with an extra such as ``coartic[gym]``."""
+    """A package that comes with an extra, such as ``coartic[gym]``, is not installed."""

@@ -39,7 +39,8 @@ FEWEST = 5
 FEWEST_TASKS = 3
 """Least number of random tasks of a family for an interval or a test over tasks."""
 FEWER_RESAMPLES = 1_999
-"""Number of resamples where they take long: for large samples and over instances."""
+"""Number of resamples where resampling is slow: for large samples, and over instances of
+families."""
 LARGE = 500
 """Largest size of a sample for which a BCa interval is computed. A larger sample has a percentile
 interval of at most :data:`FEWER_RESAMPLES` resamples, which BCa would hardly change."""
@@ -69,7 +70,7 @@ class Estimate:
     """Number of resamples from which p was counted; 0 for an exact test or no test."""
     least_p: float = math.nan
     """Smallest p that the test can give for this number of values. For a bootstrap test this is
-    usually the smallest p of the sign test, and its own p can be smaller."""
+    usually the smallest p of the sign test; the p of the bootstrap test can be smaller."""
 
     def columns(self, name: str) -> dict[str, float]:
         """Return the estimate as three entries of a table's row.
@@ -109,8 +110,8 @@ def slices(count: int, size: int) -> Iterator[slice]:
 def varies(values: Array) -> Array:
     """Return whether values differ along the first axis by more than rounding.
 
-    The result is a bool for each entry of the other axes; False if there is NaN or infinity.
-    :data:`NEGLIGIBLE` says what counts as rounding.
+    The result is a bool for each entry of the other axes. It is False if the values include NaN or
+    infinity. :data:`NEGLIGIBLE` says what counts as rounding.
     """
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
@@ -133,8 +134,8 @@ def mean(values: ArrayLike) -> Estimate:
     Returns
     -------
     Estimate
-        The mean with the interval of :func:`mean_of_means`; its ends are NaN for fewer than
-        :data:`FEWEST` values.
+        The mean with the interval of :func:`mean_of_means`. The ends of the interval are NaN for
+        fewer than :data:`FEWEST` values.
 
     Raises
     ------
@@ -161,8 +162,8 @@ def difference_of_means(first: ArrayLike, second: ArrayLike) -> Estimate:
     Returns
     -------
     Estimate
-        The difference with the interval of :func:`mean_of_means`; its ends are NaN if a sample has
-        fewer than :data:`FEWEST` values.
+        The difference with the interval of :func:`mean_of_means`. The ends of the interval are NaN
+        if a sample has fewer than :data:`FEWEST` values.
 
     Raises
     ------
@@ -245,8 +246,8 @@ def mean_of_means(
 def resample_indices(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
     """Yield the indices of the values drawn in batches of at most 1,000 resamples.
 
-    A batch is a list with an array for each sample, shape ``(batch, size)``; ``sizes`` are the
-    numbers of values in the samples. Equal arguments give equal indices.
+    A batch is a list with an array for each sample, shape ``(batch, size)``. ``sizes`` has the
+    number of values in each sample. Equal arguments give equal indices.
     """
     rng, batch = np.random.default_rng(SEED), 1_000
     if max(sizes) > LARGE:
@@ -259,7 +260,7 @@ def resample_indices(sizes: Sequence[int], resamples: int) -> Iterator[list[NDAr
 def _cached_indices(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.uint16]]]:
     """Return a cached list of all batches of :func:`resample_indices`; do not change it.
 
-    It takes a quarter of the memory of the batches themselves.
+    The indices are stored in 16 bits, which takes a quarter of the memory.
     """
     return [
         [indices.astype(np.uint16) for indices in batch]
@@ -270,7 +271,7 @@ def _cached_indices(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray
 def standard_deviation(values: Array) -> float:
     """Compute the standard deviation of values, shape ``(n,)``, with n - 1 degrees of freedom.
 
-    It is NaN for fewer than two values. For two or more it is 0 if they do not vary
+    The result is NaN for fewer than two values. For two or more values it is 0 if they do not vary
     (:func:`varies`) or include NaN or infinity.
     """
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan

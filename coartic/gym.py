@@ -1,4 +1,4 @@
-"""Tasks and families as environments of Gymnasium. A step reaches for a goal and costs its ticks.
+"""Tasks and families as environments of Gymnasium. A step reaches for a goal and costs ticks.
 
 Importing this module registers the ids :data:`IDS`, such as ``coartic/Ascending-v2``.
 ``coartic/Task-v2`` is for any other task or a family. ``gymnasium.make`` makes an environment,
@@ -45,7 +45,7 @@ except ImportError:
     raise MissingExtraError("coartic.gym needs Gymnasium: pip install 'coartic[gym]'") from None
 
 REACH = 0.5
-"""Half width of the box of targets, length unit (base) and rad (angles)."""
+"""Half width of the box of targets, in length units (base) and rad (angles)."""
 IDS: dict[str, dict[str, Any]] = {
     "coartic/Ascending-v2": {"task": "ascending"},
     "coartic/Descending-v2": {"task": "descending"},
@@ -66,7 +66,7 @@ class TaskEnv(gymnasium.Env):
     """Environment in which a robot makes trials, one after another.
 
     An episode is a trial. A step reaches for the next goal, so a trial has at most as many steps as
-    there are goals. The reward of a step is the negative number of its ticks. If the corrective
+    there are goals. The reward of a step is minus the number of its ticks. If the corrective
     process fails, the reward is -1,000,000 and the trial ends. Trials are never truncated. Nothing
     is random except the draw of an instance of a family.
 
@@ -79,16 +79,16 @@ class TaskEnv(gymnasium.Env):
         Instances of the family: ``"development"`` to train on (the default), ``"test"`` to report
         on, or ``"fresh"`` for those of a ``year``.
     count : int, optional
-        Number of instances of the split, from the first. The default is 1,000 for the development
-        split, and 10 for the others.
+        Number of instances of the split to use, starting with the first. The default is 1,000 for
+        the development split, and 10 for the others.
     year : int, optional
-        Year of fresh instances, such as 2027.
+        Year of the fresh instances, such as 2027.
     ahead : int
         Number of goals in view after the next goal.
     model : MotionModel
         Constants of movement.
     render_mode : {"rgb_array"}, optional
-        Set it to make :meth:`render` return pictures.
+        ``"rgb_array"`` to make :meth:`render` return pictures.
 
     Raises
     ------
@@ -97,14 +97,14 @@ class TaskEnv(gymnasium.Env):
 
     Notes
     -----
-    Joints are the base coordinates (length unit) and the angles of the arms (rad) that can move.
-    The arms are in the order of the task's ``hands``. In a family each arm has the largest number
-    of links that an arm of the family can have.
+    Joints are the base coordinates (in length units) and the angles of the arms (in rad) that can
+    move. The arms are in the order of the task's ``hands``. In a family each arm has the largest
+    number of links that an arm of the family can have.
 
     An observation, float32 of shape ``(O,)``, has
 
     - for the next goal and each goal ahead, 1 if the goal exists, else 0;
-    - x and y of each of these goals relative to the base, length unit; 0 if the goal does not
+    - x and y of each of these goals relative to the base (in length units); 0 if the goal does not
       exist;
     - the values of the joints;
     - in a family whose robots have different numbers of links, for each joint 1 if the robot can
@@ -117,8 +117,8 @@ class TaskEnv(gymnasium.Env):
       0.5 chooses the hand whose posture is nearer in joint space. An entry above 0.5 chooses the
       other hand.
     - The target of the movement is the posture of the chosen hand, plus :data:`REACH` times the
-      entries of the joints. If the process fails, the present posture takes the place of that
-      posture.
+      entries of the joints. If the corrective process fails, the target starts from the present
+      posture instead.
     - Entries of joints that a robot cannot move have no effect.
     """
 
@@ -163,7 +163,7 @@ class TaskEnv(gymnasium.Env):
         self.action_space = Box(-1.0, 1.0, (len(hands) - 1 + joints,), np.float32)
         self.number, self.going = -1, False
         self.outcome = np.nan
-        """Total reward of the last trial that ended, ticks; NaN if it failed or took 1,000,000
+        """Total reward of the last trial that ended (in ticks); NaN if it failed or took 1,000,000
         ticks or more."""
 
     def reset(
@@ -185,7 +185,8 @@ class TaskEnv(gymnasium.Env):
         ndarray, shape (O,)
             First observation.
         dict
-            ``task``, the name of the task, and ``is_success``, True if the trial has hit all goals.
+            Two entries: ``task`` is the name of the task, and ``is_success`` is True if the trial
+            has hit all goals.
 
         Raises
         ------
@@ -219,7 +220,7 @@ class TaskEnv(gymnasium.Env):
         ndarray, shape (O,)
             Observation.
         float
-            Reward: the negative number of ticks.
+            Reward: minus the ticks of this step; −1,000,000 if the goal is missed.
         bool
             True if the trial has ended.
         bool
@@ -273,7 +274,7 @@ class TaskEnv(gymnasium.Env):
         Returns
         -------
         ndarray, shape (400, 600, 3), or None
-            RGB picture; None if the environment was made without ``render_mode``.
+            RGB picture, or None if the environment was made without ``render_mode``.
         """
         if self.render_mode is None:
             return None
@@ -292,7 +293,7 @@ class TaskEnv(gymnasium.Env):
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def _load(self, number: int) -> None:
-        """Prepare trials of task ``number``, from 0."""
+        """Prepare trials of the task with index ``number``."""
         self.tasks[number] = task = as_task(self.tasks[number])
         check_model(self.model, radius=task.radius)
         self.task, self.number, self._goals = task, number, task.goal_array
@@ -316,18 +317,20 @@ class TaskEnv(gymnasium.Env):
         self._found_at_start = self._reached_by(range(len(sides)))
 
     def _reach(self, hand: int, targets: Array) -> NDArray[np.void]:
-        """Reach for the next goal with a hand, and for the goal after it with the first hand.
+        """Reach for the next goal with a hand, and perhaps for the goal after it.
 
-        Return the accounts of both movements. They are made in one call, because each call is slow.
-        ``hand`` is the number of a hand of the task. ``targets`` has shape ``(1, goals, 1, dof)``;
-        without targets (NaN) only the corrective process moves the arm.
+        ``hand`` is the index of a hand in ``task.hands``. ``targets`` has shape ``(1, goals, 1,
+        dof)``, for one or two goals; without a target (NaN) only the corrective process moves the
+        arm. The first hand of the task reaches for the second goal. Return an account for each
+        goal. Both movements are made in one call, because each call is slow.
         """
         goals = self._goals[None, self.goal : self.goal + targets.shape[1]]
         arms = Requests(self.q[None], self._sides[hand], targets, ALL_STOP, goals)
         return reach(self.task.robot, arms, self._parameters).goals[0, :, 0]
 
     def _reached_by(self, hands: range) -> list[Any]:
-        """Return the accounts of hands that reach for the next goal by the corrective process."""
+        """Return the account of each hand if only the corrective process reaches for the next
+        goal."""
         return [self._reach(hand, self._no_targets[:, :1])[0] for hand in hands]
 
     def _seen(self) -> NDArray[np.float32]:
@@ -348,8 +351,8 @@ class SharesOfTicks(gymnasium.RewardWrapper):
     """Wrapper that divides rewards by the ticks of the corrective process.
 
     The divisor is the number of ticks that the process takes for the whole task with the initial
-    hands, at least 1. If the process cannot complete the task, it is 1,000,000. The result is at
-    least -2.
+    hands, at least 1. If the process cannot complete the task, the divisor is 1,000,000. The result
+    is at least -2.
     """
 
     def __init__(self, env: gymnasium.Env) -> None:
@@ -357,7 +360,7 @@ class SharesOfTicks(gymnasium.RewardWrapper):
         self._ticks: dict[int, float] = {}
 
     def reward(self, reward: Any) -> float:
-        """Return a reward in ticks as a share of the divisor."""
+        """Return a reward (in ticks) divided by the divisor, but at least -2."""
         env: Any = self.unwrapped
         if env.number not in self._ticks:
             corrective = initial_reward(env.task, env.model)
@@ -373,7 +376,7 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> Any:
     env : str
         Id, such as ``"coartic/TwoArmed1-v2"``.
     num_envs : int
-        Number of robots.
+        Number of environments.
     **options
         Options of :class:`TaskEnv`.
 
@@ -410,9 +413,9 @@ def score(
     ----------
     env : str, Env, VectorEnv or VecEnv
         Id, or environment of this module. For a family the instances of the test split are scored,
-        unless the options have another ``split``. An environment in wrappers that change
-        observations or actions is used with its wrappers and its own instances. Its trials still
-        count in ticks, and wrappers that normalise do not learn from them.
+        unless the options have another ``split``. An environment with wrappers that change
+        observations or actions keeps its wrappers and its own instances. Its rewards are still in
+        ticks, and wrappers that normalise do not learn from its trials.
     policy : callable, agent, Method or mapping, optional
         One of
 
@@ -423,7 +426,7 @@ def score(
     episodes : int
         Number of trials of random actions on each task.
     seed : int
-        Seed of random actions, of methods and of an environment in wrappers.
+        Seed of random actions, of methods and of an environment with wrappers.
     vec_normalize : str, Path or VecNormalize, optional
         Normalisation of observations: the ``VecNormalize`` of an agent's training, or the file that
         its ``save`` has written (a pickle: open only files that you trust). The default is the
@@ -436,23 +439,27 @@ def score(
     -------
     DataFrame
         A row for each policy, for uniformly random actions, for the corrective process with the
-        task's initial hands, and for the best known solution. Columns:
+        initial hands of each task, and for the best known solution. Columns:
 
-        - ``reward``: mean over tasks, ticks;
+        - ``reward``: mean over tasks (in ticks);
         - ``gap``: difference from the best known reward as a share of it, mean over the tasks whose
           best reward is known;
         - ``gap_low``, ``gap_high``: 95 % interval of the gap (BCa bootstrap) over tasks, or over
           the trials of a single task;
         - ``completed``: share of trials that hit all goals in less than 1,000,000 ticks.
 
-        Reward and gap are NaN for a policy that failed in a trial, and if they are unknown.
+        Reward and gap are NaN for a policy that failed in a trial, and where they are unknown.
         ``attrs["units"]`` has the units.
 
     Raises
     ------
     TypeError
-        The environment is not of this module. Or an agent has other spaces than the environment, or
-        was trained in wrappers that this environment does not have.
+        One of these is the case:
+
+        - the environment is not of this module;
+        - an agent has other spaces than the environment;
+        - an agent was trained with wrappers that the environment does not have;
+        - a wrapper does not pass on the options of ``reset``.
     ValueError
         An option is wrong, a policy has the name of another row, or observations would be
         normalised twice.
@@ -525,7 +532,8 @@ def score(
 def _square(difference: Array) -> float:
     """Return the sum of squares of a vector, added one by one.
 
-    Sums of NumPy would round differently, and mirrored postures must have equal distances.
+    NumPy groups the terms by position, so the distances to two mirrored postures, which must be
+    equal, could differ by rounding.
     """
     square = 0.0
     for value in difference.tolist():
@@ -540,7 +548,7 @@ def _is_family(task: Any) -> bool:
 def _layers(env: Any) -> list[Any]:
     """List the layers of an environment, from the outermost wrapper to the environment inside.
 
-    For a vector environment they are those of its first environment. Raises TypeError if its
+    For a vector environment these are the layers of its first environment. Raises TypeError if its
     environments have different options.
     """
     layers = [env]
@@ -583,7 +591,7 @@ def _actions_of(
     Raises
     ------
     TypeError
-        The agent was trained with other spaces or wrappers.
+        The agent was trained with other spaces or wrappers than ``env`` has.
     """
     normalised = any(map(_normalises, wrappers))
     if normal is None and not normalised:
@@ -619,8 +627,8 @@ def _actions_of(
 def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int = 1) -> Array:
     """Make trials side by side on each task of an environment.
 
-    ``act`` returns actions ``(n, A)`` for observations ``(n, O)``. The result has the total
-    rewards, ticks, shape ``(tasks, trials)``; NaN for a trial that failed.
+    ``act`` returns actions ``(n, A)`` for observations ``(n, O)``. The result, shape ``(tasks,
+    trials)``, has the total rewards (in ticks), and NaN for trials that failed.
     """
     robots = [copy(setting) for _ in range(trials * len(setting.tasks))]
     seen = [robot.reset(options={"task": n // trials})[0] for n, robot in enumerate(robots)]
@@ -637,10 +645,11 @@ def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int = 1) 
 
 
 def _wrapped_trial(act: Callable[[Any], ArrayLike], env: Any, number: int, seed: int) -> float:
-    """Make a trial on a task in an environment with wrappers, and return its total reward, ticks.
+    """Make one trial in a wrapped environment, and return its total reward (in ticks).
 
-    In a vector environment the first environment makes the trial. The result is NaN if the trial
-    failed or was truncated. ``number`` is that of the task, from 0.
+    ``act`` maps observations ``(N, O)`` to actions ``(N, A)``. In a vector environment the first
+    environment makes the trial. The result is NaN if the trial failed or was truncated. ``number``
+    is the index of the task. Raises TypeError if a wrapper drops the options of ``reset``.
     """
     inner, is_one = _layers(env)[-1], isinstance(env, gymnasium.Env)
     options: dict[str, Any] = {"task": number}
@@ -665,7 +674,8 @@ def _wrapped_trial(act: Callable[[Any], ArrayLike], env: Any, number: int, seed:
 
 @contextmanager
 def _not_learning(env: Any) -> Iterator[None]:
-    """Prevent wrappers from updating the means with which they normalise, in a ``with`` block."""
+    """In a ``with`` block, prevent wrappers from updating the statistics with which they
+    normalise."""
     learning = [
         (layer, name, getattr(layer, name))
         for layer in _layers(env)
@@ -692,8 +702,8 @@ def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> flo
 def _table(rewards: Mapping[str, Array]) -> pd.DataFrame:
     """Return the table of :func:`score` from the rewards of its rows.
 
-    The rewards have shape ``(tasks, trials)``, in ticks; NaN for a failed trial or an unknown
-    reward. The last row is the best known one.
+    The rewards (in ticks) have shape ``(tasks, trials)``, with NaN for a failed trial or an unknown
+    reward. The last row has the best known rewards.
     """
     (*_, best), rows = rewards.values(), {}
     known = np.isfinite(best[:, 0])

@@ -8,9 +8,9 @@ from coartic.internal.limits import brief_value, check_limits
 
 MODEL_VERSION = 1
 """Version of the code that computes results: robot, movement, session, objective, optimisers,
-scoring. It is raised with every change of results."""
+scoring. Every change of the code that changes results raises this number."""
 PAPER_RADIUS = 0.1
-"""θ^g of the paper's tasks, length unit."""
+"""θ^g of the paper's tasks (in length units)."""
 
 
 class MotionModel(NamedTuple):
@@ -25,36 +25,38 @@ class MotionModel(NamedTuple):
     much as a rad of a joint (published). The last step may be shorter."""
 
     arrival_tolerance: float | None = None
-    """θ^a: a hand has arrived if it is within this distance of the position to which its target
-    brings it, length unit. None stands for a tenth of the goals' radius, which is 0.01 in the
+    """θ^a: a hand has arrived if it is within this distance (in length units) of the position to
+    which its target brings it. None stands for a tenth of the goals' radius, which is 0.01 in the
     paper's tasks (inferred: the extracted text has 0.1, which does not give the published rewards).
     """
 
     gain: float = 0.05
-    """α: step size of the corrective process, ``q += α Jᵀ e`` (published). It has no unit for the
+    """α: step size of the corrective process, ``q += α Jᵀ e`` (published). α has no unit for the
     base; for the joints its unit is rad² per squared length unit."""
 
     correction_tolerance: float | None = None
-    """Distance from the goal's centre at which the corrective process ends, length unit. None
+    """Distance from the goal's centre (in length units) at which the corrective process ends. None
     stands for a tenth of the goals' radius (inferred to be θ^a; the caption of Figure 2 has θ^g).
     """
 
     max_iterations: int = 20_000
-    """Most iterations of the corrective process for a goal (our bound). A trial that needs more
-    fails."""
+    """Largest number of iterations of the corrective process for a goal (our bound). A trial that
+    needs more fails."""
 
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
-        """Return a copy with the tolerances for goals of a radius, length unit.
+        """Return a copy with the tolerances for goals of a given radius.
 
-        A tolerance of None becomes a tenth of ``radius``.
+        ``radius`` is in length units. In the copy a tenth of ``radius`` takes the place of a
+        tolerance of None.
         """
         arrival, correction = self.tolerances(radius)
         return self._replace(arrival_tolerance=arrival, correction_tolerance=correction)
 
     def tolerances(self, radius: float) -> tuple[float, float]:
-        """Return the tolerances of arrival and of correction, length unit, for a radius.
+        """Return the tolerances of arrival and of correction, in length units.
 
-        A tolerance of None is a tenth of ``radius``, the radius of the goals, length unit.
+        ``radius`` is that of the goals, in length units. Where the model's tolerance is None, a
+        tenth of ``radius`` is returned.
         """
         tenth, arrival, correction = radius / 10, self.arrival_tolerance, self.correction_tolerance
         return (
@@ -80,8 +82,8 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
     ----------
     model : MotionModel
     radius : float, optional
-        Radius of the goals, length unit. If it is passed, ``correction_tolerance`` has to be below
-        it.
+        Radius of the goals (in length units). If you pass it, ``correction_tolerance`` has to be
+        below it.
 
     Raises
     ------

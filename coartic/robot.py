@@ -29,12 +29,13 @@ Hand = Literal["left", "right"]
 """Name of a hand: ``"left"`` or ``"right"``."""
 Array = NDArray[np.float64]
 Configs = NDArray[np.float64]
-"""Configurations, shape ``(..., dof)``: base x and y (length unit), then joint angles (rad)."""
+"""Configurations, shape ``(..., dof)``: base x and y (in length units), then joint angles (in
+rad)."""
 Points = NDArray[np.float64]
-"""Points in the plane, shape ``(..., 2)``: x and y, length unit."""
+"""Points in the plane, shape ``(..., 2)``: x and y in length units."""
 Hands = NDArray[np.int64]
 """Hands as indices in :data:`HANDS`: 0 left, 1 right."""
-LARGEST_FIGURE = 1e4  # largest number in a task or a robot, length unit or rad
+LARGEST_FIGURE = 1e4  # largest number in a task or a robot, in length units or rad
 MOST_LINKS = 100  # of an arm
 Finite = Annotated[
     float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_FIGURE, le=LARGEST_FIGURE)
@@ -52,11 +53,11 @@ class Arm(NamedTuple):
     first_joint: int
     """Index in ``q`` of the angle of the arm's first joint."""
     links: Any
-    """Lengths of the links from shoulder to hand, shape ``(n,)``, length unit."""
+    """Lengths of the links from shoulder to hand, shape ``(n,)``, in length units."""
     shoulder_x: float
-    """x of the shoulder, measured from the centre of the base, length unit."""
+    """x of the shoulder, measured from the centre of the base (in length units)."""
     shoulder_y: float
-    """y of the shoulder, measured from the centre of the base, length unit."""
+    """y of the shoulder, measured from the centre of the base (in length units)."""
 
 
 def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
@@ -69,7 +70,7 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
     arm : Arm
         The arm, with n links.
     xs, ys : array or list, length n + 1
-        Filled with x and y, length unit. Entry 0 is the shoulder, entry n the hand.
+        Filled with x and y in length units. Entry 0 is the shoulder, entry n the hand.
     cos, sin : callable
         Cosine and sine for the type of ``q``.
 
@@ -91,10 +92,10 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
 
 
 def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
-    """Compute the derivative of an arm's point by the angle of one of its joints.
+    """Compute the derivative of a point of an arm with respect to a joint angle.
 
-    A rotation about a joint moves the point at right angles to the line between them. The result is
-    a column of the geometric Jacobian.
+    A rotation about the joint moves the point at right angles to the line between joint and point.
+    The result is a column of the geometric Jacobian.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     Returns
     -------
     dx, dy
-        Derivatives of the point's x and y, length unit per rad.
+        Derivatives of the point's x and y, in length units per rad.
     """
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
 
@@ -120,34 +121,36 @@ class Robot:
     1). That the shoulders are on the top corners of the box is inferred: only a height of +0.1
     gives the published initial rewards of the one-armed tasks (docs/model.md).
 
-    A configuration ``q`` has shape ``(dof,)``: x and y of the base (length unit), the joint angles
-    of the left arm and the joint angles of the right arm (rad, each from the link before). Methods
-    that take arrays accept one configuration or many, shape ``(..., dof)``. They raise ValueError
-    if ``q`` has another shape or is not finite, or if a hand is neither ``"left"`` nor ``"right"``.
+    A configuration ``q`` has shape ``(dof,)``: x and y of the base (in length units), the joint
+    angles of the left arm and the joint angles of the right arm (in rad, each measured from the
+    link before). Methods that accept arrays accept one configuration or many, shape ``(..., dof)``.
+    They raise ValueError if ``q`` has another shape or is not finite, or if a hand is neither
+    ``"left"`` nor ``"right"``.
     """
 
     left_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
-    """Lengths of the links of the left arm from the shoulder outwards, length unit."""
+    """Lengths of the links of the left arm from the shoulder outwards (in length units)."""
     right_links: _Lengths = (1.0, 1.0, 1.0, 1.0)
-    """Lengths of the links of the right arm from the shoulder outwards, length unit."""
+    """Lengths of the links of the right arm from the shoulder outwards (in length units)."""
     left_shoulder: tuple[Finite, Finite] = (-0.5, 0.1)
-    """x and y of the left shoulder, measured from the centre of the base, length unit."""
+    """x and y of the left shoulder, measured from the centre of the base (in length units)."""
     right_shoulder: tuple[Finite, Finite] = (0.5, 0.1)
-    """x and y of the right shoulder, measured from the centre of the base, length unit."""
+    """x and y of the right shoulder, measured from the centre of the base (in length units)."""
     base_size: tuple[Length, Length] = (1.0, 0.2)
-    """Width and height of the base, length unit, for drawings only. The default fits arms of length
-    4 and is drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
+    """Width and height of the base (in length units), for drawings only. The default fits arms of
+    length 4 and is drawn in proportion to the shorter arm (:attr:`drawn_base`)."""
 
     @cached_property
     def scale(self) -> float:
-        """Scale of drawings: the length of the shorter arm, divided by the paper's 4."""
+        """Scale of drawings: the length of the shorter arm divided by 4, the length of the paper's
+        arms."""
         return min(math.fsum(self.left_links), math.fsum(self.right_links)) / 4.0
 
     @property
     def drawn_base(self) -> tuple[float, float]:
-        """Width and height of the base in drawings, length unit.
+        """Width and height of the base in drawings (in length units).
 
-        This is :attr:`base_size`. If it is the default, it is multiplied by :attr:`scale`.
+        This is :attr:`base_size`, unless that is the default, which is multiplied by :attr:`scale`.
         """
         width, height = self.base_size
         is_default = self.base_size == type(self).__dataclass_fields__["base_size"].default
@@ -194,8 +197,8 @@ class Robot:
     def joints(self, hand: Hand) -> slice:
         """Return the slice of a configuration that holds the joint angles of a hand's arm.
 
-        ``q[..., robot.joints("left")]`` has shape ``(..., n)``, rad. Raises ValueError for an
-        unknown hand.
+        ``q[..., robot.joints("left")]`` has shape ``(..., n)`` and is in rad. Raises ValueError for
+        an unknown hand.
         """
         arm = self.arm(hand)
         return slice(arm.first_joint, arm.first_joint + len(arm.links))
@@ -203,7 +206,8 @@ class Robot:
     def reach(self, hand: Hand) -> tuple[float, float]:
         """Return the smallest and the largest distance of a hand from its shoulder.
 
-        Both are in length units. Joints have no limits. Raises ValueError for an unknown hand.
+        Both distances are in length units. They assume that joints have no limits. Raises
+        ValueError for an unknown hand.
         """
         links = self.arm(hand).links.tolist()
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
@@ -219,7 +223,7 @@ class Robot:
         Returns
         -------
         ndarray, shape (..., 2)
-            Positions of the hand, x and y, length unit.
+            Positions of the hand, x and y in length units.
 
         Raises
         ------
@@ -240,7 +244,7 @@ class Robot:
         Returns
         -------
         ndarray, shape (..., n + 1, 2)
-            x and y from the shoulder to the hand of an arm with n links, length unit.
+            x and y from the shoulder to the hand of an arm with n links (in length units).
 
         Raises
         ------
@@ -261,8 +265,8 @@ class Robot:
         Returns
         -------
         ndarray, shape (..., 2, dof)
-            Derivatives of x and y by each entry of ``q``: length unit per length unit (base) and
-            per rad (joints). Columns of the other arm's joints are zero.
+            Derivatives of x and y with respect to each entry of ``q``, in length units per length
+            unit (base) and per rad (joints). Columns of the other arm's joints are zero.
 
         Raises
         ------
@@ -272,7 +276,7 @@ class Robot:
         return self.linearised(q, hand)[1]
 
     def linearised(self, q: ArrayLike, hand: Hand) -> tuple[Array, Array]:
-        """Compute the position of a hand and its Jacobian at once.
+        """Compute the position of a hand and its Jacobian together.
 
         Parameters
         ----------
@@ -282,9 +286,9 @@ class Robot:
         Returns
         -------
         position : ndarray, shape (..., 2)
-            As :meth:`forward_kinematics` returns it, length unit.
+            The result of :meth:`forward_kinematics`, in length units.
         jacobian : ndarray, shape (..., 2, dof)
-            As :meth:`jacobian` returns it.
+            The result of :meth:`jacobian`.
 
         Raises
         ------
@@ -312,7 +316,7 @@ class Robot:
         Returns
         -------
         ndarray, shape (..., 4, 2)
-            The corners, counter-clockwise from the lower left one, length unit.
+            The corners, counter-clockwise from the lower left one (in length units).
 
         Raises
         ------
@@ -335,7 +339,7 @@ class Robot:
         Returns
         -------
         CasADi matrix, 2 x 1
-            x and y, length unit.
+            x and y in length units.
 
         Raises
         ------
@@ -356,8 +360,8 @@ class Robot:
     def symbolic_hand_jerk(self, q: Sequence[Any], hand: Hand) -> Any:
         """Return the third time derivative of a hand's position as a CasADi expression.
 
-        It is written out, because the Hessians of CasADi's third derivatives have twice as many
-        operations.
+        The formula is written out by hand, because the Hessians of CasADi's own third derivatives
+        have twice as many operations.
 
         Parameters
         ----------
@@ -368,7 +372,7 @@ class Robot:
         Returns
         -------
         SX expression, 2 x 1
-            The jerk in x and y, length unit per cubed unit of time.
+            The jerk in x and y, in length units per cubed unit of time.
 
         Raises
         ------

@@ -1,4 +1,4 @@
 """Internal code that the packages share: limits, messages, files and processes.
 
-It does not import tasks, robots or methods.
+The modules here do not import tasks, robots or methods.
 """

@@ -23,15 +23,15 @@ _STRICT = ConfigDict(strict=True, arbitrary_types_allowed=True)
 
 
 class ArgumentError(CoarticError, ValueError, TypeError):
-    """A function does not accept an argument."""
+    """Error of a call with an argument that is missing, unknown or of the wrong type or value."""
 
 
 def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:
     """Decorate a function to check its arguments before each call.
 
-    The decorated function raises ArgumentError for an argument that does not match its type hint, a
-    missing argument and an unknown argument. Scalars of NumPy are accepted as those of Python.
-    Strings, True and False are not accepted as numbers.
+    The decorated function raises ArgumentError if an argument does not match its type hint, is
+    missing or is unknown. NumPy scalars are accepted like Python numbers. Strings, True and False
+    are not accepted as numbers.
     """
     names = [*inspect.signature(function).parameters]
 

@@ -40,12 +40,13 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
     folder : Path
         Folder, which is made if it is missing.
     files : mapping
-        Contents by path in the folder.
+        Content of each file, by its path in the folder.
 
     Raises
     ------
     CoarticError
-        The folder cannot be used (:func:`make_folder`; then nothing is written), or writing fails.
+        Writing fails, or the folder cannot be used (:func:`make_folder`). In the second case
+        nothing is written.
     """
     old_files = make_folder(folder, files)
 
@@ -120,7 +121,7 @@ def check_inside(folder: Path, path: Path) -> None:
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
     """Write a file that a user asked for, after :func:`check_output`.
 
-    Raises CoarticError if the file must not be replaced, or if writing fails.
+    Raises CoarticError if the file exists and ``replace`` is False, or if writing fails.
     """
     check_output(path, replace=replace)
     with errors_in_words(path):
@@ -136,8 +137,10 @@ def check_ending(path: Path, endings: Collection[str]) -> None:
 
 
 def check_output(path: Path, *, replace: bool) -> None:
-    """Raise CoarticError if the folder of a file is missing, or if the file must not be
-    replaced."""
+    """Raise CoarticError if a file cannot be written to a path.
+
+    This is so if the file's folder is missing, or if the file exists and ``replace`` is False.
+    """
     with errors_in_words(path):
         if not path.parent.is_dir():
             raise CoarticError(f"{path} cannot be written: the folder {path.parent} does not exist")
@@ -151,7 +154,7 @@ def check_output(path: Path, *, replace: bool) -> None:
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
     """Return the name of a file or folder, which need not exist, as a path.
 
-    Raises CoarticError for an empty name. The message begins with ``what``.
+    Raises CoarticError for an empty name. The error message begins with ``what``.
     """
     if not str(name).strip():
         raise CoarticError(f"{what} is empty; for the current folder write a dot")
@@ -160,7 +163,8 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
 
 @contextlib.contextmanager
 def errors_in_words(path: Path) -> Iterator[None]:
-    """Turn an OSError of the block into a CoarticError: a path cannot be written."""
+    """Turn an OSError of the block into a CoarticError which says that ``path`` cannot be
+    written."""
     try:
         yield
     except OSError as error:

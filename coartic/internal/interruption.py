@@ -1,7 +1,7 @@
 """End an interrupted command with a short message, and exit code 130 or 143.
 
-Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt. So ``with`` blocks can end their workers and
-remove their temporary folders.
+Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt, so that ``with`` blocks can end their workers
+and remove their temporary folders.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def catch_signals() -> None:
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
     """Add a sentence to the message of :func:`end_if_interrupted` if the block is interrupted.
 
-    Function ``sentence`` returns the sentence. The KeyboardInterrupt is raised again.
+    The function ``sentence`` returns the sentence. The KeyboardInterrupt is raised again.
     """
     try:
         yield
@@ -54,8 +54,8 @@ def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
 def end_if_interrupted() -> None:
     """Exit with a message on stderr if a signal has interrupted this process.
 
-    The exit code is 130 if the first signal was Ctrl-C, else 143. In any case the process ignores
-    the signals :data:`ENDING` from now on.
+    The exit code is 130 if the first signal was Ctrl-C, else 143. Whether or not there was a
+    signal, the process ignores the signals :data:`ENDING` from now on.
     """
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)

@@ -21,7 +21,7 @@ def import_lazily(
     package : str
         Name of the package.
     homes : mapping
-        The module that defines a name, by name.
+        Maps each name to the module that defines it.
 
     Returns
     -------

@@ -13,26 +13,26 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MOST_CELLS = 10_000
-"""Most cells of a suite."""
+"""Largest number of cells of a suite."""
 MOST_RUNS = 1_000_000
-"""Most runs of a cell."""
+"""Largest number of runs of a cell."""
 MOST_TRIALS = 10_000_000
-"""Most trials of a run, whose rewards are all stored."""
+"""Largest number of trials of a run. The rewards of all trials are stored."""
 MOST_SECONDS = 1_000_000
-"""Longest time limit, s. Systems can wait for about twice this time."""
+"""Longest time limit (in s). Operating systems can wait for about twice this time."""
 MOST_SEED = 2**63 - 1
 """Largest seed of a suite."""
 MOST_RUN_SEED = 2**128 - 1
 """Largest seed of a run."""
 WIDTHS = (1e-9, 100.0)
-"""Least and greatest half width of a box of targets, length unit (base) and rad (joints)."""
+"""Least and greatest half width of a box of targets, in length units (base) and rad (joints)."""
 
 
 def check_limits(name: str, value: Any, least: float, most: float) -> None:
     """Raise ValueError if a value is not a number from ``least`` to ``most``.
 
     Both ends are allowed. The value must be an integer (not 3.0) if ``least`` is an ``int``. True
-    and False are not numbers. The message begins with ``name``.
+    and False are not numbers. The error message begins with ``name``.
     """
     is_integer = isinstance(least, int)
     kind = numbers.Integral if is_integer else numbers.Real
@@ -47,7 +47,7 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def plain_values(value: Any) -> Any:
-    """Replace scalars of NumPy by those of Python, also in lists, tuples and dictionaries.
+    """Replace NumPy scalars by Python numbers, also in lists, tuples and dictionaries.
 
     Lists, tuples and dictionaries are copied, and keys are not replaced. Subclasses of these types
     are returned unchanged.
@@ -66,7 +66,7 @@ def plain_values(value: Any) -> Any:
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
     """Return real numbers as an array of float64 (:func:`real_numbers`).
 
-    Raises ValueError for other values. The message begins with ``name``.
+    Raises ValueError for other values. The error message begins with ``name``.
     """
     try:
         return real_numbers(value)

@@ -16,9 +16,9 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 LONGEST_LINE = 500
-"""Most characters of a title, a description or a citation."""
+"""Largest number of characters of a title, a description or a citation."""
 LONGEST_REASON = 2000
-"""Most characters of a stored reason."""
+"""Largest number of characters of a stored reason."""
 _MOST_NAMED = 12  # most names in a sentence
 
 
@@ -65,9 +65,10 @@ def counted(count: int, thing: str) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return ``; did you mean 'a'?`` with the most similar of ``names``, ignoring case.
+    """Return a hint, such as ``; did you mean 'a'?``, with the most similar name.
 
-    Return an empty string if no name is similar.
+    The hint names the entry of ``names`` that is most similar to ``name``, ignoring case. Return an
+    empty string if no name is similar.
     """
     by_lower_case = {known.lower(): known for known in names}
     nearest = difflib.get_close_matches(name.lower(), by_lower_case, 1)
@@ -78,14 +79,14 @@ FOREIGN = (
     *(".urdf", ".xml", ".osim", ".mot", ".sto", ".trc"),
     *(".c3d", ".mat", ".xlsx", ".xls", ".ods"),
 )
-"""Endings of files of robots and recordings from other programs."""
+"""Suffixes of files in which other programs store robots or recordings."""
 
 
 def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto/task.md") -> str:
-    """Return a sentence if a file is from another program, by its ending (:data:`FOREIGN`).
+    """Return a sentence if the suffix of a file is one of another program (:data:`FOREIGN`).
 
-    ``wanted`` is the end of the sentence, on files that coartic reads. Return an empty string for
-    any other file.
+    The end of the sentence is ``wanted``, which says what coartic reads instead. Return an empty
+    string for any other file.
     """
     if not path.lower().endswith(FOREIGN):
         return ""
@@ -96,9 +97,10 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """Return an error message for an unknown name.
 
-    It suggests the most similar of ``names``. If no name is similar, it lists the first 12 names.
-    For a file from another program it is the sentence of :func:`foreign_file`. ``kind`` is what the
-    name stands for, such as ``task``.
+    The message suggests the most similar of ``names``. If no name is similar, it lists the first 12
+    names. If ``name`` is the name of a file from another program, such as ``arm.urdf``, the message
+    is the sentence of :func:`foreign_file` instead. ``kind`` is what the name stands for, such as
+    ``task``.
     """
     if isinstance(name, str) and (sentence := foreign_file(name)):
         return f"{sentence}."

@@ -30,8 +30,9 @@ ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
 def worker_variables() -> dict[str, str]:
     """Return the environment variables of processes in which methods run.
 
-    They set one thread. On x86-64 they also select OpenBLAS's kernels for Nehalem and NumPy's loops
-    without AVX-512, so that all processors with AVX2 (from Haswell and Zen on) round alike.
+    The variables limit numerical libraries to one thread. On x86-64 they also select OpenBLAS's
+    kernels for Nehalem and NumPy's loops without AVX-512, so that all processors with AVX2 (from
+    Haswell and Zen on) round alike.
     """
     if platform.machine() not in ("x86_64", "AMD64"):
         return ONE_THREAD
@@ -45,8 +46,8 @@ def worker_variables() -> dict[str, str]:
 def threads_for(jobs: int) -> int:
     """Return the number of threads or processes for a parameter ``jobs``.
 
-    It is ``jobs``, an integer from 1 to 10,000, or for -1 the number of cores that the process may
-    use. Raises ValueError for anything else.
+    For an integer from 1 to 10,000 this is ``jobs`` itself. For -1 it is the number of cores that
+    the process may use. Raises ValueError for anything else.
     """
     if not (isinstance(jobs, Integral) and jobs == -1):
         from coartic.internal.limits import check_limits  # imports NumPy
@@ -70,8 +71,9 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
     count : int
         Number of indices, from 0.
     least : int
-        Least number of indices of a slice, unless there is only one slice. There are at most as
-        many slices as variable ``OMP_NUM_THREADS`` says, or else as the process may use cores.
+        Least number of indices of a slice, unless there is only one slice. The number of slices is
+        at most the environment variable ``OMP_NUM_THREADS`` or, if that is not set to a number, the
+        number of cores that the process may use.
     """
     if count < 2 * least:
         work(slice(0, count))
@@ -86,8 +88,10 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
 
 @contextlib.contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables for processes that start in this block, and restore them after
-    it."""
+    """Set environment variables during a ``with`` block, for processes that start in it.
+
+    Afterwards the variables have their earlier values.
+    """
     old_values = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)
     try:
@@ -128,7 +132,8 @@ def end_with_parent(
 ) -> None:
     """Start a thread that ends this process when its parent (by ``multiprocessing``) has ended.
 
-    The thread removes ``folder``, if there is one, and calls ``end``.
+    Before that the thread removes ``folder``, if one is passed. To end the process it calls
+    ``end``.
     """
 
     def wait() -> None:

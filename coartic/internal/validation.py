@@ -19,7 +19,11 @@ _UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 
 def in_sentences(kind: type[T]) -> type[T]:
-    """Decorate a pydantic class to raise ValueError with one sentence (:func:`explain`)."""
+    """Decorate a pydantic class to raise ValueError with one sentence for invalid data.
+
+    Calling the decorated class with invalid data raises a ValueError with the sentence of
+    :func:`explain`, not a ValidationError. ``model_validate`` is not changed.
+    """
     init: Any = kind.__init__
 
     @wraps(init)
@@ -35,7 +39,7 @@ def in_sentences(kind: type[T]) -> type[T]:
 
 
 def equal_contents(a: Any, b: Any) -> Any:
-    """Compare two objects field by field, as the ``__eq__`` of classes with arrays.
+    """Compare two objects field by field: the ``__eq__`` of classes with arrays.
 
     Arrays are equal if their shapes and entries are. NaN is equal to NaN and to a masked entry.
     Return NotImplemented for objects of different classes.
@@ -84,6 +88,7 @@ def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool =
     Returns
     -------
     str
+        The sentence.
     """
     problems = error.errors(include_url=False)
     # A misspelt key explains a missing one.

@@ -19,9 +19,9 @@ to base and chosen arm, where
 - N = I − J⁺J projects onto the null space of the chosen hand's Jacobian; like the paper's distance,
   it mixes lengths and angles.
 
-Ablations go beyond the paper as well. One does not correct a movement to a stored target that
-misses. The other learns from the reward of each subtask instead of the overall reward, which the
-paper calls crucial.
+Ablations go beyond the paper as well. In one, the corrective process does not correct movements to
+stored targets that miss. The other learns from the reward of each subtask instead of the overall
+reward, which the paper calls crucial.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ METHOD_PREFIX = "dual-process/"
 """Beginning of the name of each method that is the learner under a condition; the id of the
 condition follows."""
 MOST_NOISE = 100.0
-"""Largest standard deviation of noise, length unit and rad; no arm can use more."""
+"""Largest standard deviation of noise that is accepted, in length units and rad."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Drift = Annotated[float, Field(ge=0, le=10)]
 
@@ -60,7 +60,8 @@ Drift = Annotated[float, Field(ge=0, le=10)]
 def _one_or_many(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
     """Validate a drift: a number, or a tuple of numbers.
 
-    Raises one validation error for any other value, instead of an error for each form.
+    Raises one validation error for any other value, instead of one for a number and one for a
+    tuple.
     """
     try:
         return validate(value)
@@ -110,10 +111,11 @@ class ExplorationCondition:
     epsilon: Share = 0.2
     """ε: probability with which the hand for a goal is explored (published)."""
     noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
-    """Standard deviation of the noise η, length unit (base) and rad (joints) (published)."""
+    """Standard deviation of the noise η (published), in length units (base) and rad (joints)."""
     corrects: bool = True
-    """True if **A** corrects a goal that a movement to a stored target misses. If False, such a
-    trial fails, and **A** acts only in trial 0 and for states and hands without a stored target."""
+    """True if the corrective process **A** acts when a movement to a stored target misses its goal.
+    If False, such a trial fails, and **A** acts only in trial 0 and for states and hands without a
+    stored target."""
     learned: Literal["best", "replay"] = "best"
     """Solution of a run: its best trial (``"best"``), or the noiseless greedy trial after the last
     one (``"replay"``)."""
@@ -122,18 +124,19 @@ class ExplorationCondition:
     of that goal (``"subtask"``, see ``discount``)."""
     discount: Share = 0.0
     """γ: the return of goal g is Σ γ^|h − g| r_h, where r_h is the reward of the movements to goal
-    h. With 0 this is the reward of the subtask itself. A value above 0 needs credit ``"subtask"``.
+    h. With γ = 0 the return is the reward of the subtask itself. A value above 0 needs credit
+    ``"subtask"``.
     """
     counted: Literal["later", "all"] = "later"
     """Goals h in the sum for the return of goal g: g and later goals (``"later"``), or all goals
     (``"all"``, which needs credit ``"subtask"``). With ``"all"`` and γ = 1 every return is R."""
     drift: Drifts = 0.0
-    """κ of informed exploration: by what share of the path to the preferred posture, in the null
-    space of the hand, the mean of exploration moves. If there are many numbers, each trial after
-    trial 0 draws one."""
+    """κ of informed exploration. The mean of exploration moves by this share of the path to the
+    preferred posture, in the null space of the hand. If κ is a tuple, each trial after trial 0
+    draws one of its numbers."""
     pull: Share = 0.0
-    """β of informed correction: the share of the path to the preferred posture, in the null space
-    of the hand, that each iteration of the corrective process adds after trial 0."""
+    """β of informed correction. After trial 0, each iteration of the corrective process adds this
+    share of the path to the preferred posture, in the null space of the hand."""
     direction: Literal["next-goal", "stay", "start"] = "next-goal"
     """The preferred posture:
 
@@ -167,21 +170,21 @@ class ExplorationCondition:
 
     @property
     def drifts(self) -> tuple[float, ...]:
-        """The field ``drift``, κ, as a tuple; a single number becomes a tuple of one."""
+        """The field ``drift`` (κ) as a tuple. A single number becomes a tuple of one number."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     @property
     def is_informed(self) -> bool:
         """True if a preferred posture informs exploration or correction.
 
-        That is, if a drift or ``pull`` is not 0.
+        This is so if a drift or ``pull`` is not 0.
         """
         return any(self.drifts) or self.pull > 0
 
     def why_not(self, task: Task | Outline) -> str | None:
         """Return a sentence on why the condition does not apply to a task's hands.
 
-        None if it applies.
+        Return None if the condition applies.
         """
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:
@@ -234,7 +237,7 @@ EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """Return the exploration condition with an id such as ``"EC4"`` or ``"dual-process/EC4"``.
+    """Return an exploration condition by its id, such as ``"EC4"`` or ``"dual-process/EC4"``.
 
     A condition is returned unchanged. Raises CoarticError for an unknown id, and TypeError for an
     object that is neither a string nor a condition.

@@ -1,10 +1,11 @@
 """The dual-process learner: trial and error on top of the corrective process.
 
-This is the paper's section *The Learning Process* and Figure 3. At each goal of a trial the learner
-chooses a hand, perturbs the stored target configuration and moves there; the corrective process
-finishes where the goal was missed (:mod:`coartic.motion.trial`). If the trial is better than any
-earlier trial that passed through the same state and hand, it replaces what is stored there. Trials
-are compared by their total reward or, in an ablation, by the return of the goal.
+The module implements the paper's section *The Learning Process* and Figure 3. At each goal of a
+trial the learner chooses a hand, perturbs the stored target configuration and moves there. If the
+goal was missed, the corrective process **A** finishes (:mod:`coartic.motion.trial`). If the trial
+is better than any earlier trial that passed through the same state and hand, it replaces the value
+and the target that are stored for this state and hand. Trials are compared by their total reward
+or, in an ablation, by the return of the goal.
 
 One call of a compiled kernel, by :mod:`coartic.learner.learning`, makes many runs side by side,
 goal by goal and trial by trial. Each run draws from its own NumPy generator (``default_rng(seed)``,
@@ -14,7 +15,7 @@ PCG64), in this order:
    picks one;
 2. for each goal of each trial after trial 0, if hands are explored: a uniform number that is
    compared with ε;
-3. if it is below ε and the pick is random: a uniform number that picks a hand;
+3. if that number is below ε and a hand is picked at random: a uniform number that picks it;
 4. if a target is stored: a standard normal number per explored joint, in the order of ``q``.
 
 Runs share nothing, so that the result of a run depends neither on the other runs nor on their
@@ -80,7 +81,7 @@ _NEAREST_POSTURE = 3
 _EXPLORATION = {"none": 0, "random": _RANDOM, "closest": 2, "nearest-posture": _NEAREST_POSTURE}
 _NEXT_GOAL, _STAY = 0, 1
 _DIRECTION = {"next-goal": _NEXT_GOAL, "stay": _STAY, "start": 2}
-_EQUALLY_NEAR = 1e-9  # difference of distances that counts as rounding, length unit
+_EQUALLY_NEAR = 1e-9  # difference of distances that counts as rounding, in length units
 TENTHS = 10
 """Number of parts of the trials after trial 0 for which corrections are counted separately."""
 Flags = NDArray[np.bool_]
@@ -90,7 +91,7 @@ class LearnerParameters(NamedTuple):
     """A task and an exploration condition in the form that the kernel reads."""
 
     start: Configs
-    """Configuration at the start of a trial, shape ``(dof,)``, length unit and rad."""
+    """Configuration at the start of a trial, shape ``(dof,)``, in length units and rad."""
     goals: Points
     """Centres of the goals, shape ``(G, 2)``."""
     first_hands: Hands
@@ -101,16 +102,16 @@ class LearnerParameters(NamedTuple):
     hands: Hands
     """Hands that may be used, shape ``(1,)`` or ``(2,)``."""
     follows: Flags
-    """True if the target of a joint becomes its current value, shape ``(2, width)``, for each
+    """True if the current value of a joint becomes its target, shape ``(2, width)``, a row for each
     chosen hand."""
     explored: Flags
-    """True if a joint is perturbed, shape ``(2, width)``, for each chosen hand."""
+    """True if a joint is perturbed, shape ``(2, width)``, a row for each chosen hand."""
     exploration: int
     """Exploration of the hand: 0 none, 1 random, 2 closest, 3 nearest posture."""
     epsilon: float
     """ε: probability with which the hand for a goal is explored."""
     noise_sd: float
-    """Standard deviation of the noise η, length unit and rad."""
+    """Standard deviation of the noise η, in length units and rad."""
     corrects: bool
     """True if **A** corrects a goal that a movement to a stored target misses."""
     by_subtask: bool
@@ -237,7 +238,7 @@ def workspace_for(runs: int, task: Task) -> _Workspace:
 def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _Workspace) -> float:
     """Return the distance of a run's hand (0 left, 1 right) from its goal's centre.
 
-    It is in length units. The run's ``evaluations`` grow by 1.
+    The distance is in length units. The run's count ``evaluations`` grows by 1.
     """
     arm = arm_of(robot, hand)
     chain_by(run.q, arm, workspace.xs, workspace.ys, cosine, sine)
@@ -254,10 +255,10 @@ def _nearest_posture(
 ) -> int:
     """Return the hand whose corrective posture for the goal is nearest to the present posture.
 
-    Distances are in joint space; the posture is what the corrective process **A** finds for the
-    goal of run ``n``. At a tie, and if **A** fails with all hands, it is the first hand. Iterations
-    and evaluations are counted. The run does not move, but its ``hand``, ``converged`` and
-    ``iterations`` change in place.
+    The posture of a hand is the one that the corrective process **A** finds for the goal of run
+    ``n``, and distances are in joint space. At a tie, and if **A** fails with all hands, the result
+    is the first hand. Iterations and evaluations are counted. The run does not move, but its
+    ``hand``, ``converged`` and ``iterations`` change in place.
     """
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
@@ -294,8 +295,8 @@ def choose_hand(
     """Choose the hand (0 left, 1 right) of run ``n`` for its present goal.
 
     The choice is the hand with the highest value Q in ``entries``, a record for each hand; at a tie
-    the left hand. If ``explore`` is True and the condition explores hands, it is with probability ε
-    instead one of
+    the left hand. If ``explore`` is True and the condition explores hands, the choice is instead,
+    with probability ε, one of
 
     - a random hand;
     - the hand closest to the goal, or a random hand if both are equally close;
@@ -321,13 +322,14 @@ def choose_hand(
 def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) -> None:
     """Set the preferred posture p of a run, in place.
 
-    This happens after the hand for a goal is chosen. The learner's ``direction`` decides what p is:
+    The kernel calls this after the hand for a goal is chosen. The learner's ``direction`` decides
+    what p is:
 
     - *stay*: the present posture q;
     - *start*: the posture at the start of the trial;
     - *next goal*: (q + t') / 2, where t' is the target stored for the next goal and its hand with
-      the highest value. Without a next goal or a stored target p is q, as it is for joints that
-      this hand's movements do not explore.
+      the highest value. Without a next goal or a stored target, p is q. For joints that are not
+      explored with that hand, p is q as well.
 
     ``number`` is the index of the goal, from 0. ``table`` has records of value and target, shape
     ``(G, 3, 2)``: by goal, previous hand (0 left, 1 right, 2 none) and hand. Nothing changes if
@@ -354,9 +356,9 @@ def drift(
 ) -> None:
     """Move the mean of exploration, the run's ``target`` t, in place.
 
-    It moves by κ N(t) (p − t), and by κ (p − t) for an idle arm that is explored. κ is the run's
-    drift, p the preferred posture, and N projects onto the null space of the hand's Jacobian.
-    Entries that are not explored do not change; nothing changes if κ is 0.
+    Base and chosen arm move by κ N(t) (p − t), and an idle arm that is explored moves by κ (p − t).
+    κ is the run's drift, p the preferred posture, and N projects onto the null space of the hand's
+    Jacobian. Entries that are not explored do not change; nothing changes if κ is 0.
     """
     if run.drift == 0.0:
         return
@@ -430,11 +432,12 @@ def make_trial(
     rngs: Any,
     workspace: _Workspace,
 ) -> None:
-    """Make one trial in each of N runs, up to the first goal missed.
+    """Make one trial in each of N runs. A trial ends at the first goal that is missed.
 
-    This fills ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. If ``initial`` is
-    True, it is trial 0 with the hands and targets of ``learner``. If ``explore`` is False, the
-    trial is greedy, without drift and noise. Other arguments are as in :func:`learn_kernel`.
+    This function fills ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. If
+    ``initial`` is True, the trial is trial 0, with the hands and targets of ``learner``. If
+    ``explore`` is False, the trial is greedy, without drift and noise. Other arguments are as in
+    :func:`learn_kernel`.
     """
     batch, counts, runs = workspace.batch, workspace.counts, len(tables)
     for n in range(runs):
@@ -493,7 +496,8 @@ def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
 def _copy_accounts(source: Any, destination: Any) -> None:
     """Copy the accounts of a trial's goals, shape ``(G,)``, in place.
 
-    It copies word by word: LLVM would copy records byte by byte, which takes long to compile.
+    The function copies word by word, because LLVM would copy records byte by byte, which takes long
+    to compile.
     """
     copies, words = destination.view(np.int64), source.view(np.int64)
     for k in range(len(words)):

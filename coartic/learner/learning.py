@@ -57,7 +57,8 @@ _MOST_IN_BATCH = 4_000_000  # trials of runs whose rewards fit into one answer o
 def runs_at_once(trials: int) -> int:
     """Return the largest number of runs of ``trials`` trials for one job of a worker.
 
-    It is 72, or fewer if 72 runs have more than 4,000,000 trials in total, but at least 1.
+    The number is at most 72 and at least 1. Within these limits, the runs together make at most
+    4,000,000 trials.
     """
     return max(1, min(SLOTS, _MOST_IN_BATCH // trials))
 
@@ -88,9 +89,9 @@ def learn(
     model : MotionModel
     start : sequence of Movement
         A first solution, such as a planner's or an earlier run's. For each goal trial 0 uses the
-        first of its movements: it moves straight to the target with that hand, length unit (base)
-        and rad (joints). The corrective process acts if that misses the goal, or if there is no
-        target. Without a first solution only the corrective process acts in trial 0.
+        first of its movements: it moves the hand of this movement straight to the target. The
+        corrective process acts if the hand misses the goal, or if there is no target. Without a
+        first solution only the corrective process acts in trial 0.
 
     Returns
     -------
@@ -110,9 +111,12 @@ def learn(
     SolutionError
         The first solution breaks the task's rules.
     ValueError
-        The seed is not an integer from 0 to 2^128 - 1, ``trials`` is not from 1 to 10,000,000, a
-        constant of the model is out of bounds, or the task was changed so that it contradicts
-        itself.
+        An argument cannot be used:
+
+        - ``seed`` is not an integer from 0 to 2^128 - 1;
+        - ``trials`` is not from 1 to 10,000,000;
+        - a constant of the model is out of bounds;
+        - the task was changed so that it contradicts itself.
 
     Notes
     -----
@@ -157,7 +161,7 @@ def learn_many(
     trials : int
     model : MotionModel
     start : sequence of Movement
-        Arguments of :func:`learn`, the same for every run.
+        Arguments of :func:`learn`. They are the same for every run.
     jobs : int
         Largest number of threads; -1 for one per core.
 
@@ -296,10 +300,10 @@ Kernels = Literal["learner", "motion", "trials"]
 
 
 def warm_up(task: Task, *parts: Kernels) -> None:
-    """Compile a task's kernels, or load their machine code, so that later runs need not.
+    """Compile a task's kernels, or load their machine code, before the first run.
 
-    They are compiled for the number of links of the task's robot. ``parts`` names the kernels, by
-    default all three:
+    The kernels are compiled for the number of links of the task's robot. ``parts`` names the
+    kernels, by default all three:
 
     - ``"learner"``: the learner;
     - ``"motion"``: single movements and corrections;

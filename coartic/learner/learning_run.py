@@ -19,8 +19,8 @@ from coartic.robot import Array
 from coartic.tasks.task import Task
 
 CORRECTIONS_BY_TENTH = "corrections"
-"""Detail of a stored run: the corrective movements in trial 0 and in each tenth of the later
-trials."""
+"""Name of a detail of a stored run: the numbers of corrective movements in trial 0 and in each
+tenth of the later trials."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,22 +52,24 @@ class LearningRun:
     replay_reward: int | None
     """Total reward of the replay; None if it failed."""
     values: Array
-    """Q, shape ``(goals, 3, 2)``, by goal, previous hand (left, right, none) and hand. It is the
-    highest total reward, or the highest return of the goal if the condition credits subtasks; -inf
-    if nothing was learned."""
+    """Q, shape ``(goals, 3, 2)``, by goal, previous hand (left, right, none) and hand. Q is the
+    highest total reward, or the highest return of the goal if the condition credits subtasks. It is
+    -inf if nothing was learned."""
     targets: Array
-    """q*, shape ``(goals, 3, 2, dof)``, length unit (base) and rad (joints); NaN if Q is -inf."""
+    """q*, shape ``(goals, 3, 2, dof)``, in length units (base) and rad (joints); NaN if Q is
+    -inf."""
     corrections: NDArray[np.int64]
     """Corrective movements in trial 0 and in each tenth of the later trials, shape ``(11,)``."""
     counters: Meter
     """Counts of the trials of the run; the replay is not counted."""
     wall_s: float = field(compare=False)
-    """Time of the runs that were made together, divided by their number, s."""
+    """Wall time of the run (in s): the time of the runs that were made together, divided by their
+    number."""
     __eq__ = equal_contents
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """True for the trials that hit every goal, bool, shape ``(trials,)``.
+        """True for the trials that hit every goal, shape ``(trials,)``.
 
         All other trials failed, and changed neither ``values`` nor ``targets``.
         """

@@ -84,20 +84,21 @@ class DualProcess(Method):
     def why_not(self, task: Outline) -> str | None:
         """Return a sentence on why the learner's condition does not apply to a task's hands.
 
-        None if it applies.
+        Return None if the condition applies.
         """
         return self.rules().why_not(task)
 
     def solve(self, session: Session) -> Result:
         """Run the learner, and return the movements of its learned solution.
 
-        This is the best trial or, if the condition has ``learned="replay"``, the noiseless trial
-        after learning.
+        The learned solution is the best trial or, if the condition has ``learned="replay"``, the
+        noiseless trial after learning.
 
         Raises
         ------
         MethodError
-            That trial did not hit every goal, or the budget has no trial left.
+            The trial with the learned solution did not hit every goal, or the budget has no trial
+            left.
         NotApplicableError
             No initial hands are found.
         """
@@ -109,15 +110,16 @@ class DualProcess(Method):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        It is 72, or fewer if their runs have more than 4,000,000 trials in total, but at least 1.
+        The number is at most 72 and at least 1. Within these limits, the sessions together make at
+        most 4,000,000 trials.
         """
         return runs_at_once(self.parameters.trials)
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
         """Run the learner in sessions that differ only in their seeds.
 
-        Return for each session, in order, the result of :meth:`solve` or the MethodError that it
-        would raise, as an object.
+        Return a list with an entry for each session, in order: the result of :meth:`solve`, or the
+        MethodError that it would raise.
         """
         parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
@@ -210,7 +212,7 @@ _optional: Any = {name: (kind | None, None) for name, kind in _FIELDS.items()}
 
 
 class CustomDualProcess(DualProcess):
-    """The learner under any exploration condition, with all information that one may use.
+    """The learner under any exploration condition, with all information that a condition may use.
 
     Its parameters are ``trials``, ``base`` and the fields of a condition except ``id`` and
     ``hands``.

@@ -66,7 +66,7 @@ class Outline(NamedTuple):
 
     @property
     def too_many_sequences(self) -> str | None:
-        """A sentence if the task has more than 4096 hand sequences, too many to try.
+        """A sentence if the task has more than 4096 hand sequences, which are too many to try.
 
         Otherwise None.
         """
@@ -79,24 +79,34 @@ def outline_of(task: Task) -> Outline:
 
 
 class Method(ABC):
-    """Base class of methods; a subclass declares itself in its class attributes."""
+    """Base class of methods.
+
+    A subclass sets the class attributes below (its id, title, the information that it uses, ...)
+    and implements :meth:`solve`.
+    """
 
     name: ClassVar[str]
-    """Id, such as ``"random-search"``; another form of the same method adds ``/form``."""
+    """Id, such as ``"random-search"``. The id of another form of the same method adds ``/form``."""
     title: ClassVar[str]
+    """Name in figures and tables."""
     citation: ClassVar[str]
+    """Publications from which the method comes."""
     information: ClassVar[frozenset[Information]]
+    """Information that the method uses."""
     tuned_on: ClassVar[str] = ""
-    """Tasks on which its parameters were chosen, and among how many; empty if that is not known. It
-    tells readers whether results are of new tasks, and is not a part of a run's identity."""
+    """Tasks on which the method's parameters were chosen, and among which values; empty if that is
+    not known. It tells readers whether results are of tasks that are new to the method. It is not a
+    part of the id of a run."""
     stochastic: ClassVar[bool] = True
     """True if the seed matters. If False, the method is run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
+    """Class of the method's parameters. By default a method has none."""
     version: ClassVar[int] = 1
-    """Version of the method's results. Raise it with every change of them, a change of a default
-    included: runs of two versions are not compared."""
+    """Version of the method's results. Raise it whenever results change, also if a default changes.
+    Runs of different versions are not compared."""
     files: ClassVar[tuple[str, ...]] = ()
-    """Names of data files in the folder of the method's file. They count as a part of its code."""
+    """Names of data files in the folder of the method's file. These files count as a part of the
+    method's code."""
     quick: ClassVar[Mapping[str, Any]] = {}
     """Parameters for a check that takes seconds, if the defaults take longer."""
 
@@ -132,8 +142,8 @@ class Method(ABC):
     def solve_together(self, sessions: Sequence[Session]) -> Sequence[Result | MethodError]:
         """Solve in many sessions that differ only in their seeds.
 
-        Return for each session, in order, the result of :meth:`solve` or the MethodError that it
-        raises, as an object.
+        Return a sequence with an entry for each session, in order: the result of :meth:`solve`, or
+        the MethodError that it raised.
         """
         results: list[Result | MethodError] = []
         for session in sessions:
@@ -166,8 +176,8 @@ def run_method(
     """Let a method solve a task in this process.
 
     There is no budget of trials, and the solution is not executed. Methods of this project may see
-    the task, and count by themselves. Any other method is refused information that it does not
-    declare, if a session can see its use (:data:`METERED`).
+    the task, and report their own counts. Any other method gets an UndeclaredError for information
+    that it uses and does not declare, if a session can see the use (:data:`METERED`).
 
     Parameters
     ----------
@@ -180,9 +190,9 @@ def run_method(
     Returns
     -------
     result : Result
-        The solution with its details.
+        The solution with its details, as the method returns it.
     session : Session
-        The session in which it was found, with its counts and rewards.
+        The session in which the method found the solution, with its counts and rewards.
 
     Raises
     ------
@@ -194,6 +204,8 @@ def run_method(
         The method does not apply to the task, or finds no initial hands.
     SolutionError
         The solution is not a sequence.
+    TaskError, TypeError
+        The task cannot be used, or has another type.
     ValueError
         The seed is not an integer from 0 to 2^128 - 1.
     """

@@ -61,10 +61,10 @@ NO_COPIES = (
 
 
 def explored_joints(session: Session) -> NDArray[np.bool_]:
-    """Return which entries of a configuration optimisers explore on the session's task.
+    """Return which entries of a configuration are explored by optimisers on the session's task.
 
-    These are the coordinates of the base that are not locked, and the joints of the arms of all
-    hands of the task. The result is bool, shape ``(dof,)``.
+    The result is bool, shape ``(dof,)``. It is True for the coordinates of the base that are not
+    locked, and for the joints of the arms of all hands of the task.
     """
     mask = np.zeros(session.dof, dtype=np.bool_)
     mask[:2] = [coordinate not in session.locked_base for coordinate in "xy"]
@@ -77,8 +77,8 @@ def sequences_of(session: Session) -> list[str]:
     """List all hand sequences of the session's task, such as ``"RRLR"``, in alphabetical order.
 
     If the task names a sequence, that sequence comes first. If there are more than 4096, the list
-    has only the initial hand sequence (:meth:`Session.find_initial_hands`, whose errors are
-    raised).
+    has only the initial hand sequence, from :meth:`Session.find_initial_hands`. Errors of that
+    method are raised.
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
@@ -89,20 +89,20 @@ def sequences_of(session: Session) -> list[str]:
 def _entries_of(name: str, points: ArrayLike) -> Array:
     """Return points as an array (:func:`real_array`), ignoring the labels of a table.
 
-    Objects with ``to_numpy`` are accepted. Raises ValueError, which calls the points ``name``, for
-    other values.
+    Objects with ``to_numpy`` are accepted. Raises ValueError for other values; the message calls
+    the points ``name``.
     """
     return real_array(name, points.to_numpy() if hasattr(points, "to_numpy") else points)
 
 
 class Objective:
-    """The cost of a trial, its ticks, as a function of its target configurations.
+    """The cost of a trial (its ticks) as a function of its target configurations.
 
     A point has, goal by goal, the targets of the entries of a configuration that are explored
-    (:func:`explored_joints`), length unit (base) and rad (joints).
+    (:func:`explored_joints`), in length units (base) and rad (joints).
 
     - The cost of a point is minus the reward of its trial, or ``FAILED`` if the trial fails or
-      takes longer.
+      takes more ticks than that.
     - The corrective process acts at goals that a movement misses, and its ticks count.
     - If all entries of a goal are NaN, no movement is made to a target. Only the corrective process
       acts, which costs nothing if the hand is in the goal already. A movement to a target always
@@ -110,16 +110,36 @@ class Objective:
     - A trial fails if its point has an entry beyond 100,000.
 
     The first trials are made when the objective is created. In them only the corrective process
-    acts, with ``hands`` or with the sequences of :func:`sequences_of` that the budget allows. The
+    acts, with ``hands`` or with as many sequences of :func:`sequences_of` as the budget allows. The
     best sequence becomes the hands of all points for which no other hands are passed.
 
     Threads can share an objective, which answers their calls one after the other. Copies, and
     trials in a forked process, raise CoarticError, because they would not count for the budget.
 
+    Parameters
+    ----------
+    session : Session
+        Session in which the trials are made and counted.
+    hands : str, optional
+        Hand sequence of the first trial, such as ``"RRLR"``. By default the sequences of
+        :func:`sequences_of` are tried, and the best one is used.
+    half_width : float
+        Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
+    trials : int, optional
+        Largest number of trials, including the first ones. By default only the session limits them.
+    task : Task, optional
+        The task. A method does not pass it, because a method cannot see its task.
+
     Raises
     ------
     MethodError
-        The corrective process completes none of these sequences.
+        The corrective process completes none of the sequences tried.
+    BudgetError
+        No trial is left.
+    NotApplicableError
+        There are more than 4096 hand sequences, and no initial one is found.
+    ValueError
+        ``hands`` do not fit the task, or ``half_width`` is not from 1e-9 to 100.
     """
 
     __slots__ = (
@@ -204,12 +224,16 @@ class Objective:
 
     @property
     def best_known(self) -> int | None:
-        """Lowest known cost of the task, ticks, of any solution.
+        """Lowest known cost of any solution of the task (in ticks).
 
-        The solution may have any hand sequence, and may hit goals without a movement. None if no
-        cost is shipped. That is so for most tasks of your own, for instances of families except the
-        first 40 test instances of shipped families, and for another model than the paper's. Raises
-        UndeclaredError in a method, as :attr:`task` does.
+        The solution may have any hand sequence, and may hit goals without a movement. The cost is
+        None if coartic comes with none, which is so for
+
+        - most tasks of your own;
+        - instances of families, except the first 40 test instances of shipped families;
+        - models other than the paper's.
+
+        Raises UndeclaredError in a method, as :attr:`task` does.
         """
         optimum = self._optimum
         return None if optimum is None else -optimum.reward
@@ -245,9 +269,10 @@ class Objective:
 
     @property
     def best_cost(self) -> float:
-        """Cost of the best trial so far, ticks.
+        """Cost of the best trial so far (in ticks).
 
-        At first it is the cost with only the corrective process.
+        Before the first evaluation it is the cost of the best trial in which only the corrective
+        process acts.
         """
         return self._best_cost
 
@@ -258,20 +283,21 @@ class Objective:
 
     @property
     def lower(self) -> Array:
-        """Lower ends of ``bounds``, shape ``(dim,)``, length unit and rad, a copy."""
+        """A copy of the lower ends of ``bounds``, shape ``(dim,)``, in length units and rad."""
         return self.bounds[:, 0].copy()
 
     @property
     def upper(self) -> Array:
-        """Upper ends of ``bounds``, shape ``(dim,)``, length unit and rad, a copy."""
+        """A copy of the upper ends of ``bounds``, shape ``(dim,)``, in length units and rad."""
         return self.bounds[:, 1].copy()
 
     @property
     def history(self) -> pd.DataFrame:
         """Table with a row each time the best cost fell.
 
-        The first row is the trial with only the corrective process. Columns: ``evaluations``, the
-        number made until then (0 in the first row), and ``cost``, ticks.
+        The first row is the best trial in which only the corrective process acts. Column
+        ``evaluations`` is the number of evaluations made until then (0 in the first row); column
+        ``cost`` is the cost (in ticks).
         """
         import pandas as pd  # workers do not import pandas
 
@@ -283,13 +309,14 @@ class Objective:
         Parameters
         ----------
         targets : array_like
-            Costs, ticks.
+            Costs (in ticks).
 
         Returns
         -------
         float or ndarray
-            Number of evaluations until the best cost was at or below each target, infinite if it
-            was not reached so far; a float for a number, otherwise an array of the same shape.
+            Number of evaluations until the best cost was at or below each target; infinite if no
+            point has reached the target so far. The result is a float if ``targets`` is a number,
+            otherwise an array of the same shape.
 
         Raises
         ------
@@ -308,18 +335,19 @@ class Objective:
 
     @property
     def x0(self) -> Array:
-        """A point to begin with, shape ``(dim,)``, length unit and rad, a copy.
+        """A starting point for a search, shape ``(dim,)``, in length units and rad.
 
-        It has the postures in which the corrective process on its own hits the goals.
+        Its entries are those of the configurations in which the corrective process on its own, with
+        :attr:`hands`, hits the goals. Each access returns a new array.
         """
         return self.configurations[self.joints].copy()
 
     @property
     def best_x(self) -> Array:
-        """The point of the best trial so far, shape ``(dim,)``, a copy.
+        """A copy of the point of the best trial so far, shape ``(dim,)``.
 
-        With the hands ``best_hands`` it costs ``best_cost``. All entries are NaN until a point is
-        better than the corrective process on its own.
+        With the hands :attr:`best_hands` this point costs :attr:`best_cost`. All entries are NaN
+        until a point is better than the corrective process on its own.
         """
         return self._best_x.copy()
 
@@ -327,7 +355,8 @@ class Objective:
     def solution(self) -> tuple[Movement, ...]:
         """Movements of the best trial so far, for :func:`coartic.execute`.
 
-        At first these are corrective movements without targets.
+        Until a point is better than the corrective process on its own, these are corrective
+        movements without targets.
         """
         return movements_of(self.best_hands, self._best_targets)
 
@@ -347,16 +376,17 @@ class Objective:
         Returns
         -------
         tuple of Movement
-            A movement for each goal. It has no target if the entries of the goal are NaN. Otherwise
-            its target has all joints: a joint without an entry in the point keeps its value, or has
-            its value at the start for goals after a failure.
+            A movement for each goal. A movement has no target if the entries of its goal are NaN.
+            Otherwise its target has all joints: a joint without an entry in the point keeps its
+            value. If the trial fails at a goal, such joints have their values at the start in the
+            targets of later goals.
 
         Raises
         ------
         UndeclaredError
             The call is made in a method, which can use :attr:`solution`.
         ValueError
-            Point or hands do not fit.
+            ``x`` or ``hands`` does not fit.
         """
         task, point = self.task, _entries_of("x", x)
         if point.shape != (self.dim,):
@@ -373,7 +403,7 @@ class Objective:
     # Evaluation.
 
     def __call__(self, x: ArrayLike, hands: str | None = None) -> Any:
-        """Return the cost of a point, or the costs of points in columns, ticks.
+        """Return the cost of a point, or of each point in columns (in ticks).
 
         Parameters
         ----------
@@ -419,7 +449,7 @@ class Objective:
         return cost
 
     def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
-        """Make a trial for each of many points, and return the costs, ticks.
+        """Make a trial for each of many points, and return the costs (in ticks).
 
         The trials are made side by side.
 
@@ -441,11 +471,15 @@ class Objective:
         Raises
         ------
         BudgetError
-            Fewer trials are left than there are points. The trials that are left are made, for the
-            first points.
+            Fewer trials are left than there are points. The trials that are left are made first,
+            for the first points.
         ValueError
-            The shape is wrong, an entry is infinite, a goal has both NaN and other entries, or the
-            hands do not fit the task.
+            An argument cannot be used:
+
+            - ``points`` has the wrong shape;
+            - an entry is infinite;
+            - a goal has both NaN and other entries;
+            - ``hands`` do not fit the task.
         """
         array = _entries_of("points", points)
         if array.ndim != 2 or array.shape[1] != self.dim:
@@ -481,8 +515,8 @@ class Objective:
     ) -> None:
         """Note a point as the best so far.
 
-        ``cost`` is in ticks; ``codes`` are its hands, shape ``(G,)``. It is evaluation number
-        ``evaluations`` (from 1), and trial ``trial`` (from 0) of ``accounts``.
+        ``cost`` is in ticks, and ``codes``, shape ``(G,)``, are the hands of the point. The point
+        is evaluation number ``evaluations`` (from 1), and trial ``trial`` (from 0) of ``accounts``.
         """
         self._best_cost, self._best_x = cost, point.copy()
         self._best_targets = self._targets_in(accounts, trial)
@@ -490,16 +524,17 @@ class Objective:
         self._improvements.append((evaluations, cost))
 
     def _targets_in(self, accounts: Accounts, trial: int) -> Configs:
-        """Return a copy of a trial's targets, shape ``(G, dof)``, length unit and rad.
+        """Return a copy of a trial's targets, shape ``(G, dof)``, in length units and rad.
 
-        ``trial`` is its index in ``accounts``.
+        ``trial`` is the index of the trial in ``accounts``.
         """
         return accounts.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:
-        """Return the targets of points ``(N, dim)``, shape ``(N, G, dof)``, length unit and rad.
+        """Return the targets of points ``(N, dim)``, shape ``(N, G, dof)``, in length units and
+        rad.
 
-        They are NaN for joints without an entry in a point.
+        Targets are NaN for joints without an entry in a point.
         """
         targets = np.repeat(self._targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
@@ -559,7 +594,7 @@ def objective(
         A hand sequence (``"RRLR"``), by default the sequence for which the corrective process on
         its own gets the highest reward. The optimum can have other hands, as in ``two-armed-2``.
     half_width : float
-        Half the width of the bounds around ``x0``, length unit (base) and rad (joints).
+        Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
     model : MotionModel
     budget : int, optional
         Largest number of trials, including the trials by which hands are chosen. Further trials
@@ -575,9 +610,13 @@ def objective(
     TaskError
         The task cannot be used.
     ValueError
-        Hands do not fit, the half width is not from 1e-9 to 100, a constant of the model is out of
-        bounds, or the budget is not from 1 to 10,000,000 or is less than the number of hand
-        sequences to choose among.
+        An argument cannot be used:
+
+        - ``hands`` do not fit the task;
+        - ``half_width`` is not from 1e-9 to 100;
+        - a constant of the model is out of bounds;
+        - ``budget`` is not from 1 to 10,000,000, or is less than the number of hand sequences to
+          choose among.
     TypeError
         The model is not a MotionModel, or the task is not a Task, a string or a path.
     MethodError
@@ -610,13 +649,13 @@ class OptimiserParameters(Parameters):
     process on its own gets the highest reward, or the task's initial one if there are more than
     4096."""
     half_width: Annotated[float, Field(ge=WIDTHS[0], le=WIDTHS[1])] = HALF_WIDTH
-    """Half the width of the bounds, length unit (base) and rad (joints)."""
+    """Half the width of the bounds, in length units (base) and rad (joints)."""
 
 
 class Optimiser(Method):
     """Base class of methods that minimise the cost of a trial.
 
-    A subclass has a name, a title, a citation and :meth:`optimise`.
+    A subclass sets ``name``, ``title`` and ``citation``, and implements :meth:`optimise`.
     """
 
     information = OPTIMISER_INFORMATION

@@ -39,16 +39,17 @@ from coartic.tasks.task import Task
 
 
 class Information(StrEnum):
-    """Information that a method can use beyond what a session shows to all."""
+    """Information that a method can use beyond what a session shows to every method."""
 
     GOALS = "goals"
     """Centres of the goals, and their radius."""
     FORWARD_KINEMATICS = "forward kinematics"
     """Position of a hand in a configuration."""
     JACOBIAN = "Jacobian"
-    """Derivative of a hand's position by the entries of a configuration."""
+    """Derivative of a hand's position with respect to the entries of a configuration."""
     CORRECTIVE_PROCESS = "corrective process"
-    """A configuration that hits a goal, found by **A**, which uses goal and Jacobian."""
+    """A configuration that hits a goal, found by the corrective process **A**, which uses goal and
+    Jacobian."""
     REWARD_BY_TRIAL = "reward by trial"
     """The total reward of a trial after the trial is made."""
     REWARD_BY_SUBTASK = "reward by subtask"
@@ -56,7 +57,7 @@ class Information(StrEnum):
     KINEMATIC_MODEL = "kinematic model"
     """The kinematics as formulas, with all derivatives."""
     REWARD_FORMULA = "reward as a formula"
-    """That reward is lost in proportion to the path in joint space."""
+    """The rule that a movement costs reward in proportion to its path in joint space."""
     SECONDARY_OBJECTIVES = "secondary objectives"
     """Objectives beyond hitting the goals, such as smoothness."""
 
@@ -71,8 +72,8 @@ METERED = frozenset(
         Information.KINEMATIC_MODEL,
     }
 )
-"""Information whose use a session can see. For all other information there is only the
-declaration."""
+"""Information whose use a session can see. The use of other information is declared, but not
+checked."""
 
 
 class UndeclaredError(CoarticError):
@@ -131,9 +132,9 @@ class Meter:
     solver_iterations: int = 0
     """Iterations of a solver."""
     build_s: float = 0.0
-    """Wall time of setting up problems, which is needed once."""
+    """Wall time of setting up problems (in s). Each problem is set up once."""
     solve_s: float = 0.0
-    """Wall time of solving them."""
+    """Wall time of solving problems (in s)."""
 
     COUNTS: ClassVar[tuple[str, ...]]
     """Names of all counters except the times."""
@@ -163,7 +164,7 @@ MOST_COUNT = 2**63 - 1
 
 
 def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
-    """Return rewards of trials as an array of 8-byte integers, :data:`NO_REWARD` for None."""
+    """Return rewards as an array of 8-byte integers, with :data:`NO_REWARD` in place of None."""
     return array("q", [NO_REWARD if reward is None else reward for reward in rewards])
 
 
@@ -172,7 +173,8 @@ class Session:
 
     The declaration is enforced: a call that uses information of :data:`METERED` which is not in
     ``information`` raises UndeclaredError. Trials and evaluations are counted. A session is not a
-    sandbox. Threads can share it: they make trials one after the other, from the same budget.
+    sandbox. Threads can share a session: they make trials one after the other, from the same
+    budget.
 
     Parameters
     ----------
@@ -245,7 +247,7 @@ class Session:
 
     @property
     def q0(self) -> Array:
-        """Starting configuration, shape ``(dof,)``, length unit and rad, a copy."""
+        """Starting configuration, shape ``(dof,)``, in length units and rad (a copy)."""
         return np.array(self._task.q0)
 
     @property
@@ -254,14 +256,17 @@ class Session:
         return self._task.robot.dof
 
     def joints(self, hand: Hand) -> slice:
-        """Return the slice of a configuration with the joint angles, rad, of a hand's arm."""
+        """Return the slice of a configuration with the angles of a hand's arm (in rad).
+
+        Raises ValueError for an unknown hand.
+        """
         return self._task.robot.joints(hand)
 
     # These have to be declared.
 
     @property
     def goals(self) -> Array:
-        """Goal centres, shape ``(G, 2)``, length unit, a copy.
+        """Goal centres, shape ``(G, 2)``, in length units (a copy).
 
         Raises UndeclaredError without ``Information.GOALS``.
         """
@@ -270,7 +275,7 @@ class Session:
 
     @property
     def radius(self) -> float:
-        """θ^g: radius of every goal, length unit.
+        """θ^g: radius of every goal (in length units).
 
         Raises UndeclaredError without ``Information.GOALS``.
         """
@@ -300,7 +305,7 @@ class Session:
         Returns
         -------
         CasADi matrix, 2 x 1
-            x and y, length unit.
+            x and y in length units.
 
         Raises
         ------
@@ -314,7 +319,8 @@ class Session:
 
     @property
     def used(self) -> frozenset[Information]:
-        """The declared information that the session has seen used so far."""
+        """The declared information that the method has used so far, as far as the session can
+        see."""
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
@@ -352,7 +358,7 @@ class Session:
         Returns
         -------
         ndarray, shape (..., 2)
-            x and y, length unit.
+            x and y in length units.
 
         Raises
         ------
@@ -377,8 +383,8 @@ class Session:
         Returns
         -------
         ndarray, shape (..., 2, dof)
-            Derivatives of x and y by each entry of ``q``, length unit per length unit (base) or rad
-            (joints).
+            Derivatives of x and y with respect to each entry of ``q``, in length units per length
+            unit (base) and per rad (joints).
 
         Raises
         ------
@@ -393,14 +399,14 @@ class Session:
         return jacobians
 
     def correct(self, q: Any, hand: Hand, goal: int) -> Correction:
-        """Run the corrective process for a goal, and count what it takes.
+        """Run the corrective process for a goal, and count its evaluations.
 
         No movement is made. Iterations, Jacobians and forward-kinematics evaluations are counted.
 
         Parameters
         ----------
         q : array_like, shape (dof,)
-            Where to begin.
+            Configuration in which the process begins.
         hand : {"left", "right"}
         goal : int
             Number of the goal, from 1.
@@ -485,35 +491,35 @@ class Session:
     def trials(self, hands: HandSequences, targets: Any, *, until: Any = None) -> Trials:
         """Make N physical trials at once.
 
-        The corrective process acts if a goal is missed, and its ticks count. Counts are the same as
-        for :meth:`trial`, which however spends one or two more evaluations of forward kinematics
-        per goal tried.
+        The corrective process acts if a goal is missed, and its ticks count. The counts are the
+        same as for N calls of :meth:`trial`, except that each call makes one or two more
+        evaluations of forward kinematics per goal tried.
 
         Parameters
         ----------
         hands : str or sequence of str
             One hand sequence for all trials (``"RRLR"``), or a sequence for each.
         targets : array_like, shape (N, G, dof)
-            Targets, length unit (base) and rad (joints). A joint whose target is NaN keeps its
-            value. For a goal with only NaN no movement is made to a target, and only the corrective
-            process acts, which has to be declared. A trial with a target beyond 100,000 fails
-            without a movement (:meth:`trial` refuses it).
+            Targets, in length units (base) and rad (joints). A joint whose target is NaN keeps its
+            value. For a goal with only NaN there is no movement to a target: only the corrective
+            process acts, which the method has to declare. A trial with a target beyond 100,000
+            fails without a movement (:meth:`trial` refuses it).
         until : array_like, shape (N,), optional
-            Rewards. Trials end after the first one whose reward exceeds its entry; no later trial
-            is counted or returned.
+            A reward for each trial. The first trial whose reward exceeds its entry is the last one
+            that is counted and returned.
 
         Returns
         -------
         Trials
-            The results, with a row for each trial made. If the budget has fewer trials left, the
-            first trials are made. If ``Information.CORRECTIVE_PROCESS`` is not declared,
+            The results, with a row for each trial made. If the budget has only n < N trials left,
+            only the first n are made. If ``Information.CORRECTIVE_PROCESS`` is not declared,
             ``corrections``, ``iterations``, ``targets`` and ``reached`` are empty.
 
         Raises
         ------
         UndeclaredError
-            ``Information.REWARD_BY_TRIAL`` is not declared, or ``Information.CORRECTIVE_PROCESS``
-            for a goal without targets.
+            ``Information.REWARD_BY_TRIAL`` is not declared. Or a goal has no targets and
+            ``Information.CORRECTIVE_PROCESS`` is not declared.
         BudgetError
             N is above 0, and the budget has no trial left.
         ValueError
@@ -571,8 +577,9 @@ class Session:
     def _make_trials(self, codes: Hands, targets: Configs, until: Array | None = None) -> Accounts:
         """Make and count N trials, and return their accounts.
 
-        With ``until`` there may be fewer (:meth:`trials`). ``codes`` are the hands, 0 (left) or 1
-        (right), shape ``(N, G)``. The caller checks arguments and budget, and holds ``lock``.
+        With ``until`` fewer trials may be counted and returned (:meth:`trials`). ``codes`` are the
+        hands, 0 (left) or 1 (right), shape ``(N, G)``. The caller checks arguments and budget, and
+        holds ``lock``.
         """
         accounts = make_trials(self._compiled, codes, targets[:, :, None])
         count_trials(-len(targets) * self._of_run)
@@ -587,12 +594,12 @@ class Session:
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """Find the hand sequence of the first trial, such as ``"RRRR"``.
 
-        If the task names a sequence, it is returned. If the task names a policy, it is the sequence
-        for which the corrective process on its own gets the highest reward: among sequences of one
-        hand (``"best-single-hand"``), or among all (``"best-of-all"``).
+        If the task names a sequence, that sequence is returned. If the task names a policy, the
+        result is the sequence for which the corrective process on its own gets the highest reward:
+        among sequences of one hand (``"best-single-hand"``), or among all (``"best-of-all"``).
 
         The trials of this search are counted as ``initial_trials``. They are not among the method's
-        trials, and do not count for its budget, but their ticks and other counts are added to the
+        trials and do not count for its budget. Their ticks and other counts are added to the
         method's.
 
         Parameters
@@ -653,12 +660,12 @@ class Session:
 
     @property
     def meter(self) -> Meter:
-        """The counts so far, a copy."""
+        """A copy of the counts so far."""
         return replace(self._meter)
 
     @property
     def rewards(self) -> list[int | None]:
-        """Total reward of each trial made, a new list; None if a trial failed.
+        """Total reward of each trial made, as a new list with None for failed trials.
 
         Trials of the search for the initial hands are not included.
         """
@@ -682,11 +689,11 @@ class Session:
         self._meter.add(**counts)
 
     def building(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block to ``build_s``, s."""
+        """Return a context manager that adds the wall time of its block to ``build_s`` (in s)."""
         return self._timing("build_s")
 
     def solving(self) -> AbstractContextManager[None]:
-        """Return a context that adds the wall time of its block to ``solve_s``, s."""
+        """Return a context manager that adds the wall time of its block to ``solve_s`` (in s)."""
         return self._timing("solve_s")
 
     @contextmanager
@@ -703,9 +710,9 @@ class Session:
     def reveal(self, *information: Information) -> Task:
         """Return the task itself, for methods of this project.
 
-        These methods count by themselves, with :meth:`spend`. ``information``, at least one item,
-        is noted as used. Raises UndeclaredError for any other method, without an item, and for an
-        item that the method does not declare.
+        A method that calls this counts its own evaluations, with :meth:`spend`. ``information`` has
+        at least one item, which is noted as used. Raises UndeclaredError if the method is not of
+        this project, if no item is passed, or if the method does not declare an item.
         """
         self._needs_trust("reveal")
         if not information:
@@ -716,8 +723,8 @@ class Session:
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
         """Add rewards and time of trials that a compiled method of this project made.
 
-        ``rewards`` has None for a failed trial. ``solve_s``, s, is added to the counter of this
-        name; no other count changes. Raises UndeclaredError for any other method.
+        ``rewards`` has None for a failed trial. ``solve_s`` (in s) is added to the counter of this
+        name; no other count changes. Raises UndeclaredError if the method is not of this project.
         """
         self._needs_trust("record")
         self._rewards.extend(_pack_rewards(rewards))

@@ -40,8 +40,8 @@ SlotArrays = Any
 def _links_for(robot: Robot) -> int:
     """Return the number of links per arm for which a robot's kernels are compiled.
 
-    It is 4 or 8 if no arm has more links, so that most robots share machine code, and otherwise
-    :attr:`Robot.max_links`.
+    The number is 4 or 8 if no arm has more links, so that most robots share machine code. Otherwise
+    it is :attr:`Robot.max_links`.
     """
     return 4 if robot.max_links <= 4 else max(robot.max_links, 8)
 
@@ -67,7 +67,7 @@ def _parameters_type(links: int) -> np.dtype[np.void]:
     fields = {
         "arms": (record_type(arm | shoulder), len(HANDS)),
         "model": record_type(model),
-        "radius": np.float64,  # of the goals, length unit
+        "radius": np.float64,  # of the goals, in length units
         "free_x": np.bool_,  # True if the corrective process moves the base in x
         "free_y": np.bool_,
         "checks": np.bool_,  # True if an arm without a target stays if its hand is in the goal
@@ -92,7 +92,7 @@ def robot_parameters(
     ----------
     robot : Robot
     radius : float
-        Radius of the goals, length unit.
+        Radius of the goals (in length units).
     locked_base : tuple of {"x", "y"}
         Coordinates of the base that the corrective process does not change.
     model : MotionModel
@@ -155,17 +155,17 @@ class Batch(NamedTuple):
 def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
     """Return a new batch for kernels, with all entries 0.
 
-    It has ``count`` records of runs with room for the links of ``robot``, and arrays of 72 slots
-    (:data:`SLOTS`). Each run needs a slot, so a kernel moves at most 72 runs at a time.
+    The batch has ``count`` records of runs with room for the links of ``robot``, and arrays of 72
+    slots (:data:`SLOTS`). Each run needs a slot, so a kernel moves at most 72 runs at a time.
     """
     width = width_of(robot)
     fields = {
-        "q": (np.float64, width),  # where the robot is, length unit and rad
+        "q": (np.float64, width),  # where the robot is, in length units and rad
         "target": (np.float64, width),  # of a movement; where a correction has ended
-        "preferred": (np.float64, width),  # preferred posture, length unit and rad
+        "preferred": (np.float64, width),  # preferred posture, in length units and rad
         "drift": np.float64,  # by what share of the path to it exploration's mean moves
         "pull": np.float64,  # share of that path in an iteration of the corrective process
-        "goal": (np.float64, 2),  # x and y, length unit
+        "goal": (np.float64, 2),  # x and y, in length units
         "hand": np.int64,  # the hand that is to hit the goal: 0 left, 1 right
         "action": np.int64,  # the next action: see coartic.motion.trial
         "corrects": np.bool_,  # True if the corrective process acts where a movement misses
@@ -274,8 +274,8 @@ def squared_distance(run: RunRecord) -> float:
 def start(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
     """Load a run into a slot for a movement, in place.
 
-    In addition to :func:`load`, this copies start and target and the squared joint-space distance
-    between them, so that :func:`move_slots` can make the movement.
+    In addition to what :func:`load` does, this function copies start and target and the squared
+    joint-space distance between them, so that :func:`move_slots` can make the movement.
     """
     load(slots, slot, number, run, arm)
     _copy_arm(slots.start, slot, run.q, arm)
@@ -321,9 +321,10 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return an upper bound on the absolute link angles in a slot, rad.
+    """Return an upper bound on the absolute link angles in a slot (in rad).
 
-    It is the sum of the absolute angles of the arm's joints. ``q`` has a column for each slot.
+    The bound is the sum of the absolute angles of the arm's joints. ``q`` has a column for each
+    slot.
     """
     total = 0.0
     for k in range(len(q) - BASE_DOF):
@@ -345,9 +346,10 @@ def have_small_angles(slots: SlotArrays, count: int) -> bool:
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Return a kernel that fills ``slots.x`` and ``slots.y`` by these functions.
+    """Return a kernel that fills ``slots.x`` and ``slots.y`` with a given cosine and sine.
 
-    Its arguments are the slots and the number of columns to fill (:func:`find_positions`).
+    The arguments of the kernel are the slots and the number of columns to fill
+    (:func:`find_positions`).
     """
 
     @inner
@@ -367,8 +369,9 @@ _far_chains = _chains_by(cosine, sine)
 def find_positions(slots: SlotArrays, count: int, small_angles: bool) -> None:
     """Fill ``x`` and ``y`` of the first ``count`` slots for the configurations ``q``, in place.
 
-    These are the positions of shoulder, joints and hand, length unit. Slots that pad the count are
-    filled as well. ``small_angles`` may be True only if all absolute link angles are below 1e5 rad.
+    ``x`` and ``y`` are the positions of shoulder, joints and hand (in length units). Slots that pad
+    the count are filled as well. ``small_angles`` may be True only if all absolute link angles are
+    below 1e5 rad.
     """
     if small_angles:
         _near_chains(slots, padded_count(count))

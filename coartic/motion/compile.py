@@ -139,8 +139,8 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
     """Return the addresses through which kernels draw from N > 0 NumPy generators.
 
-    Shape ``(N, 3)``: the state and two functions of each generator, for :func:`generator_at`. The
-    generators must outlive the kernel's call.
+    The result has shape ``(N, 3)``: the state and two functions of each generator, for
+    :func:`generator_at`. The generators must outlive the kernel's call.
     """
     rows = [
         [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
@@ -153,7 +153,7 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
     """Return signature and builder of a call that makes NumPy's generator in a kernel.
 
-    It makes the generator from the addresses of its state and drawing functions
+    The call makes the generator from the addresses of its state and drawing functions
     (:func:`addresses`). As for every intrinsic, the arguments are types of Numba.
     """
     from numba.core import cgutils, types
@@ -287,7 +287,7 @@ def _compile_kernel(function: Callable[..., Any], kind: str) -> Any:
 def _keep_on_disk(compiled: Any, function: Callable[..., Any]) -> Any:
     """Make a compiled function read and store its machine code on disk, and return it.
 
-    It is returned unchanged if no folder can be written.
+    The function is returned unchanged if no folder can be written.
     """
     folder, config = _cache_folder(), import_numba().config
     if folder is not None:
@@ -362,9 +362,9 @@ class _MachineCode:
     def load_overload(self, *signature: Any) -> Any:
         """Return a signature's machine code, or None if this process is to compile it.
 
-        It waits for another process that compiles the same code (:meth:`wait_for_lock`). The first
-        time that code is to be compiled, a message is logged. ``signature`` is as Numba
-        passes it.
+        If another process compiles the same code, this process waits for it
+        (:meth:`wait_for_lock`). The first time that code is to be compiled, a message is logged.
+        ``signature`` is as Numba passes it.
         """
         self.unlock()
         code = self.load(*signature)
@@ -399,8 +399,8 @@ class _MachineCode:
     def wait_for_lock(self) -> bool:
         """Lock this function's code for this process, and return whether that succeeded.
 
-        The process id is written into the lock file, unless the disk is full. The lock fails if the
-        file cannot be locked, or if another process holds it for more than 120 s. After 5 s a
+        The process id is written into the lock file, unless the disk is full. Locking fails if the
+        file cannot be locked, or if another process holds the lock for more than 120 s. After 5 s a
         message names that process.
         """
         with contextlib.suppress(OSError):

@@ -1,12 +1,12 @@
 """The corrective process **A**: find a configuration that hits a goal.
 
-It is Jacobian-transpose descent on the distance to the goal, ``q += α Jᵀ e`` with the error e of
-the hand (paper, section *The Corrective Process*, Figure 2). Its only information is the primary
+The process is Jacobian-transpose descent on the distance to the goal, ``q += α Jᵀ e`` with the
+error e of the hand (paper, section *The Corrective Process*, Figure 2). It uses only the primary
 objective: where the goal is, and how the chosen hand's position depends on the base and the chosen
 arm. The other arm's joints do not change, and a locked base coordinate has no column in the
 Jacobian.
 
-The kernels make its iterations for many arms side by side.
+The kernels make the iterations of the process for many arms side by side.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class Correction(NamedTuple):
     """Result of the corrective process (:func:`correct`)."""
 
     q: Array
-    """Configuration found, shape ``(dof,)``, length unit and rad; the last iterate if ``converged``
-    is False."""
+    """Configuration found, shape ``(dof,)``, in length units and rad; the last iterate if
+    ``converged`` is False."""
     converged: bool
     """True if the hand is within ``MotionModel.correction_tolerance`` of the goal's centre."""
     iterations: int
@@ -59,8 +59,8 @@ class Correction(NamedTuple):
 def _find_statuses(slots: SlotArrays, count: int, square: float) -> None:
     """Set the status of corrections in the first ``count`` slots, in place.
 
-    - at the goal: the squared distance of the hand from the goal's centre is at most ``square``,
-      squared length unit;
+    - at the goal: the squared distance of the hand from the goal's centre is at most ``square`` (in
+      squared length units);
     - failed: that distance is not finite;
     - going on: otherwise.
     """
@@ -120,9 +120,9 @@ def descend(
 def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) -> None:
     """Iterate the corrective process in the first ``count`` slots until each has ended.
 
-    A correction ends when it has converged or failed: its configuration is not finite, no longer
-    changes, or has had ``max_iterations``. The slots are loaded by :func:`load`, and free
-    afterwards. In the record of each run
+    A correction ends when it has converged or failed. It fails if its configuration is not finite
+    or no longer changes, or after ``max_iterations``. The slots are loaded by :func:`load`, and
+    free afterwards. In the record of each run
 
     - ``converged`` and ``iterations`` are set;
     - ``target`` gets base and arm of the last iterate; the entries of the other arm stay;
@@ -219,7 +219,7 @@ def _pull_to_preferred(slots: SlotArrays, count: int, robot: RobotRecord, runs: 
 def pull_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
     """Run the corrective process with a pull to each run's preferred posture.
 
-    It runs in the first ``count`` slots, and sets the results in the runs' records
+    The process runs in the first ``count`` slots. Its results are set in the runs' records
     (:func:`descend_to_goals`).
     """
     descend_to_goals(batch, count, robot, _pull_to_preferred)
@@ -229,7 +229,7 @@ def pull_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
 def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
     """Run the paper's corrective process in the first ``count`` slots.
 
-    It sets the results in the runs' records (:func:`descend_to_goals`).
+    The results are set in the runs' records (:func:`descend_to_goals`).
     """
     descend_to_goals(batch, count, robot, None)
 
@@ -256,19 +256,19 @@ def correct(
 ) -> Correction:
     """Find a configuration with a hand at a goal by Jacobian-transpose inverse kinematics.
 
-    This is the paper's corrective process. It descends from ``q`` on the distance to the goal. The
-    other arm does not move.
+    This is the paper's corrective process, which descends from ``q`` on the distance to the goal.
+    The other arm does not move.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     q : ndarray, shape (dof,)
-        Where to begin, length unit (base) and rad (joints).
+        Configuration in which the process begins, in length units (base) and rad (joints).
     hand : {"left", "right"}
         The hand.
     goal : tuple of float
-        Centre of the goal, x and y, length unit.
+        Centre of the goal, x and y in length units.
     locked_base : collection of {"x", "y"}
         Coordinates of the base that do not move.
     model : MotionModel
@@ -278,17 +278,22 @@ def correct(
     Returns
     -------
     Correction
-        The configuration, whether it is at the goal, and how many iterations it took. If it does
-        not converge within ``model.max_iterations``, no error is raised.
+        The configuration, whether its hand is at the goal, and how many iterations the process
+        took. If the process does not converge within ``model.max_iterations``, ``converged`` is
+        False, and no error is raised.
 
     Raises
     ------
     TypeError
         ``robot`` or ``model`` has another type.
     ValueError
-        A shape is wrong, a number is not finite or beyond 100,000, the hand is unknown,
-        ``locked_base`` has an entry other than ``"x"`` and ``"y"``, or a constant of the model is
-        out of bounds.
+        An argument cannot be used:
+
+        - a shape is wrong;
+        - a number is not finite, or beyond 100,000;
+        - the hand is unknown;
+        - ``locked_base`` has an entry other than ``"x"`` and ``"y"``;
+        - a constant of the model is out of bounds.
 
     Notes
     -----

@@ -42,9 +42,10 @@ def ranked_sequences(
     Returns
     -------
     list of tuple
-        An entry for each sequence: the sequence, the reward (None if the trial failed), the reason
-        of the failure (or an empty string), and the counts of the trial by name (:data:`COUNTED`),
-        with one more evaluation for each goal tried. The order is
+        An entry ``(sequence, reward, reason, counts)`` for each sequence. ``reward`` is None if the
+        trial failed, and ``reason`` says why (otherwise it is empty). ``counts`` has the counts of
+        the trial by name (:data:`COUNTED`); as in :func:`coartic.execute`, each goal that is tried
+        adds an evaluation. The order is
 
         - by reward, the highest first and failed trials last;
         - then by the number of changes of hand, the fewest first;
@@ -121,11 +122,12 @@ def search_initial_hands(
     *,
     model: MotionModel = PAPER,
 ) -> tuple[str, Mapping[str, int]]:
-    """Find the hand sequence of trial 0, and count what the search took.
+    """Find the hand sequence of trial 0, and count the trials of the search.
 
-    If the task names a sequence, it is returned with no counts. If the task names a policy, trials
-    with only the corrective process are made: with ``"best-single-hand"`` for sequences of one
-    hand, otherwise for all. The best of :func:`ranked_sequences` is returned.
+    If the task names a sequence, that sequence is returned with no counts. If the task names a
+    policy, trials with only the corrective process are made: for sequences of one hand with
+    ``"best-single-hand"``, otherwise for all sequences. The best of :func:`ranked_sequences` is
+    returned.
 
     These trials are counted (:func:`count_trials`), even if the result comes from the cache, but
     not if the search fails.
@@ -142,7 +144,8 @@ def search_initial_hands(
     sequence : str
         The hand sequence, such as ``"RRRR"``.
     counts : mapping
-        Counts by the names of :class:`~coartic.method.Meter`. They are cached: do not change them.
+        Counts by the names of :class:`~coartic.method.Meter`. The counts are cached: do not change
+        them.
 
     Raises
     ------
@@ -166,8 +169,9 @@ def _search_by_policy(
 ) -> tuple[str, Mapping[str, int]]:
     """Search the initial hands of a task with a policy.
 
-    The last 64 results are cached. The task is passed as JSON, and ``hands`` in order, so that they
-    can be keys. The caller counts the trials. The result is as in :func:`search_initial_hands`.
+    The last 64 results are cached. The task is passed as JSON, and ``hands`` as an ordered tuple,
+    so that they can be keys of the cache. The caller counts the trials. The result is as in
+    :func:`search_initial_hands`.
     """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)

@@ -16,8 +16,8 @@ where m is the length of a step. Before each step the stopping rule is evaluated
 A movement of k steps takes k + 1 ticks; the last tick detects arrival (inferred: it gives the
 published initial rewards exactly).
 
-The kernels give the same results as this loop, for many arms side by side, and do not visit every
-step of a movement (:func:`clear_steps`).
+The kernels move many arms side by side. They give the same results as a loop that evaluates the
+rule at every step, although they do not visit every step (:func:`clear_steps`).
 """
 
 from __future__ import annotations
@@ -56,14 +56,14 @@ _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
 _IN_GOAL, _MISSED = 1.0, 2.0  # status of a slot whose movement has ended
-LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, length unit or rad
+LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, in length units or rad
 
 
 class MoveResult(NamedTuple):
     """Result of one movement (:func:`move`)."""
 
     q: Array
-    """Configuration in which the movement stopped, shape ``(dof,)``, length unit and rad."""
+    """Configuration in which the movement stopped, shape ``(dof,)``, in length units and rad."""
     ticks: int
     """Control ticks spent. The reward of the movement is ``-ticks``."""
     hit: bool
@@ -87,7 +87,7 @@ def largest_square(length: float) -> float:
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
     """Return a number of steps for which the hand certainly stays out of a disc.
 
-    It is usually not an integer, and 0 if the hand may be in the disc.
+    The number is usually not an integer. It is 0 if the hand may be in the disc.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
     rim : float
         r: radius of the disc.
     closing : float
-        d u, where u is the closing speed, length unit per step.
+        d u, where u is the closing speed, in length units per step.
     slowness : float
         1 / s, where s is a bound on the hand's path per step.
     bend : float
@@ -183,11 +183,11 @@ def _place_between(slots: SlotArrays, count: int, step: float) -> None:
 def check(slots: SlotArrays, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -> int:
     """Evaluate the stopping rule of the movements in the first ``count`` slots, in place.
 
-    Set ``status``, and where a movement goes on set ``step`` to the next step that can end it.
-    Return how many movements have ended. A movement ends
+    This sets ``status`` and, where a movement goes on, ``step``, which becomes the next step that
+    can end the movement. Return how many movements have ended. A movement ends
 
     - at its last step;
-    - with the hand within ``rims[0]``, length unit, of the goal's centre; or
+    - with the hand within ``rims[0]`` (in length units) of the goal's centre; or
     - with ``stop_on_arrival``, also within ``rims[1]`` of where the target brings the hand.
 
     ``squares`` are the squares of ``rims`` (:func:`largest_square`).
@@ -298,31 +298,36 @@ def move(
     robot : Robot
         The robot.
     q : ndarray, shape (dof,)
-        Configuration in which the robot stands, length unit (base) and rad (joints).
+        Configuration in which the robot stands, in length units (base) and rad (joints).
     target : ndarray, shape (dof,)
         Target configuration, in the same units.
     hand : {"left", "right"}
         The hand that is to hit the goal.
     goal : tuple of float
-        Centre of the goal, x and y, length unit.
+        Centre of the goal, x and y in length units.
     radius : float
-        Radius of the goal, length unit.
+        Radius of the goal (in length units).
     stop_on_arrival : bool
-        True if the movement also ends where the hand is near the position to which the target
-        brings it; False, as in a corrective movement, if it ends only on a hit or at its target.
+        If True, the movement also ends when the hand is near the position to which the target
+        brings it. If False, as in a corrective movement, it ends only on a hit or at its target.
     model : MotionModel
         The constants; only ``step`` and ``arrival_tolerance`` are used.
 
     Returns
     -------
     MoveResult
-        Where the robot stopped, the control ticks it took, and whether the goal is hit.
+        Where the robot stopped, the control ticks of the movement, and whether the goal is hit.
 
     Raises
     ------
     ValueError
-        A shape is wrong, a number is not finite or beyond 100,000, the radius is below 0, the hand
-        is unknown, or a constant of the model is out of bounds.
+        An argument cannot be used:
+
+        - a shape is wrong;
+        - a number is not finite, or beyond 100,000;
+        - the radius is below 0;
+        - the hand is unknown;
+        - a constant of the model is out of bounds.
     TypeError
         ``robot``, ``model`` or ``stop_on_arrival`` has another type.
 
@@ -360,25 +365,28 @@ def follow(
     ----------
     robot : Robot
     q : ndarray, shape (dof,)
-        Configuration in which the robot stands, length unit (base) and rad (joints).
+        Configuration in which the robot stands, in length units (base) and rad (joints).
     waypoints : ndarray, shape (W, dof)
         At least one configuration to pass through (:func:`path_points`).
     hand : {"left", "right"}
     goal : tuple of float
-        Centre of the goal, x and y, length unit.
+        Centre of the goal, x and y in length units.
     radius : float
-        Radius of the goal, length unit.
+        Radius of the goal (in length units).
     model : MotionModel
 
     Returns
     -------
     MoveResult
-        The first point of the path with the hand in the goal, or the last waypoint.
+        Result of the movement, which stops at the first point of the path at which the hand is in
+        the goal, or else at the last waypoint.
 
     Raises
     ------
     ValueError
         A shape is wrong, the hand is unknown, or a number is not finite or out of bounds.
+    TypeError
+        ``model`` is not a MotionModel.
     """
     check_goal(goal, radius), check_model(model)
     points = path_points(robot, q, waypoints, model)
@@ -392,8 +400,8 @@ def follow(
 def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
     """Return the configurations at the n steps of a straight movement, with both ends.
 
-    ``q`` and ``target`` have shape ``(dof,)``, the result ``(n + 1, dof)``, length unit and rad.
-    They are rounded as in the kernels.
+    ``q`` and ``target`` have shape ``(dof,)``, the result ``(n + 1, dof)``, in length units and
+    rad. The results are rounded as in the kernels.
     """
     difference, square = target - q, 0.0
     for value in difference.tolist():
@@ -406,8 +414,8 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
 def segment_lengths(configurations: ArrayLike) -> Array:
     """Return the joint-space distance from each configuration to the next.
 
-    ``configurations`` has shape ``(k, dof)``, the result ``(k - 1,)``, length unit and rad
-    together.
+    ``configurations`` has shape ``(k, dof)``, the result ``(k - 1,)``, in a mix of length units and
+    rad.
     """
     return np.asarray(np.sqrt((np.diff(configurations, axis=0) ** 2).sum(axis=1)))
 
@@ -416,9 +424,9 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
     """Return the points of the n steps of a path through waypoints in joint space.
 
     The path goes from ``q``, shape ``(dof,)``, straight to each of the W > 0 ``waypoints`` in turn,
-    shape ``(W, dof)``. The result has shape ``(n + 1, dof)``, length unit and rad. Point k < n lies
-    k times ``model.step`` along the path; point n is the last waypoint. Raises ValueError for a
-    wrong shape, and for a number that is not finite or beyond 100,000.
+    shape ``(W, dof)``. The result has shape ``(n + 1, dof)``, in length units and rad. Point k < n
+    lies k times ``model.step`` along the path; point n is the last waypoint. Raises ValueError for
+    a wrong shape, and for a number that is not finite or beyond 100,000.
     """
     shape = (len(waypoints), robot.dof)
     corners = np.vstack([configuration(robot, q), finite_array("waypoints", waypoints, shape)])
@@ -476,7 +484,7 @@ def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
     """Return the centre of a goal, x and y, as two floats.
 
     Raises ValueError if ``centre`` is not two finite numbers within ±100,000, or if ``radius`` is
-    not from 0 to 100,000, length unit.
+    not from 0 to 100,000 (in length units).
     """
     x, y = finite_array("goal", centre, (2,)).tolist()
     check_limits("radius", radius, 0.0, LARGEST_ENTRY)

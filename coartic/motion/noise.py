@@ -29,9 +29,10 @@ from coartic.tasks.task import Task
 
 Flags = NDArray[np.bool_]
 MOST_CORRECTIONS = 50
-"""Most corrective movements for one goal; an execution with noise that needs more fails."""
-_MOST_NOISE = 100.0  # standard deviation, length unit and rad
-_STAYS = 1e-9  # change up to which a coordinate does not move, length unit or rad
+"""Largest number of corrective movements for one goal. An execution with noise that needs more
+fails."""
+_MOST_NOISE = 100.0  # standard deviation, in length units and rad
+_STAYS = 1e-9  # change up to which a coordinate does not move, in length units or rad
 _FIND, _FOLLOW = 4, 5  # further actions: find a correction, follow a path
 _ACTIONS = {"learned": MOVE, "planned": MOVE, "corrective": REPEAT, "path": _FOLLOW}
 
@@ -58,13 +59,14 @@ def execute_noisy(
     solutions : iterable of iterables of Movement
         K solutions of the task, as a list even if there is only one.
     motor_noise : float
-        Standard deviation s of the noise, from 0 to 100, length unit (base) and rad (joints). With
-        0 the ticks are the same as in :func:`coartic.execute`.
+        Standard deviation s of the noise, from 0 to 100, in length units (base) and rad (joints).
+        With 0 the ticks are the same as in :func:`coartic.execute`.
     repeats : int
         Number R of executions of each solution.
     seed : int or iterable of int
-        A seed for each solution, or one seed, from which solution k takes child k. The ticks of a
-        solution depend on its own seed and on ``repeats``, but not on the other solutions.
+        A seed for each solution, or one seed, whose child k (``SeedSequence.spawn``) is the seed of
+        solution k. The ticks of a solution depend on its own seed and on ``repeats``, but not on
+        the other solutions.
     model : MotionModel
     signal_dependent : bool
         True if the noise of aimed movements grows with their length. The noise of corrections
@@ -75,15 +77,16 @@ def execute_noisy(
     ndarray, shape (K, R)
         Control ticks of each execution; NaN if it failed, because the corrective process did not
         converge or the goal was still missed after 50 corrections. If a solution has failures,
-        report their number as well, because the mean over its other executions is too good.
+        report their number as well, because the mean over its other executions is too low.
 
     Raises
     ------
     TaskError, TypeError
         The task cannot be used, or an argument has another type.
     SolutionError
-        A solution breaks the task's rules, as in :func:`coartic.execute`, or its movements have
-        other ticks than they take on this task with this model: it may be of another task.
+        A solution breaks the task's rules, as in :func:`coartic.execute`. Or its movements have
+        other ticks than they take on this task with this model, for example because the solution is
+        of another task.
     ValueError
         ``motor_noise``, ``repeats``, ``seed`` or a constant of the model is out of bounds, or the
         number of seeds is not the number of solutions.
@@ -157,9 +160,9 @@ class _Aim(NamedTuple):
     """Movement to a target of the solution, or along its waypoints."""
 
     action: int
-    """How it is made: ``MOVE``, ``REPEAT`` (corrective) or ``_FOLLOW`` (a path)."""
+    """How the movement is made: ``MOVE``, ``REPEAT`` (corrective) or ``_FOLLOW`` (a path)."""
     points: Configs
-    """The target, shape ``(1, dof)``, or the K waypoints, ``(K, dof)``, length unit and rad."""
+    """The target, shape ``(1, dof)``, or the K waypoints, ``(K, dof)``, in length units and rad."""
     moves: Flags
     """True where a coordinate moves, shape ``(dof,)``."""
 
@@ -168,7 +171,7 @@ class _Noise(NamedTuple):
     """Motor noise of a solution."""
 
     sd: float
-    """Standard deviation s, length unit and rad."""
+    """Standard deviation s, in length units and rad."""
     grows: bool
     """True if the noise of aimed movements grows with their length."""
     rng: np.random.Generator
@@ -183,9 +186,9 @@ class _Robots:
         self.batch = batch_for(compiled.task.robot, count)
         runs, dof = self.batch.runs, compiled.task.robot.dof
         self.q: Configs = runs["q"][:, :dof]
-        """Where each robot stands, shape ``(count, dof)``, length unit and rad."""
+        """Where each robot stands, shape ``(count, dof)``, in length units and rad."""
         self.targets: Configs = runs["target"][:, :dof]
-        """Where each robot is to move, likewise."""
+        """Target of each robot, in the same shape and units."""
         self.hit: Flags = runs["hit"]
         """True where the hand is in the present goal, shape ``(count,)``."""
         self.ticks = np.zeros(count)
@@ -209,13 +212,15 @@ class _Robots:
 
     @property
     def due(self) -> Flags:
-        """Executions that go on and have not hit the present goal, shape ``(count,)``."""
+        """True for the robots that have not failed and have not yet hit the present goal, shape
+        ``(count,)``."""
         return ~self.hit & ~np.isnan(self.ticks)
 
     def aim(self, aim: _Aim, misses: Array) -> None:
-        """Make a movement with the robots that are due.
+        """Move the robots that are :attr:`due`, as ``aim`` says.
 
-        It misses its end by ``misses``, shape ``(count, dof)``, in the coordinates that move.
+        Row n of ``misses``, shape ``(count, dof)``, is added to the target of robot n in the
+        coordinates that move. On a path, waypoint k of K is shifted by k/K of the row.
         """
         if aim.action != _FOLLOW:
             self.targets[:] = np.where(aim.moves, aim.points + misses, self.q)
@@ -233,7 +238,7 @@ class _Robots:
             self.ticks[n] += result.ticks
 
     def correct(self, hand: Hand, noise: _Noise) -> None:
-        """Correct the robots that are due until they hit the goal.
+        """Correct the robots that are :attr:`due` until they hit the goal.
 
         An execution fails if the corrective process does not converge, or after 50 corrections.
         """
@@ -255,7 +260,7 @@ class _Robots:
         self.ticks[self.due] = np.nan
 
     def _move(self, action: int) -> None:
-        """Move the robots that are due straight to their targets, and count the ticks."""
+        """Move the robots that are :attr:`due` straight to their targets, and count the ticks."""
         due = self.due
         self.act(action, due)
         self.ticks[due] += self.batch.runs["ticks"][due]
@@ -292,8 +297,8 @@ def _execute_exactly(robot: _Robots, plan: Plan) -> list[list[_Aim]]:
 def _is_by_process(robot: _Robots, movement: Movement) -> bool:
     """Return whether a corrective movement has the target that the corrective process finds.
 
-    Targets are compared to 1e-9, from where the robot stands. True if the movement has no target or
-    is not made.
+    The process begins where the robot stands. The targets count as the same if no coordinate
+    differs by more than 1e-9. The result is also True if the movement has no target or is not made.
     """
     if movement.target is None or not robot.due[0]:
         return True
@@ -364,8 +369,8 @@ def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
 def _check_ticks(task: Task, number: int, plan: Plan, ticks: float) -> None:
     """Check that a solution's movements have the ticks that they take without noise.
 
-    ``ticks`` is that number, NaN if the execution fails. Nothing is checked if a movement has no
-    ticks. Raises SolutionError.
+    ``ticks`` is the number that they take, or NaN if the execution fails. Nothing is checked if a
+    movement has no ticks. Raises SolutionError if the numbers differ.
     """
     stored = [movement.ticks for movements in plan for movement in movements]
     counts = [count for count in stored if count is not None]

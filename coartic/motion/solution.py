@@ -40,8 +40,8 @@ from coartic.tasks.task import Task, check_hands, hands_of, letters_of
 Kind = Literal["learned", "corrective", "planned", "path"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 HELD = 1e-6
-"""Largest distance of a locked base coordinate of a target from its value at the start, length
-unit. Solvers leave smaller differences."""
+"""Largest distance of a locked base coordinate of a target from its value at the start (in length
+units). Solvers leave smaller differences."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Movement:
     """
 
     goal: int
-    """Number of the goal for which the movement is made, from 1 as in the paper."""
+    """Number of the goal for which the movement is made. Goals count from 1, as in the paper."""
     hand: Hand
     """The hand that is to hit the goal, ``"left"`` or ``"right"``."""
     kind: Kind
@@ -67,14 +67,14 @@ class Movement:
     made only while the goal is not hit.
     """
     target: Array | None = None
-    """Target configuration q^t, shape ``(dof,)``, length unit and rad; for a path its last
+    """Target configuration q^t, shape ``(dof,)``, in length units and rad; for a path its last
     waypoint. If a corrective movement has None, the corrective process finds the target during
     execution."""
     ticks: int | None = None
     """Control ticks of the movement; None before the movement is executed."""
     waypoints: Array | None = None
-    """Configurations through which a path passes in turn, shape ``(k, dof)``, length unit and rad;
-    None for the other kinds."""
+    """Configurations through which a path passes in turn, shape ``(k, dof)``, in length units and
+    rad; None for the other kinds."""
     __eq__ = equal_contents
 
     def __post_init__(self) -> None:
@@ -90,8 +90,8 @@ class Execution:
     movements: tuple[Movement, ...]
     """The movements that were made, in order, with targets and ticks."""
     configurations: Array
-    """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, length unit and
-    rad."""
+    """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, in length units
+    and rad."""
     ticks: int
     """Total number of control ticks."""
     corrections: int
@@ -99,8 +99,8 @@ class Execution:
     iterations: int = 0
     """Iterations of the corrective process, with one Jacobian each."""
     evaluations: int = 0
-    """Forward-kinematics evaluations. A correction takes its iterations + 1. Each goal tried takes
-    one more if its first movement is corrective, and otherwise two more."""
+    """Forward-kinematics evaluations. A correction takes one more than its iterations. Each goal
+    that is tried takes one more if its first movement is corrective, and otherwise two more."""
     reason: str = ""
     """Sentence on why the task was not completed; empty if it was completed."""
     __eq__ = equal_contents
@@ -143,8 +143,8 @@ def execute(
 ) -> Execution:
     """Execute a solution from the task's start and score it.
 
-    If a goal is still missed after its movements, the corrective process corrects it from where the
-    robot stands, and the ticks of this movement count.
+    If a goal is still missed after its movements, the corrective process finds a correction from
+    where the robot stands. The ticks of this movement count.
 
     Parameters
     ----------
@@ -221,8 +221,9 @@ Plan = list[list[Movement]]
 def _with_targets(movements: list[Movement]) -> list[Movement | None]:
     """Return the movements for a goal that have targets, up to the first one without.
 
-    From that one on the corrective process acts. If the first movement is corrective, the list
-    begins with None, which stands for a check of the hand.
+    The corrective process acts from the first movement without a target on. If the first movement
+    is corrective, the list begins with None, which stands for a check whether the hand is in the
+    goal.
     """
     aimed: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
@@ -268,7 +269,7 @@ def movements_in(
         Length of a configuration.
     requested : iterable of iterable of sequence of Movement or None
         For each trial and goal the movements that were to be made (:func:`_with_targets`). The
-        kinds come from them.
+        kinds of the result come from these movements.
 
     Returns
     -------
@@ -363,10 +364,11 @@ def _execution_of(
 
 
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
-    """Compute the joint travel of the idle arm, rad, summed over the goals.
+    """Compute the joint travel of the idle arm, summed over the goals (in rad).
 
-    For each goal this is the Euclidean distance between the joint angles of the arm that does not
-    hit it, at this hit and at the hit before (for goal 1, at the start).
+    For each goal, the travel is the Euclidean distance between two vectors of joint angles of the
+    arm that does not hit the goal: those at this hit and those at the hit before (for goal 1, at
+    the start).
 
     Parameters
     ----------
@@ -460,9 +462,9 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
 def _check_point(task: Task, point: Any) -> Array:
     """Check a configuration, and return it as an array ``(dof,)``.
 
-    This is the array passed, or a new array if locked base coordinates have to be set to their
-    values at the start. Raises ValueError if ``point`` is not a configuration of the robot, or
-    moves a locked base coordinate by more than 1e-6.
+    The result is the array that was passed, or a new array if locked base coordinates have to be
+    set to their values at the start. Raises ValueError if ``point`` is not a configuration of the
+    robot, or moves a locked base coordinate by more than 1e-6.
     """
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # The length is quick to compute; with a NaN entry it is not below any limit.
@@ -496,8 +498,8 @@ def _hold_base(task: Task, points: Array) -> Array:
 def check_targets(task: Task, targets: Any) -> Configs:
     """Check targets, and return a copy with locked base coordinates as at the start.
 
-    The shape is ``(N, G, dof)``, length unit and rad; NaN is allowed. Raises ValueError for another
-    shape, for infinite entries, and for targets that move a locked base by more than 1e-6.
+    The shape is ``(N, G, dof)``, in length units and rad; NaN is allowed. Raises ValueError for
+    another shape, for infinite entries, and for targets that move a locked base by more than 1e-6.
     """
     copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
@@ -520,14 +522,14 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
     hands : str
         The hand for each goal, such as ``"RRLR"``.
     targets : array_like, shape (G, dof)
-        The configuration to move to for each goal, length unit (base) and rad (joints). For a row
-        of NaN only the corrective process acts.
+        The configuration to move to for each goal, in length units (base) and rad (joints). For a
+        row of NaN only the corrective process acts.
 
     Returns
     -------
     tuple of Movement
         A movement for each goal, of kind ``learned``, or ``corrective`` for a row of NaN.
-        :func:`coartic.execute` and :func:`coartic.trajectory` take it.
+        :func:`coartic.execute` and :func:`coartic.trajectory` accept the tuple as a solution.
 
     Raises
     ------
@@ -562,7 +564,7 @@ def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) 
     -------
     Execution
         Movements, configurations at the hits, control ticks and reward. If the corrective process
-        does not converge, ``completed`` is False and ``reason`` says so.
+        does not converge, ``completed`` is False, and ``reason`` says at which goal.
 
     Raises
     ------
@@ -621,9 +623,9 @@ def initial_hands(
 ) -> str:
     """Find the hand sequence of a task's first trial.
 
-    If the task names a sequence, this is the sequence. If the task names a policy, it is the
-    sequence for which the corrective process on its own gets the highest reward: among sequences of
-    one hand (``"best-single-hand"``), or among all (``"best-of-all"``).
+    If the task names a sequence, that sequence is returned. If the task names a policy, the result
+    is the sequence for which the corrective process on its own gets the highest reward: among
+    sequences of one hand (``"best-single-hand"``), or among all (``"best-of-all"``).
 
     Parameters
     ----------
@@ -658,7 +660,7 @@ def initial_hands(
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
     """Return the reward of the corrective process on its own with a task's initial hands.
 
-    None if the trial fails, or if a policy is to find the hands and finds none
+    Return None if the trial fails, or if a policy is to find the hands and finds none
     (:func:`initial_hands`).
     """
     try:

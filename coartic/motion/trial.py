@@ -82,7 +82,7 @@ def account_type(width: int) -> np.dtype[np.void]:
     each has a record with its ``target`` and ``moved``; all other fields are in the first record.
     """
     fields = {
-        "q": (np.float64, width),  # where the robot is afterwards, length unit and rad
+        "q": (np.float64, width),  # where the robot is afterwards, in length units and rad
         "target": (np.float64, width),  # of the movement; as requested if it is not made
         "corrected": (np.float64, width),  # target of the corrective movement, if one is made
         "moved": np.int64,  # ticks of the movement to the target, 0 if it is not made
@@ -140,8 +140,8 @@ def aim(run: RunRecord, target: Any) -> None:
 def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Let each of the first ``count`` runs do its ``action``: phase 3, *move*.
 
-    The actions are at :data:`IDLE`. ``q``, ``hit``, ``ticks``, ``evaluations`` and ``acting``
-    change in place. Ticks are 0 if there is no movement.
+    :data:`IDLE` lists the actions. ``q``, ``hit``, ``ticks``, ``evaluations`` and ``acting`` change
+    in place. Ticks are 0 if there is no movement.
     """
     for stops in (True, False):
         for i in range(count):
@@ -158,9 +158,9 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 def make_corrections(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Move each run for which **A** converged to the configuration found: phase 4, *correct*.
 
-    These are runs among the first ``count`` of a batch, after :func:`find_corrections`. The
-    movement ends as soon as the hand is in the goal, or at ``target``. ``ticks`` of each run become
-    the ticks of this movement, 0 if none is made.
+    Only the first ``count`` runs of a batch are moved, and :func:`find_corrections` has to be
+    called before. The movement ends as soon as the hand is in the goal, or at ``target``. ``ticks``
+    of each run become the ticks of this movement, 0 if none is made.
     """
     for i in range(count):
         batch.runs[i].acting = batch.runs[i].converged
@@ -172,7 +172,7 @@ def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
     """Write a run's result for its goal into an account: phase 5, *account*.
 
     ``moved`` is the number of ticks of the run's movements to targets. If the run missed its goal,
-    its trial ends. Its count of evaluations becomes 0.
+    its trial ends. The run's count of evaluations becomes 0.
     """
     fill_row(goal.q, run.q)
     goal.hand, goal.hit = run.hand, run.hit
@@ -218,7 +218,7 @@ def _move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> N
 def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
     """Let a corrective process set the ``target`` of each run that it applies to.
 
-    It applies to the runs among the first ``count`` that missed the goal, go on and may be
+    The process applies to those of the first ``count`` runs that missed the goal, go on and may be
     corrected. ``descend`` is the kernel of the process **A**. In each of the first ``count`` runs
     ``converged`` becomes True if **A** converged, and ``ticks`` becomes 0.
     """
@@ -253,9 +253,9 @@ def find_pulled_corrections(count: int, robot: RobotRecord, batch: Batch) -> Non
 
 
 class Requests(NamedTuple):
-    """Movements that the kernel is to make.
+    """Movements that the kernel is to make: N arms reach for G goals each.
 
-    They are movements of N arms to G goals each, M for a goal.
+    There are M movements for each goal of an arm.
     """
 
     starts: Configs
@@ -263,8 +263,8 @@ class Requests(NamedTuple):
     hands: Hands
     """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
     targets: Configs
-    """Targets, shape ``(N, G, M, dof)``, length unit and rad; NaN for entries that stay. The first
-    movement for a goal is always made, further ones only while the goal is missed."""
+    """Targets, shape ``(N, G, M, dof)``, in length units and rad; NaN for entries that stay. The
+    first movement for a goal is always made, further ones only while the goal is missed."""
     stops: NDArray[np.bool_]
     """True where the movement to a target ends on arrival as well, shape ``(N, G, M)``; empty if
     all movements do."""
@@ -313,9 +313,9 @@ def _reach_lot(
 ) -> None:
     """Let ``count`` arms from index ``offset`` on reach for their goals, in place.
 
-    At most as many arms as ``batch`` has runs. ``arms`` are :class:`Requests`, ``robot`` is a
-    :data:`RobotRecord`. Filled are ``goals``, the accounts ``(N, G, M)``, and ``counts``, shape
-    ``(N, 5)``, which the caller sets to 0.
+    ``count`` is at most the number of runs of ``batch``. ``arms`` are :class:`Requests`, and
+    ``robot`` is a :data:`RobotRecord`. This function fills the accounts ``goals``, shape ``(N, G,
+    M)``, and adds to ``counts``, shape ``(N, 5)``, which the caller sets to 0 before.
     """
     for i in range(count):
         n, run = offset + i, batch.runs[i]
@@ -374,7 +374,7 @@ def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any
 
 
 SHARE = 14 * SLOTS
-"""Smallest number of arms for a thread: starting a thread takes as long as a hundred trials."""
+"""Smallest number of arms for a thread. Starting a thread takes as long as a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Batches that no thread uses, by :attr:`Robot.max_links`."""
 
@@ -382,8 +382,8 @@ _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
     """Return new accounts of ``count`` trials.
 
-    They have ``goals`` goals, and ``moves`` movements to targets for each goal. The counts of the
-    trials are 0; the caller fills in everything else.
+    The accounts have ``goals`` goals, and ``moves`` movements to targets for each goal. The counts
+    of the trials are 0; the caller fills in everything else.
     """
     return Accounts(
         np.empty((count, goals, moves), account_type(width_of(robot))),
@@ -422,7 +422,7 @@ class Reached(NamedTuple):
     """Results of N arms that reached for a goal each (:func:`reach_goals`)."""
 
     q: Configs
-    """Configuration in which each arm ended, shape ``(N, dof)``, length unit and rad."""
+    """Configuration in which each arm ended, shape ``(N, dof)``, in length units and rad."""
     hit: NDArray[np.bool_]
     """True where the hand is in the goal, shape ``(N,)``."""
     ticks: NDArray[np.int64]
@@ -434,7 +434,8 @@ class Reached(NamedTuple):
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes its iterations + 1."""
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
+    iterations."""
 
 
 @checked_arguments
@@ -457,13 +458,13 @@ def reach_goals(
     robot : Robot
         The robot of all arms.
     q : ndarray, shape (N, dof)
-        Configurations in which the arms start, length unit (base) and rad (joints).
+        Configurations in which the arms start, in length units (base) and rad (joints).
     hands : ndarray of int, shape (N,)
         Hand of each arm: 0 left, 1 right.
     goals : ndarray, shape (N, 2)
-        Centre of the goal of each arm, x and y, length unit.
+        Centre of the goal of each arm, x and y in length units.
     radius : float
-        Radius of all goals, length unit.
+        Radius of all goals (in length units).
     targets : ndarray, shape (N, dof), optional
         Targets of the first movements. An entry that is NaN keeps its value. An arm whose row is
         NaN has no target: only the corrective process acts. By default no arm has a target.
@@ -477,8 +478,8 @@ def reach_goals(
     Returns
     -------
     Reached
-        Where the arms ended, and what that took. An arm with a target beyond 1e5 does not move or
-        hit.
+        Where the arms ended, and the ticks and evaluations that this took. An arm with a target
+        beyond 1e5 does not move, and does not hit its goal.
 
     Raises
     ------
@@ -521,7 +522,7 @@ class CompiledTask(NamedTuple):
 
     task: Task
     starts: Configs
-    """Configuration at the start of a trial, shape ``(1, dof)``, length unit and rad."""
+    """Configuration at the start of a trial, shape ``(1, dof)``, in length units and rad."""
     goals: Points
     """Centres of the goals, shape ``(1, G, 2)``."""
     parameters: NDArray[np.void]
@@ -624,10 +625,11 @@ class Trials(NamedTuple):
     iterations: NDArray[np.int64]
     """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
     evaluations: NDArray[np.int64]
-    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes its iterations + 1."""
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
+    iterations."""
     targets: Configs
-    """Targets of the movements made, shape ``(N, G, dof)``, length unit and rad. A row is NaN if no
-    target was passed. For goals after a failure the row is the target as it was passed."""
+    """Targets of the movements made, shape ``(N, G, dof)``, in length units and rad. A row is NaN
+    if no target was passed. For goals after a failure the row is the target as it was passed."""
     reached: Configs
     """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN if it was not hit."""
 
@@ -635,7 +637,7 @@ class Trials(NamedTuple):
     def rewards(self) -> Array:
         """Total reward of each trial, minus its ticks, shape ``(N,)``.
 
-        It is -inf if the trial failed.
+        The reward of a failed trial is -inf.
         """
         return np.where(self.completed, -self.ticks, -np.inf)
 
@@ -643,8 +645,10 @@ class Trials(NamedTuple):
 def trials_of(accounts: Accounts, dof: int) -> Trials:
     """Return the results of trials from their accounts.
 
-    ``dof`` is the number of entries of a configuration. Arrays other than ``completed`` share
-    memory with ``accounts``, whose ``q`` becomes NaN where a goal is not hit.
+    ``dof`` is the number of entries of a configuration. The arrays of the result, except
+    ``completed``, are views of ``accounts``. This function changes ``accounts``: it sets
+    ``accounts.goals["q"]`` to NaN at goals that were not hit. If there are several movements for a
+    goal, only the first account of the goal is used.
     """
     goals, counts = accounts.goals[..., 0], accounts.counts
     reached = goals["q"][..., :dof]

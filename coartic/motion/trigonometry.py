@@ -37,8 +37,8 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n
 def _reduced(angle: float) -> tuple[float, float, int]:
     """Return sine and cosine of an angle's rest, and its quarter turn modulo 4.
 
-    The rest is ``angle``, rad, minus the nearest integer number of quarter turns. Only for |angle|
-    below 1e5 rad.
+    The rest is ``angle`` (in rad) minus the nearest integer number of quarter turns. |angle| must
+    be below 1e5 rad.
     """
     quarters = np.rint(angle * _PER_QUARTER)
     x = ((angle - quarters * _HIGH) - quarters * _MIDDLE) - quarters * _LOW

@@ -38,14 +38,14 @@ def draw_robot(
 ) -> Callable[[Array], None]:
     """Draw the base and the arms of the task's hands in a configuration.
 
-    The limits of ``axes`` are the caller's task: the base does not widen them.
+    The caller sets the limits of ``axes``, because the base does not widen them.
 
     Parameters
     ----------
     axes : matplotlib Axes
     task : Task
     q : ndarray, shape (dof,)
-        The configuration, length unit and rad.
+        The configuration, in length units and rad.
     weight : float
         Factor for the width of lines.
     alpha : float
@@ -107,10 +107,11 @@ def fill_goals(circles: list[Circle], hit: ArrayLike) -> None:
 
 
 def number_goals(axes: Axes, task: Task, *, weight: float = 1.0, **text: Any) -> None:
-    """Write the number of every goal, from 1, above it.
+    """Write the number of each goal (from 1) above the goal.
 
-    It is below the goal if another goal is close above. ``weight`` is a factor for the distance.
-    ``text`` has options of ``Axes.annotate`` that are not set here, such as ``fontsize``.
+    The number is below the goal if another goal is close above. ``weight`` is a factor for the
+    distance between number and goal. ``text`` has options of ``Axes.annotate`` that are not set
+    here, such as ``fontsize``.
     """
     goals = task.goal_array
     right, up = np.moveaxis(goals[None] - goals[:, None], 2, 0)
@@ -136,13 +137,13 @@ def box(task: Task, configurations: ArrayLike, margin: float = 0.45) -> tuple[Ar
     configurations : array_like, shape (..., dof)
         Configurations of the base and of the arms of the task's hands.
     margin : float
-        Free border, length unit, for arms of length 4. It scales with the shorter arm. Circles of
-        goals may extend into it.
+        Width of the free border for arms of length 4 (in length units). The width scales with the
+        shorter arm. Circles of goals may extend into the border.
 
     Returns
     -------
     low, high : ndarray, shape (2,)
-        The lower left and the upper right corner, length unit.
+        The lower left and the upper right corner (in length units).
     """
     margin *= task.robot.scale
     points = [

@@ -1,4 +1,4 @@
-"""Films of movements, GIF or MP4, in the colours of the play page.
+"""Films of movements (GIF or MP4) in the colours of the play page.
 
 Open squares mark the left arm, closed circles the right arm. Goals are numbered circles. A goal is
 filled from the tick at which it is hit, and the film pauses there. Pale lines trace the hands.
@@ -46,7 +46,7 @@ def write_film(
     width: int = 800,
     replace: bool = False,
 ) -> tuple[int, float]:
-    """Write a film of movements side by side, which all begin at their first tick.
+    """Write a film of movements side by side. All begin at their first tick.
 
     Parameters
     ----------

@@ -36,8 +36,8 @@ class Trajectory:
     execution: Execution
     """Execution of the solution (:func:`coartic.execute`)."""
     configurations: Array
-    """Configurations, shape ``(ticks, dof)``, length unit (base) and rad (joints): a row for each
-    control tick, the first row being the start. A movement of k steps has k + 1 rows, so that its
+    """Configurations, shape ``(ticks, dof)``, in length units (base) and rad (joints): a row for
+    each control tick. The first row is the start. A movement of k steps has k + 1 rows, so that its
     last row is repeated as the first row of the next movement."""
     hits: NDArray[np.int64]
     """Row in which each goal was hit, shape ``(G,)``. If a goal was hit without any ticks, this is
@@ -62,17 +62,17 @@ class Trajectory:
     def hand_path(self, hand: Hand) -> Array:
         """Return the position of a hand in each row of ``configurations``.
 
-        The shape is ``(rows, 2)``, length unit. The hand need not be one that may hit goals of the
-        task.
+        The shape is ``(rows, 2)``, in length units. The hand need not be one that may hit goals of
+        the task.
         """
         return self.task.robot.forward_kinematics(self.configurations, hand)
 
     def subtask(self, goal: int) -> Array:
         """Return the rows of ``configurations`` that belong to a goal.
 
-        They go from the hit of the goal before, or from the start, to the hit of this goal, both
-        included, shape ``(rows, dof)``. There are no rows if no tick was made. ``goal`` is a number
-        from 1; ValueError is raised if the task does not have it.
+        The rows, shape ``(rows, dof)``, go from the hit of the goal before (or from the start) to
+        the hit of this goal, both included. There are no rows if no tick was made. ``goal`` is the
+        number of the goal, from 1. Raises ValueError if the task does not have the goal.
         """
         check_limits("goal", goal, 1, len(self.hits))
         start = self.hits[goal - 2] if goal > 1 else 0
@@ -84,10 +84,11 @@ class Trajectory:
         The index is ``tick``, from 0. The columns are
 
         - ``goal``: number of the first goal that is hit in this or a later row;
-        - ``hand``: the hand that is to hit it;
-        - ``base_x`` and ``base_y`` (length unit), ``left_1`` and so on (rad): the configuration;
-        - ``left_x``, ``left_y``, ``right_x`` and ``right_y`` (length unit): the positions of both
-          hands.
+        - ``hand``: the hand that is to hit this goal;
+        - ``base_x`` and ``base_y`` (in length units), ``left_1`` and so on (in rad): the
+          configuration;
+        - ``left_x``, ``left_y``, ``right_x`` and ``right_y`` (in length units): the positions of
+          both hands.
 
         ``attrs["units"]`` has the units.
         """
@@ -110,7 +111,7 @@ class Trajectory:
     def plot(self) -> Figure:
         """Return a figure of the robot at the start (pale) and at each hit.
 
-        It also shows the path of the hand that hits each goal.
+        The figure also shows the path of the hand that hits each goal.
         """
         from matplotlib.figure import Figure
 
@@ -155,6 +156,8 @@ class Trajectory:
         CoarticError
             The file has another suffix, no control tick was made, or the file exists or cannot be
             written.
+        ArgumentError
+            An argument has another type, or ``width`` is out of range.
         """
         from coartic.pictures.film import write_film
 

@@ -1,2 +1,4 @@
-"""Runs as they are planned and stored. Modules here know a method by its name, version and
-parameters, not how it works."""
+"""Runs as they are planned and stored.
+
+Modules here know a method by its name, version and parameters, not how it works.
+"""

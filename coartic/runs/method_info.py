@@ -34,8 +34,8 @@ ALWAYS_IN_IDS = frozenset(
     }
 )
 """Names of parameters that are always a part of the id of a run. Do not add names. Any other
-parameter is a part of the id only if its value is not the default. So a new parameter of a method,
-or a new field of an exploration condition, does not change the ids of existing runs."""
+parameter is a part of the id only if its value is not the default. Therefore a new parameter of a
+method, or a new field of an exploration condition, does not change the ids of existing runs."""
 VERSION = re.compile(r"\d+\.\d+")
 """Pattern of the code of a built-in method: versions of model and method."""
 
@@ -60,9 +60,9 @@ class MethodInfo:
     """Versions of model and method, such as ``1.2``. For a method file it is a hash of the code
     (:mod:`coartic.benchmarks.method_files`)."""
     packages: dict[str, str] = field(default_factory=dict, compare=False)
-    """Versions of the installed packages that its method file imports, by name."""
+    """Versions of the installed packages that the method file imports, by name."""
     tuned_on: str = field(default="", compare=False)
-    """Tasks on which its parameters were chosen; not stored."""
+    """Tasks on which the method's parameters were chosen; not stored."""
     where: str = field(default="", compare=False)
     """Module or method file that a worker imports; not stored."""
 
@@ -79,7 +79,8 @@ class MethodInfo:
     def load(self) -> type[Method]:
         """Import the method and return its class.
 
-        A process imports it once for each ``code``. It does not notice when the file changes.
+        A process imports the method once for each ``code``. It does not notice when the file
+        changes.
         """
         return load_method(*self.key)
 
@@ -121,15 +122,16 @@ class MethodInfo:
         return dict(self._ask("rules"))
 
     def _ask(self, question: str, *arguments: Any) -> Any:
-        """Ask the method, or the process that has imported its file (:func:`answer`)."""
+        """Ask the method (:func:`answer`), directly or in the process that has imported its
+        file."""
         if self.where in READERS:
             return READERS[self.where](self.name, question, *arguments)
         return answer(self.load(), question, *arguments)
 
 
 READERS: dict[str, Callable[..., Any]] = {}
-"""Functions that ask the process which has imported a method file, by the path of the file. This
-process does not import method files."""
+"""Functions that ask the process which has imported a method file, by the path of the file. For
+these files this process does not import the file itself."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
@@ -142,7 +144,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     question : {"complete", "why_not", "rules"}
         Name of the function of :class:`MethodInfo` whose result is returned.
     *arguments
-        Parameters, except for ``"rules"``; then, for ``"why_not"``, the entries of an outline.
+        None for ``"rules"``. For the other questions the parameters of the method, and for
+        ``"why_not"`` also the entries of an :class:`Outline`.
 
     Raises
     ------
@@ -181,7 +184,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
-    """Make the MethodInfo of a class; other parameters are its fields of the same names."""
+    """Make the MethodInfo of a class. The other arguments are fields of the MethodInfo."""
     return MethodInfo(
         name=method.name,
         title=method.title,
@@ -197,7 +200,7 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return the defaults of parameters as plain data, by name; None for one without a default."""
+    """Return the defaults of parameters as plain data, by name; None if there is no default."""
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
         for name, field in method.Parameters.model_fields.items()
@@ -250,10 +253,11 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 @cache
 def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
-    """Import a method file, and return the module and the names of the modules that it loaded.
+    """Import a method file, and return its module and the names of loaded modules.
 
-    A process imports the file once for each ``code``, a hash. The folder of the file is added to
-    ``sys.path``. Errors of the file are raised as they are.
+    The names are those of the other modules that the import has loaded. A process imports the file
+    once for each ``code``, a hash. The folder of the file is added to ``sys.path``. Errors of the
+    file are raised as they are.
     """
     name = f"coartic_method_{path.stem}"
     if str(path.parent) not in sys.path:

@@ -29,7 +29,8 @@ class Cell:
     parameters: dict[str, Any]
     """Parameters of the method, by name (:meth:`.MethodInfo.complete`)."""
     trial_budget: int | None = None
-    """Most trials of a run, without the search for initial hands; None for no limit."""
+    """Largest number of trials of a run, without the search for initial hands; None for no
+    limit."""
 
     @property
     def setting(self) -> str:
@@ -50,7 +51,7 @@ class Cell:
 
     @cached_property
     def id(self) -> str:
-        """Id of the cell: 16 hex digits of :attr:`digest`, ``-``, version or code of the method."""
+        """Id of the cell: 16 hex digits of :attr:`digest`, a hyphen, and ``MethodInfo.code``."""
         return f"{self.digest[:16]}-{self.method.code}"
 
     @cached_property
@@ -60,7 +61,7 @@ class Cell:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of task, method, parameters, model and trial budget, 64 hex digits.
+        """Hash of task, method, parameters, model and trial budget: 64 hex digits.
 
         The code of the method and the time limit do not count.
         """
@@ -86,22 +87,24 @@ class Job:
     seed: int
     """Seed of the suite."""
     numbers: Sequence[int]
-    """Numbers of the runs, from 0 in each cell. In a plan they are a range. The plan of a results
-    folder stores a job of runs 50 to 99 as a job of runs 0 to 99."""
+    """Numbers of the runs, from 0 in each cell. In a plan the numbers are a range. The plan of a
+    results folder stores a job of runs 50 to 99 as a job of runs 0 to 99."""
     time_limit_s: float | None = None
-    """Most CPU time of all runs of the job, s; None for no limit."""
+    """Limit of the CPU time of all runs of the job together (in s); None for no limit."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
     suite_trials: int | None = None
-    """Trials of a run in the suite's file, if the command asks for another number; else None."""
+    """Number of trials of a run in the suite's file if the command asks for another number;
+    otherwise None."""
     question: tuple[str, str] | None = None
     """Title and description of a suite of the user's own on its own tasks; otherwise None."""
 
     def run_id(self, number: int) -> str:
         """Return the id of a run.
 
-        It is 16 hex digits of a hash of cell, seed and number, a hyphen, and the version or code of
-        the method.
+        The id has the form ``HASH-CODE``. HASH is 16 hex digits of a hash of the cell, the suite's
+        seed and the run's number. CODE is ``MethodInfo.code``: the versions of model and method, or
+        the hash of a method file.
         """
         text = f"{self.cell.digest} {self.seed} {number}"
         digits = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -126,11 +129,11 @@ def cell_of(
     task : Task
     method : MethodInfo
     parameters : mapping
-        Parameters of the method, by name. Other parameters have their defaults.
+        Parameters of the method, by name. Parameters that are not passed have their defaults.
     trials : int, optional
         Default of parameter ``trials``, for methods that have it.
     trial_budget : int, optional
-        Most trials of a run.
+        Largest number of trials of a run.
 
     Returns
     -------
@@ -148,7 +151,10 @@ def cell_of(
 
 
 def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
-    """Return tasks by name. Raises CoarticError if two different tasks have the same name."""
+    """Return tasks by name.
+
+    Raises CoarticError if two different tasks have the same name.
+    """
     named = dict[str, Task]()
     for task in tasks:
         if named.setdefault(task.name, task) != task:
@@ -161,8 +167,8 @@ def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
 def run_seed(suite_seed: int, task: str, number: int) -> int:
     """Return the seed of a run.
 
-    It depends only on the suite's seed, the task's name and the run's number. It does not depend on
-    the method, so that the runs of two methods are paired.
+    The seed depends only on the suite's seed, the task's name and the run's number. It does not
+    depend on the method, so that the runs of two methods are paired.
     """
     words = np.frombuffer(hashlib.sha256(task.encode()).digest()[:16], dtype="<u4")
     sequence = np.random.SeedSequence(suite_seed, spawn_key=(*map(int, words), number))

@@ -33,25 +33,27 @@ PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
 a learner) and ``replay`` (a greedy trial without noise after learning)."""
 PARTS = tuple(PREFIXES)
 MOTOR_NOISE = 0.01
-"""Standard deviation of the motor noise with which each solution is executed when it is scored, rad
-and length unit (:func:`coartic.execute_noisy`)."""
+"""Standard deviation of the motor noise with which each solution is executed when it is scored, in
+length units and rad (:func:`coartic.execute_noisy`)."""
 NOISY_EXECUTIONS = 100
-"""Number of these executions."""
+"""Number of executions of each solution with motor noise."""
 UNREPEATED = "made_again"
-"""Key of the details of a run for the difference that was found when the run was made again."""
+"""Key in the details of a run. Its value is the difference that was found when the run was made
+again."""
 _MOST_MOVEMENTS = 10_000
-"""Most movements of a solution."""
+"""Largest number of movements of a solution."""
 _MOST_NUMBERS = 400_000
-"""Most numbers in the start, the targets and the waypoints of a solution."""
+"""Largest number of entries in the start, the targets and the waypoints of a solution."""
 MOST_STEPS = 1_000_000
-"""Most movement steps on the straight path from the start through all targets and waypoints."""
+"""Largest number of movement steps on the straight path from the start through all targets and
+waypoints."""
 
 
 class Score(NamedTuple):
     """Score of a part of a run (solution, initial or replay); None for missing values."""
 
     reward: int | None = None
-    """Total reward: the negative number of ticks."""
+    """Total reward: minus the number of ticks."""
     hands: str | None = None
     """Hand of each goal, such as ``LRLR``."""
     movements: tuple[Movement, ...] = ()
@@ -59,7 +61,7 @@ class Score(NamedTuple):
     corrections: int | None = None
     """Number of corrective movements; only for a solution."""
     other_arm_travel: float | None = None
-    """Joint travel of arms during movements of the other hand, rad; only for a solution."""
+    """Joint travel of arms during movements of the other hand (in rad); only for a solution."""
     noisy_ticks: float | None = None
     """Mean ticks of a solution over :data:`NOISY_EXECUTIONS` executions with motor noise of
     standard deviation :data:`MOTOR_NOISE`; None if one of them fails."""
@@ -70,15 +72,15 @@ class Times:
     """Time and memory of a run. The runs of a job share its time equally."""
 
     wall_s: float | None = None
-    """Wall time, s; None if unknown."""
+    """Wall time (in s); None if unknown."""
     cpu_s: float | None = None
-    """CPU time, s; None if unknown."""
+    """CPU time (in s); None if unknown."""
     warm: bool | None = None
     """True if the process had run the method before; None if unknown."""
     together: int = 1
-    """Number of runs of the job, which were made side by side."""
+    """Number of runs of the job. They were made side by side."""
     process_peak_mb: float | None = None
-    """Most memory of the worker so far, also in earlier runs, MiB; None if unknown."""
+    """Largest memory of the worker so far, including earlier runs (in MiB); None if unknown."""
 
 
 @dataclass(frozen=True)
@@ -101,8 +103,8 @@ class Outcome:
     """Reward of each trial; None if the trial failed or its reward is not stored."""
     times: Times = Times()
     environment: dict[str, Any] | None = None
-    """Versions, platform, processor, variables, arithmetic and commit, by name. Entries may be left
-    out if they are those of the process that scores the run."""
+    """Versions, platform, processor, variables, arithmetic and commit, by name. An entry may be
+    left out if it is the same as in the process that scores the run."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,7 @@ class Run:
     def counts(self) -> Any:
         """Counts of the run, as attributes of :class:`~coartic.method.Meter`.
 
-        They are None if the worker gave no answer.
+        All counts are None if the worker gave no answer.
         """
         return self.outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter())))
 
@@ -178,7 +180,7 @@ class Run:
     def early_corrections(self) -> int | None:
         """Corrective movements in the first tenth of a learner's trials after trial 0.
 
-        It is None if they were not counted.
+        The value is None if the corrections were not counted.
         """
         return self._corrections(1)
 
@@ -186,7 +188,7 @@ class Run:
     def late_corrections(self) -> int | None:
         """Corrective movements in the last tenth of a learner's trials after trial 0.
 
-        It is None if they were not counted.
+        The value is None if the corrections were not counted.
         """
         return self._corrections(-1)
 
@@ -208,8 +210,8 @@ class Run:
     def downsample(self) -> Run:
         """Return a copy of the run with fewer rewards.
 
-        It has the rewards of the best trial and of each trial that was better than all earlier
-        ones. Other rewards are None.
+        The copy has the rewards of the best trial and of each trial that was better than all
+        earlier ones. Other rewards are None.
         """
         best, solved, rewards = -math.inf, self.best_trial, list[int | None]()
         for trial, reward in enumerate(self.outcome.rewards):
@@ -220,9 +222,10 @@ class Run:
 
     @cached_property
     def result(self) -> str:
-        """Hash of status, movements and stored rewards, 16 hex digits.
+        """Hash of status, movements and stored rewards: 16 hex digits.
 
-        Movements count with their ticks and configurations. Times and counts do not count.
+        The hash includes the ticks and configurations of the movements. It does not include times
+        and counts.
         """
         movements = [[part, *data] for part in PARTS for data in self.movement_data(part)]
         content = json.dumps([self.outcome.status, *movements]).encode()
@@ -238,7 +241,7 @@ class Run:
     def to_row(self) -> dict[str, Any]:
         """Return the columns of the run in table ``results``, by name.
 
-        The store adds the others: ``cell``, ``environment``, ``movements`` and ``rewards``.
+        The store adds the other columns: ``cell``, ``environment``, ``movements`` and ``rewards``.
         """
         row = {name: attrgetter(source)(self) for name, _, source, _ in COLUMNS if source}
         details = json.dumps(self.outcome.details)
@@ -327,7 +330,7 @@ documentation are made from them. A column has
 
 
 def movement_data(movement: Movement) -> list[Any]:
-    """Return a movement as a list of goal, hand, kind, ticks and path.
+    """Return a movement as a list of its goal, hand, kind, ticks and path.
 
     Workers send movements in this form, hashes are computed from it, and folders store it. The path
     is JSON: the target, or the waypoints of a movement of kind ``path``. -0.0 becomes 0.0. Missing
@@ -362,10 +365,10 @@ def movement_from(data: Sequence[Any]) -> Movement:
 def reward_bytes(rewards: Sequence[int | None]) -> bytes:
     """Encode the rewards of trials as bytes, which the caller compresses.
 
-    The numbers have four bytes. The first number is the best reward, signed (0 if there is none).
-    The number of each trial is 1 plus the ticks by which its reward is lower, or 0 if its reward is
-    None. The lowest bytes of all numbers come first, then the next bytes, because they compress
-    better in this order.
+    Each number has four bytes. The first number is the best reward, signed (0 if there is none).
+    The number of each trial is 1 plus the difference between the best reward and the trial's, or 0
+    if the trial's reward is None. The lowest bytes of all numbers come first, then the next bytes,
+    because bytes compress better in this order.
     """
     values = np.array(rewards, np.float64)  # None becomes NaN
     best = 0.0 if np.isnan(values).all() else np.nanmax(values)
@@ -385,8 +388,8 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
     Returns
     -------
     list of Execution or Exception
-        Execution of each solution, in order. For a solution that breaks the rules of the task or is
-        too long (:func:`too_long`) it is the error, which is not raised.
+        Execution of each solution, in order. A solution that breaks the rules of the task or is too
+        long (:func:`too_long`) has the error instead, which is not raised.
     """
     errors = [too_long(task, solution) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]

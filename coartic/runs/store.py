@@ -104,7 +104,10 @@ class Store:
     def __init__(
         self, folder: Path, connection: sqlite3.Connection, content: bytes | None = None
     ) -> None:
-        """Use an open connection; ``content`` is the content of a file that is only in memory."""
+        """Wrap an open connection.
+
+        ``content`` is the content of the file if the file is only in memory, otherwise None.
+        """
         self.folder = folder
         self._db, self._content = connection, content
 
@@ -200,15 +203,17 @@ class Store:
         Returns
         -------
         list of tuple
-            For each run: the position of its job in the plan, from 0; its number; its status; its
-            limit of CPU time, s, or None for no limit.
+            An entry ``(position, number, status, time_limit_s)`` for each run. ``position`` is that
+            of the run's job in the plan, from 0. ``time_limit_s`` is the limit of CPU time (in s),
+            or None for no limit.
         """
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
     def stale(self) -> Counter[tuple[str, str, str]]:
-        """Return numbers of runs of the plan that another version or code of their method made.
+        """Count the runs of the plan that another version or code of their method made.
 
-        The keys are triples: id of the method, that version, and the version in the plan.
+        The keys are triples: id of the method, the version or code that made the runs, and the one
+        in the plan.
         """
         query = """SELECT now.method, old.code, now.code, count(*) FROM suite
             JOIN cells AS now ON now.runs IS NOT NULL
@@ -246,7 +251,7 @@ class Store:
     def imports(self) -> dict[str, list[str]]:
         """Return the packages that the files of methods import, by id of the method.
 
-        They are names with versions, over all runs of the plan.
+        The packages are names with versions, over all runs of the plan.
         """
         by_method = defaultdict[str, dict[str, None]](dict)
         for method, made, _ in self._packages():
@@ -296,8 +301,8 @@ class Store:
     def write(self, runs: Iterable[Run]) -> None:
         """Write finished runs, all of them or none.
 
-        They replace stored runs with the same cell, seed and number. Raises CoarticError if they
-        cannot be stored, such as on a full disk.
+        The runs replace stored runs with the same cell, seed and number. Raises CoarticError if the
+        runs cannot be stored, for example because the disk is full.
         """
         with self.transaction():
             for run in runs:
@@ -325,7 +330,10 @@ class Store:
             raise CoarticError(f"{plain(str(self.folder / RUNS_FILE))} cannot be used: {_DAMAGED}")
 
     def include(self, other: Store) -> None:
-        """Copy runs of the plan that this folder lacks from another folder."""
+        """Copy from another folder the runs that this folder lacks.
+
+        Only runs of cells of the plan are copied.
+        """
         file = f"{(other.folder / RUNS_FILE).absolute().as_uri()}?mode=ro"
         with explain_errors(other.folder):
             self._db.execute("ATTACH ? AS other", (":memory:" if other._content else file,))
@@ -386,7 +394,7 @@ class Store:
             return run
 
     def runs(self) -> pd.DataFrame:
-        """Return view ``runs``: a row for each run of the plan that the folder has, in order.
+        """Return view ``runs``: a row for each stored run of the plan, in order.
 
         Returns
         -------
@@ -414,7 +422,7 @@ class Store:
         part : {"solution", "initial", "replay"}
             Runs without this part are left out.
         most : int
-            Number of ok runs of each cell of the plan, from the first.
+            Largest number of runs for each cell of the plan: its first runs with status ``ok``.
         """
         query = """SELECT run_id, json_extract(movements, ?) FROM
             (SELECT run_id, movements, position, run,
@@ -523,7 +531,7 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
 
 
 def _cell_from(cell_id: str, content: str) -> Cell:
-    """Return a cell from its JSON; ``where`` of its method is empty.
+    """Return a cell from its JSON. ``where`` of its method is empty.
 
     Raises ValueError if the JSON is not a cell, or not the cell of this id.
     """
@@ -618,8 +626,8 @@ def writing(folder: Path) -> Iterator[Store]:
 def lock(folder: Path, *, command: str = "coartic run") -> Iterator[None]:
     """Lock a folder for this process in a ``with`` block.
 
-    It does nothing on a disk without such locks. Raises CoarticError, which names ``command``, if
-    another process has locked the folder.
+    On a disk that has no locks, the block runs without a lock. Raises CoarticError, which names
+    ``command``, if another process has locked the folder.
     """
     opened = os.open(folder, os.O_RDONLY)
     try:
@@ -706,7 +714,7 @@ _SENTENCES = {
     "size (`ulimit -f`) may be exhausted: make room, and repeat the command",
     "SQLITE_FULL": "the disk is full: make room, and repeat the command",
 }
-"""Sentences by SQLite's names of errors, or by the first two words of the names."""
+"""Explanation of an error by its name in SQLite, or by the first two words of that name."""
 
 
 def _explain(path: Path, error: Exception) -> str:

@@ -20,7 +20,7 @@ def builtin_tasks() -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Their names, in the paper's order. :func:`load_task` accepts each of them.
+        Names of the tasks, in the paper's order. :func:`load_task` accepts each of them.
     """
     return tuple(shipped_tasks())
 

@@ -5,16 +5,16 @@ which hands, arms and base, and from which start. A family that was released is 
 change is a new version.
 
 An instance is a task with a name such as ``two-armed/v1/i017``. It depends only on the file and the
-name: numbers come from a counter-based generator (:mod:`coartic.tasks.philox`). Its key is the hash
-of family, version and stream, and its counter has the number of the instance. Streams are ``d``
-(development, to tune on), ``i`` (test, to report on) and years (``2027-``, fresh instances).
+name: numbers come from a counter-based generator (:mod:`coartic.tasks.philox`). The key of the
+generator is a hash of family, version and stream, and its counter has the number of the instance.
+Streams are ``d`` (development, to tune on), ``i`` (test, to report on) and years (``2027-``, fresh
+instances).
 
 The structure is drawn once: how many goals and links, the base, the kind of start. Positions and
 angles are drawn again until they break no rule (:func:`broken_rule`). Rejection therefore does not
-change the shares of structures. Positions and angles are integers of thousandths from the
-beginning. Geometric rules compare integers; the other rules use the compiled kernels, which need
-only IEEE arithmetic (:mod:`coartic.motion.trigonometry`). No rejection depends on a machine's
-library.
+change the shares of structures. Positions and angles are drawn as integers, in thousandths.
+Geometric rules compare integers; the other rules use the compiled kernels, which need only IEEE
+arithmetic (:mod:`coartic.motion.trigonometry`). No rejection depends on a machine's library.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ LOCKED: dict[Base, tuple[Literal["x", "y"], ...]] = {
     "rail": ("y",),
     "locked": ("x", "y"),
 }
-"""Base coordinates that cannot move, by kind of base."""
+"""Base coordinates that cannot move, for each kind of base."""
 _PARTS = 1000  # parts of a length unit, of a rad, of 1
 _STRUCTURE, _GEOMETRY = 0, 1  # word of the counter, by what is drawn
 _RANGE = re.compile(r"(.+/)([^/]+)\.\.([^/]+)")
@@ -114,11 +114,12 @@ class _Region(FileData):
     """Region of the goals: a box that contains each instance's own box."""
 
     x: Range
-    """From, to, length unit; the base is at the origin at the start."""
+    """Lowest and highest x (in length units). At the start the base is at the origin."""
     y: Range
-    """From, to, length unit."""
+    """Lowest and highest y (in length units)."""
     scale: Annotated[Range, AfterValidator(_as_share)] = (_PARTS, _PARTS)
-    """Sides of an instance's own box as a share of the region's sides, from, to."""
+    """Smallest and largest share of the region's sides that the sides of an instance's own box
+    have."""
 
 
 class _Alignment(FileData):
@@ -128,18 +129,19 @@ class _Alignment(FileData):
     """
 
     steps: Range
-    """Distance from goal to goal along the line, length unit, from, to."""
+    """Smallest and largest distance from goal to goal along the line (in length units)."""
     off: Range
-    """Distance of the goal off the line from the line, to either side, length unit, from, to."""
+    """Smallest and largest distance by which that goal is off the line, to either side (in length
+    units)."""
 
 
 class Posture(FileData):
     """Posture of an arm at the start."""
 
     first: Range
-    """Angle of the first joint from +x, rad, from, to."""
+    """Smallest and largest angle of the first joint, measured from +x (in rad)."""
     others: Range
-    """Angle of each other joint from the link before it, rad, from, to."""
+    """Smallest and largest angle of each other joint, measured from the link before it (in rad)."""
 
 
 _PARKED = Posture(first=(0, 0), others=(0, 0))
@@ -160,7 +162,8 @@ class Postures(FileData):
 class Family(FileData):
     """Distributions from which tasks are drawn, and rules that each instance obeys.
 
-    Lengths, angles and shares of the file are stored as integers of thousandths: 300 for 0.3.
+    The units below are those of the file. Lengths, angles and shares are stored as integers, in
+    thousandths of these units: 300 for 0.3.
     """
 
     name: str
@@ -168,7 +171,7 @@ class Family(FileData):
     title: Line
     """Name in figures and tables."""
     description: Line
-    """One sentence for lists."""
+    """One sentence that describes the family in lists."""
     hands: tuple[Hand, ...] = HANDS
     """Hands that may hit goals."""
     goals: Annotated[tuple[_GoalsCount, _GoalsCount], _ordered]
@@ -177,13 +180,13 @@ class Family(FileData):
     """Smallest and largest number of links of each arm. All links have the same length (to a
     thousandth)."""
     reach: Thousandths = 4 * _PARTS
-    """Sum of the links of each arm, length unit; by default the paper's."""
+    """Sum of the lengths of the links of each arm (in length units). The default is the paper's."""
     base: Annotated[_Bases, Field(min_length=1)]
     """Bases. Each instance has one of them: free, on a rail (it cannot move in y), or locked."""
     restrictions: _Bases = ()
-    """Further bases with which every instance can be completed, in addition to its own."""
+    """Bases with which every instance can be completed, in addition to its own base."""
     radius: Thousandths = 100
-    """Radius of every goal, length unit."""
+    """Radius of every goal (in length units)."""
     region: _Region
     """Region of the goals: table ``[region]``."""
     line: _Alignment | None = None
@@ -194,15 +197,15 @@ class Family(FileData):
     """Policy that finds the hands of trial 0, ``"best-single-hand"`` or ``"best-of-all"``. An
     instance has the hands that the policy found for it."""
     apart: Thousandths = 300
-    """Smallest distance between the centres of two goals, length unit."""
+    """Smallest distance between the centres of two goals (in length units)."""
     clear: Thousandths = 200
-    """Smallest distance of a hand at the start from the rim of a goal, length unit."""
+    """Smallest distance of a hand at the start from the rim of a goal (in length units)."""
     within: Thousandths = 950
-    """Largest distance of a goal from a shoulder as a share of the reach, measured along the base
-    coordinates that are locked."""
+    """Largest distance of a goal from a shoulder, as a share of the reach. The distance is measured
+    along the base coordinates that are locked."""
     bent: Thousandths = 200
-    """Angle, rad. At the start each arm with one of ``hands`` has a joint after its first that is
-    bent at least by this angle."""
+    """Angle (in rad). At the start each arm with one of ``hands`` has a joint after its first that
+    is bent by at least this angle."""
 
 
 def draft(family: Family, address: Address, attempt: int) -> Task:
@@ -250,9 +253,9 @@ def draft(family: Family, address: Address, attempt: int) -> Task:
 def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list[tuple[int, int]]:
     """Draw goals, and return their x and y in thousandths of a length unit.
 
-    Without a line in the family they are in a box with a drawn share of the region's sides. With a
-    line they are on a line, possibly outside the region. If there are more than two goals, one of
-    them, neither the first nor the last, is moved off the line by ``off``.
+    If the family has no line, the goals are in a box whose sides are a drawn share of the region's
+    sides. Otherwise they are on a line, possibly outside the region. If there are more than two
+    goals, one of them, neither the first nor the last, is moved off the line by ``off``.
 
     Parameters
     ----------
@@ -294,7 +297,7 @@ def broken_rule(family: Family, task: Task) -> str | None:
     - ``straight``: an arm is straight at the start, or nearly.
     - ``start-hit``: a hand is in a goal at the start, or close to one.
     - ``corrective``: the corrective process on its own does not complete the task, with the base of
-      the draft or of a restriction, or has more than 4096 hand sequences to try.
+      the draft or of a restriction; or there are more than 4096 hand sequences to try.
 
     The last four rules only look at hands of the family.
     """
@@ -337,8 +340,9 @@ def broken_rule(family: Family, task: Task) -> str | None:
 def instance_of(family: Family, address: Address) -> Task:
     """Return the instance at an address: the first draft that breaks no rule.
 
-    The task has a title, initial hands and provenance. Raises TaskError if each of the first 10,000
-    drafts breaks a rule of the family.
+    Unlike a draft, the returned task has a title, a description, a provenance, and as
+    ``initial_hands`` a hand sequence with which the corrective process completes it. Raises
+    TaskError if each of the first 10,000 drafts breaks a rule of the family.
     """
     broken = Counter[str]()
     for attempt in range(MOST_ATTEMPTS):
@@ -372,7 +376,7 @@ def instance_of(family: Family, address: Address) -> Task:
 
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
-    """Return an instance of a family, a task, by its name.
+    """Return an instance of a family (a task) by its name.
 
     Examples of names are ``two-armed/v1/i017`` and, for the family of a file,
     ``mine.v1.toml/i017``. The last 4096 instances are cached. Raises TaskError if the instance does
@@ -427,7 +431,7 @@ def shipped_families() -> dict[str, Family]:
 
 
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
-    """Return the families of files by name.
+    """Read families from files, and return them by name.
 
     Raises TaskError for a file that cannot be used, and for a name that another of the files or a
     shipped family has.
@@ -442,9 +446,9 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 
 def load_family(name: str) -> Family:
-    """Return a shipped family by name, or a family by its file's path.
+    """Return a shipped family by its name, or another family by the path of its file.
 
-    The name includes the version, such as ``two-armed/v1``. A file is read once per process. Raises
+    The name includes the version, as in ``two-armed/v1``. A file is read once per process. Raises
     TaskError if the family does not exist or cannot be used.
     """
     if is_file(name):

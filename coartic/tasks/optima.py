@@ -1,8 +1,8 @@
 """The best known rewards that come with the package, and what is proven about them.
 
 ``optima.json`` has the best reward that any method found for each of the paper's tasks, with run
-ids and solutions. ``best_known.csv`` has the best reward for test instances of families.
-``studies/optima`` takes over better rewards from results folders, and proves the bounds.
+ids and solutions. ``best_known.csv`` has the best reward for test instances of families. The study
+``studies/optima`` copies better rewards from results folders, and proves the bounds.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import Any
 from coartic.tasks.task import Task
 
 BASE = "task"
-"""Entry of a task with its base locked as in the task itself; rewards are compared with this
-entry."""
+"""Value of ``base`` (:func:`entries`) in the entry of a task whose base is locked as in the task
+itself. Rewards are compared with this entry."""
 DATA = Path(__file__).with_name("optima.json")
 """Entries of the paper's tasks (:func:`entries`)."""
 BEST_KNOWN = Path(__file__).with_name("best_known.csv")
@@ -35,7 +35,7 @@ class KnownOptimum:
     """The best known reward of a task with both arms free, for the paper's model."""
 
     reward: int
-    """Total reward, minus the ticks."""
+    """Total reward: minus the ticks."""
     bound: int | None
     """Reward that no solution exceeds; None if nothing is proven."""
     hands: str = ""
@@ -48,10 +48,10 @@ class KnownOptimum:
 
 
 def task_hash(task: Task) -> str:
-    """Return a hash of what defines a task, 16 hex digits.
+    """Return a hash of what defines a task: 16 hex digits.
 
-    Start, goals, radius, hands, locked base and robot count; the task's name and initial hands do
-    not.
+    The hash depends on start, goals, radius, hands, locked base and robot. It does not depend on
+    the task's name and initial hands.
     """
     content = task.model_dump(mode="json")
     text = json.dumps({key: content[key] for key in ("goals", *HASHED_FIELDS)}, sort_keys=True)
@@ -61,8 +61,8 @@ def task_hash(task: Task) -> str:
 def best_shipped(task: Task) -> KnownOptimum | None:
     """Return the best known reward of a task and its bound, from the shipped files.
 
-    The task is recognised by :func:`task_hash`, whatever its name. None if the files do not have
-    the task. Of a shipped family they only have the first 40 instances of the test split.
+    The task is recognised by :func:`task_hash`, whatever its name. Return None if the files do not
+    have the task. Of a shipped family they have only the first 40 instances of the test split.
     """
     return _by_task_hash().get(task_hash(task))
 
@@ -94,7 +94,8 @@ def entries() -> list[dict[str, Any]]:
     - ``base``: coordinates that are locked, ``y`` or ``xy``, or ``task`` for those that the task
       locks;
     - ``other_arm``: whether the idle arm is ``free`` or ``still``;
-    - ``run_ids`` and ``made_by``: the runs; versions and the date.
+    - ``run_ids``: ids of the runs;
+    - ``made_by``: versions and the date.
 
     If a solution is known, there are also
 
@@ -104,7 +105,7 @@ def entries() -> list[dict[str, Any]]:
     - ``solution``: a list ``[goal, hand, kind, target, waypoints]`` for each movement;
     - ``nodes``, in one entry: number of nodes of the search that proved the bound.
 
-    Otherwise there is ``infeasible``, the reason why no search has a solution.
+    Otherwise the entry has the key ``infeasible``, the reason why no search has a solution.
     """
     content: dict[str, list[dict[str, Any]]] = json.loads(DATA.read_text(encoding="utf-8"))
     return content["optima"]

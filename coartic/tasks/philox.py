@@ -42,7 +42,7 @@ def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
 def hash_key(name: str) -> tuple[int, int]:
     """Return the key of a name: two words of its SHA-256.
 
-    They are the first two words of the hash of the UTF-8, with 32 bits each, little-endian.
+    The words are the first two of the hash of the name in UTF-8, with 32 bits each, little-endian.
     """
     left, right = struct.unpack("<2I", hashlib.sha256(name.encode()).digest()[:8])
     return left, right
@@ -51,8 +51,8 @@ def hash_key(name: str) -> tuple[int, int]:
 class Draws:
     """Integers drawn one after the other; equal keys and counters give equal integers.
 
-    ``counter`` is three words of the generator's counter. The remaining word counts the blocks of
-    four random words used.
+    ``counter`` has the last three words of the generator's counter. Its first word counts the
+    blocks of four random words that were used.
     """
 
     def __init__(self, key: tuple[int, int], *counter: int) -> None:
@@ -63,7 +63,7 @@ class Draws:
     def integer(self, least: int, largest: int) -> int:
         """Return an integer from ``least`` to ``largest``, both included.
 
-        The probabilities are equal to within 2^-64.
+        The probabilities of the integers are equal to within 2^-64.
         """
         return least + (next(self._pairs) * (largest - least + 1) >> 64)
 

@@ -115,28 +115,29 @@ class Provenance(FileData):
     """Source of a number of a task: the entry of a key in ``Task.provenance``."""
 
     status: Literal["published", "inferred", "chosen"]
-    """Whether it is published in the paper, inferred from it, or chosen by the task's author."""
+    """Whether the number is published in the paper, inferred from the paper, or chosen by the
+    task's author."""
     source: Line
-    """Section or figure of the paper, or the person who chose it, in one line."""
+    """Section or figure of the paper, or the person who chose the number, in one line."""
 
 
 class Start(FileData):
     """The starting configuration q_0 as a task file has it; ``Task.q0`` is the array."""
 
     base: Point = (0.0, 0.0)
-    """Centre of the base, length unit."""
+    """Centre of the base (in length units)."""
     left: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
-    """Angles of the joints of the left arm, rad, one for each link; the first is measured from
-    +x."""
+    """Angles of the joints of the left arm (in rad), one for each link. The first is measured from
+    +x, each other from the link before."""
     right: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
-    """Angles of the joints of the right arm, in the same form."""
+    """Angles of the joints of the right arm, as for the left arm."""
 
 
 class Task(FileData):
     """A sequence of goals to hit in turn, each with a hand of the robot.
 
-    :func:`load_task` reads a task from a file, or finds it by its name. Fields cannot be set. In
-    Python a configuration ``q0=``, shape ``(dof,)``, can be passed instead of ``start``:
+    :func:`load_task` reads a task from a file, or finds it by its name. Fields cannot be changed.
+    In Python a configuration ``q0=``, shape ``(dof,)``, can be passed instead of ``start``:
     ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
 
     Source of the shipped tasks: paper, section *Experiments*. ``provenance`` says where each number
@@ -148,46 +149,46 @@ class Task(FileData):
     title: Line = ""
     """Name in figures and tables; ``name`` if it is empty."""
     description: Line = ""
-    """One sentence for lists."""
+    """One sentence that describes the task in lists."""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1, max_length=len(HANDS))] = HANDS
     """Hands that may hit goals. The robot has both arms in any case."""
     goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
-    """Goal centres x_g in the order in which they are to be hit, length unit."""
+    """Goal centres x_g in the order in which they are to be hit (in length units)."""
     radius: Length = PAPER_RADIUS
-    """θ^g: radius of every goal, length unit."""
+    """θ^g: radius of every goal (in length units)."""
     locked_base: Annotated[tuple[Literal["x", "y"], ...], Field(max_length=2)] = ()
     """Base coordinates that cannot move."""
     initial_hands: str = "best-single-hand"
     """Hand sequence of trial 0, such as ``"RRRR"``, or a policy that finds one by trials with only
     the corrective process: ``"best-single-hand"`` or ``"best-of-all"``."""
     start: Start
-    """Configuration in which every trial begins: table ``[start]``. By default the base is at
-    (0, 0) and the arms are straight along +x."""
+    """Configuration in which every trial begins (table ``[start]`` of the file). By default the
+    base is at (0, 0) and the arms are straight along +x."""
     robot: Robot = Robot()
-    """Geometry of the robot if it differs from the paper's: table ``[robot]``."""
+    """Geometry of the robot if it differs from the paper's (table ``[robot]`` of the file)."""
     provenance: dict[str, Provenance] = Field(default_factory=dict)
     """Source and status of the numbers, by key. A number without an entry was chosen by the task's
     author."""
 
     @cached_property
     def q0(self) -> Array:
-        """Starting configuration, shape ``(dof,)``, length unit and rad, read-only."""
+        """Starting configuration, shape ``(dof,)``, in length units and rad (read-only)."""
         q = np.array([*self.start.base, *self.start.left, *self.start.right], dtype=np.float64)
         q.setflags(write=False)
         return q
 
     @cached_property
     def goal_array(self) -> Array:
-        """Goal centres, x and y, shape ``(G, 2)``, length unit, read-only."""
+        """Goal centres, x and y, shape ``(G, 2)``, in length units (read-only)."""
         goals = np.array(self.goals, dtype=np.float64)
         goals.setflags(write=False)
         return goals
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Task:
-        """Return a copy with the fields in ``update`` changed, which are not checked.
+        """Return a copy in which the fields in ``update`` are changed, without a check.
 
-        With ``deep`` it is a deep copy. The arrays ``q0`` and ``goal_array`` of the copy follow
-        from the changed fields.
+        With ``deep`` the result is a deep copy. The arrays ``q0`` and ``goal_array`` of the copy
+        follow from the changed fields.
         """
         copied = super().model_copy(update=update, deep=deep)
         for name in ("q0", "goal_array"):
@@ -217,7 +218,7 @@ class Task(FileData):
     def split(self) -> Split | None:
         """Split of an instance of a family: ``"development"``, ``"test"`` or ``"fresh"``.
 
-        It follows from the form of the task's name; None for names of another form.
+        The split follows from the form of the task's name. It is None for names of another form.
         """
         address = address_of(self.name)
         return address and address.split
@@ -233,7 +234,7 @@ class Task(FileData):
     def _with_start(cls, content: Any) -> Any:
         """Return the content of a task with a ``start``.
 
-        - Content that has a ``start``, or is not a dictionary, is returned unchanged.
+        - Content that has a ``start`` or is not a dictionary is returned unchanged.
         - If it has ``q0``, shape ``(dof,)``, ``start`` is made of it.
         - Otherwise the base is at (0, 0), and both arms are straight along +x.
 
@@ -298,10 +299,11 @@ class Task(FileData):
 
     @checked_arguments
     def save(self, path: str | Path, *, replace: bool = False) -> None:
-        """Write the task as a task file, ``.toml``.
+        """Write the task as a TOML file.
 
         With ``replace`` an existing file is overwritten. Raises CoarticError if the name does not
-        end in ``.toml``, if the file exists and ``replace`` is False, or if it cannot be written.
+        end in ``.toml``, if the file exists and ``replace`` is False, or if the file cannot be
+        written.
         """
         file = folder_named(path, "the name of a task's file")
         if file.suffix != ".toml":
@@ -345,8 +347,8 @@ class Task(FileData):
 def check_hands(task: Task, hands: str) -> str:
     """Check a hand sequence, such as ``"RRLR"``, and return it unchanged.
 
-    Raises ValueError unless it is a string with the letter of one of the task's hands for each
-    goal.
+    Raises ValueError unless ``hands`` is a string with the letter of one of the task's hands for
+    each goal.
     """
     allowed = letters_of(sorted(task.hands))
     fits = isinstance(hands, str) and len(hands) == len(task.goals)
@@ -361,8 +363,8 @@ def check_hands(task: Task, hands: str) -> str:
 def _out_of_reach(task: Task, tolerance: float) -> str | None:
     """Return a sentence on the first goal that is out of reach, or None.
 
-    A goal is out of reach if neither hand of the task, or not the hand that ``initial_hands``
-    names, can come within ``tolerance`` of its centre, length unit.
+    A goal is out of reach if no hand of the task can come within ``tolerance`` (in length units) of
+    its centre, or if the hand that ``initial_hands`` names for it cannot.
     """
     named = None if task.initial_is_policy else hands_of(task.initial_hands)
     for index, goal in enumerate(task.goals):
@@ -382,11 +384,11 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
 
 
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
-    """Return by how much a goal is out of a hand's reach, length unit.
+    """Return by how much a goal is out of a hand's reach (in length units).
 
-    This is how far the goal's centre lies outside the distances that a hand can have from its
-    shoulder, minus ``tolerance``: above 0 if the goal is out of reach, otherwise at most 0. Base
-    coordinates that are not locked can take any value.
+    The result is how far the goal's centre lies outside the range of distances that a hand can have
+    from its shoulder, minus ``tolerance``. It is above 0 if the goal is out of reach, otherwise at
+    most 0. Base coordinates that are not locked can take any value.
     """
     arm = task.robot.arm(hand)
     near, far = task.robot.reach(hand)
@@ -401,8 +403,9 @@ def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float
 def check_task(task: Task) -> Task:
     """Check that all goals of a task can be reached, and return the task.
 
-    Raises TaskError if no hand of the task, or not the hand that ``initial_hands`` names, can come
-    as near to a goal's centre as a tenth of the radius, where the paper's corrective process ends.
+    The paper's corrective process ends within a tenth of the radius from a goal's centre. Raises
+    TaskError if no hand of the task can come as near to a goal, or if the hand that
+    ``initial_hands`` names for it cannot.
     """
     _, tolerance = PAPER.tolerances(task.radius)
     if (problem := _out_of_reach(task, tolerance)) is not None:
@@ -437,7 +440,7 @@ def parse_task(content: dict[str, Any], source: str, *, reach: bool = True) -> T
     content : dict
         The content, as ``tomllib`` reads it from a TOML file.
     source : str
-        Name of the content in errors, such as the path of the file.
+        Name of the content in error messages, such as the path of the file.
     reach : bool
         True to refuse goals that are out of reach.
 
@@ -464,7 +467,7 @@ def _all_keys() -> list[str]:
 
 
 def task_text(task: Task) -> str:
-    """Return a task in the form of a task file, TOML."""
+    """Return the content of a task's TOML file."""
     content = task.model_dump(mode="json")
     tables = {key: content.pop(key, {}) for key in ("start", "robot", "provenance")}
     if task.robot == Robot():
