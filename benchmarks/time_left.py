@@ -21,7 +21,9 @@ _EARLY = 0.1
 
 
 class TimeLeft:
-    """Estimate of the time until all expected runs are made. It can be used in threads.
+    """Estimate of the time until all expected runs are made.
+
+    Several threads can use the same object.
 
     The estimate assumes that
 
@@ -59,10 +61,10 @@ class TimeLeft:
 
     @property
     def seconds(self) -> float:
-        """Time left, s.
+        """Time left, in s.
 
-        It is NaN until a tenth of the work is done, and while there are runs of a method whose time
-        is unknown. If no run finishes for a long time, it grows again.
+        The estimate is NaN until a tenth of the work is done, and while runs of a method are
+        missing whose time is unknown. If no run finishes for a long time, the estimate grows again.
         """
         with self._lock:
             factors, done_s = self._factors(), sum(self._took_s.values())
@@ -83,9 +85,10 @@ class TimeLeft:
         return max(expected_s - since_s, since_s / 4)
 
     def _factors(self) -> dict[str, float]:
-        """Return, by method, the time of its runs here as a multiple of :func:`_shipped_s`.
+        """Return the time of each method's runs here as a multiple of :func:`_shipped_s`.
 
-        All shipped methods have the same factor, that of the machine.
+        The result has the factor by the id of the method. All shipped methods have the same factor,
+        that of the machine.
         """
         took_s, shipped_s = defaultdict[str, float](float), defaultdict[str, float](float)
         for kind, count in self._made.items():
@@ -103,9 +106,9 @@ def _kind_of(cell: Cell) -> _Kind:
 
 
 def _shipped_s(kind: _Kind) -> float:
-    """Return the mean time of a shipped run of this kind, s, for its number of trials.
+    """Return the mean time (in s) of a shipped run of this kind, scaled to its number of trials.
 
-    If the method is not shipped, the time of a run with the default number of trials counts as 1 s.
+    If no runs of the method are shipped, 1 s stands for a run with the default number of trials.
     """
     method, task, trials = kind
     by_task = _shipped_means().get(method, {})
@@ -115,7 +118,7 @@ def _shipped_s(kind: _Kind) -> float:
 
 @cache
 def _shipped_means() -> Mapping[str, Mapping[str, float]]:
-    """Return the mean time of the shipped runs, s, by method and task."""
+    """Return the mean time (in s) of the shipped runs by method and task."""
     with open_shipped("comparison") as store:
         means = store.runs().groupby(["method", "task"]).wall_s.mean()
     return {str(method): dict(of[method]) for method, of in means.groupby("method")}
