@@ -2,10 +2,15 @@
 
     python studies/dial/protocols.py results/dial
 
-writes ``runs.csv``, a row for each run of the learner, ``others.csv``, a row for each run of
-another method, ``shifts.csv``, a row for each goal before a goal that is moved, and ``named.csv``,
-a row for each named setting on a task of the paper. A task is done at a time; what is done is not
-done again. It takes about an hour on two cores.
+writes
+
+- ``runs.csv``, a row for each run of the learner;
+- ``others.csv``, a row for each run of another method;
+- ``shifts.csv``, a row for each goal before a goal that is moved;
+- ``named.csv``, a row for each named setting on a task of the paper.
+
+The rows of a task are written when all of its runs are finished. Tasks that a file has already are
+not run again. All takes about an hour on two cores.
 """
 
 import csv
@@ -35,17 +40,18 @@ COLUMNS = [
 NAMED_RUNS = 20
 NAMED_COLUMNS = ["row", "task", "setting", "runs", *(f"after_{trials}" for trials in AFTER[1:])]
 MISSED = -(10**9)
-"""Reward of a trial that misses a goal: less than any other."""
+"""Reward of a trial that misses a goal. It is lower than any other reward."""
 OTHERS = {
     "CMA-ES": (CMAES, RUNS),
     "posture planning": (TwoGoals, 1),
     "shortest path": (PathLength, 1),
 }
-"""Other methods than the learner, and their runs on a task; planners are the same in each."""
+"""Methods other than the learner, with their numbers of runs on a task. All runs of a planner are
+the same."""
 
 
 def run_task(name):
-    """Run every setting on a task; rows of :data:`COLUMNS`."""
+    """Run every setting on a task, and return rows of :data:`COLUMNS`."""
     task, rows = load_task(name), []
     for setting, fields in SETTINGS.items():
         if len(task.hands) == 1:
@@ -61,8 +67,10 @@ def run_task(name):
 def row_of(task, setting, number, rewards):
     """Return a row of :data:`COLUMNS`.
 
-    ``quarter`` and ``half``: trials until the best reward so far is this share of the way from the
-    corrective process alone to the best known reward; infinite if it never is in all trials.
+    ``quarter`` and ``half`` are the numbers of trials until the best reward so far has covered this
+    share of the distance from the reward of the corrective process alone to the best known reward.
+    If a run does not get there, they are infinite, or NaN if it has fewer than :data:`TRIALS`
+    trials.
     """
     start, best_known = span_of(task)
     best, trials = np.maximum.accumulate(rewards), len(rewards)
@@ -75,16 +83,19 @@ def row_of(task, setting, number, rewards):
 
 
 def span_of(task):
-    """Return the reward of the corrective process alone with its best hands, from which the gain
-    counts, and the best known reward."""
+    """Return the two rewards between which the gain on a task is measured.
+
+    They are the reward of the corrective process alone with its best hands, and the best known
+    reward.
+    """
     problem = objective(task)
     return -int(problem.best_cost), -problem.best_known
 
 
 def run_others(name):
-    """Run the other methods on a task; rows of :data:`COLUMNS`.
+    """Run the other methods on a task, and return rows of :data:`COLUMNS`.
 
-    A planner makes no trial: its plan is executed once. A method that fails gains nothing.
+    A planner makes no trial: its plan is executed once. A method that fails has no gain.
     """
     task, rows = load_task(name), []
     for setting, (method, runs) in OTHERS.items():
@@ -101,7 +112,10 @@ def run_others(name):
 
 
 def run_named(name):
-    """Run the named settings on a task; rows of :data:`NAMED_COLUMNS`, of mean best rewards."""
+    """Run the named settings on a task, and return rows of :data:`NAMED_COLUMNS`.
+
+    ``after_N`` is the mean over runs of the best reward after N trials.
+    """
     task, rows = load_task(name), []
     for setting, fields in NAMED.items():
         condition = replace(base_of(task), **fields)
@@ -117,7 +131,7 @@ PARTS = {
     "shifts": (run_shifts, SHIFT_COLUMNS, SHIFT_TASKS),
     "named": (run_named, NAMED_COLUMNS, TASKS),
 }
-"""Files, the function that makes the rows of a task, their columns, and the tasks."""
+"""For each file: the function that makes the rows of a task, the columns, and the tasks."""
 
 
 def main(folder):
