@@ -1,4 +1,4 @@
-"""Read stored runs: estimates, tests, tables, figures.
+"""Read stored runs, and compute estimates, tests, tables and figures from them.
 
 ``coartic.analysis.load(folder)`` reads a results folder as a :class:`Study`.
 """

@@ -49,7 +49,7 @@ def bibliography(
         True to add the works on which statistics and signatures are based.
     environment : mapping, optional
         Environment of a results folder (:attr:`.Study.made_with`), whose version and commit are
-        cited; by default the version of this program.
+        cited; by default the version of this program is cited.
     imports : mapping, optional
         Names and versions of the packages that a method's file imports, by the id of the method
         (:attr:`.Study.imports`). They are named in a comment.

@@ -7,9 +7,9 @@ compared runs have
 
 - the same hand sequence. Signature ``hand``, the choice of hands itself, is compared with random
   search that tries all hand sequences, and all its runs count;
-- the same noise of the idle arm, if possible: it has noise under a learner's condition with
-  ``modify_other`` (not EC1 and EC3). If there is no random search without this noise, random search
-  with it is used;
+- the same treatment of the idle arm, if possible. A learner adds noise to the idle arm if its
+  condition has ``modify_other`` (EC2 and EC4). If there is no random search without this noise,
+  random search with it is used;
 - the same number of trials;
 - a solution. A solved run that does not improve counts with its value, often 0.
 
@@ -45,7 +45,7 @@ def with_control(
     Parameters
     ----------
     study : Study
-        Results with runs of both.
+        Results with runs of the method and of random search.
     signature : str
         Name in ``coartic.analysis.SIGNATURES``.
     task, label : str
@@ -101,8 +101,8 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
 def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:
     """Return the label of the random search that controls a method on a task.
 
-    It has the hand sequence ``hands`` (if ``hands`` is empty, it tries all hand sequences) and the
-    same number of trials. The result is empty if there are no such runs.
+    This random search has the hand sequence ``hands`` (if ``hands`` is empty, it tries all hand
+    sequences) and the same number of trials. The result is empty if there are no such runs.
 
     Random search that treats the idle arm as the method does is preferred. If there is none, random
     search that explores both arms is used, unless ``alike`` is True.
@@ -117,9 +117,10 @@ def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool =
 def explores_idle_arm(study: Study, task: str, label: str) -> bool:
     """Return True if a method adds exploration noise to the idle arm.
 
-    - On tasks for one arm it is always True.
+    - On tasks for one arm, the result is always True.
     - For the learner, its condition decides.
-    - For other methods, such as random search, parameter ``idle_arm`` decides; True without it.
+    - For other methods, such as random search, their parameter ``idle_arm`` decides. If a method
+      does not have this parameter, the result is True.
     """
     run = study.cells[task, label].iloc[0]
     if len(study.tasks[task].hands) == 1:
@@ -135,10 +136,13 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
 def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
     """Return the labels of the forms of random search on a task.
 
-    The keys are the hand sequence (empty if all hand sequences are tried), the number of trials,
-    and whether the idle arm is explored. If forms have the same key, the first is used. A form is
-    left out if it has several ``stages``, its solved runs have different hand sequences although it
-    does not try all, or it has no solved run.
+    A form is a method ``random-search...`` with its setting. The keys are the hand sequence (empty
+    if the form tries all hand sequences), the number of trials, and whether the idle arm is
+    explored. If several forms have the same key, the first is used. A form is left out if
+
+    - it has more than one stage (parameter ``stages``);
+    - it has no solved run on the task;
+    - its solved runs have different hand sequences, although it does not try all by design.
     """
     labels = dict[tuple[str, float, bool], str]()
     of_search = study.methods[study.methods.algorithm == "random search"]
@@ -157,16 +161,16 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
 
 @lru_cache(maxsize=4_096)
 def _most_trials(study: Study, task: str, label: str) -> float:
-    """Return the most trials that a run of a method on a task made, or 0."""
+    """Return the largest number of trials of a method's runs on a task; 0 without trials."""
     return float(study.cells[task, label].trials.fillna(0).max())
 
 
 def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
-    """Return how much a method's signature exceeds that of random search, a mean over runs.
+    """Return by how much a method's signature exceeds that of random search on average.
 
     Each run is compared with the mean of random search with the same hands (for signature ``hand``,
-    with any hands), in the unit of the signature. Only runs count for which :func:`with_control`
-    has random search; NaN if there are none.
+    with any hands). Only runs count for which :func:`with_control` has random search. The result is
+    in the unit of the signature, and NaN if no run counts.
     """
     pairs = with_control(study, signature, task, label).values()
     excess = [values - control.mean() for values, control in pairs if len(control)]
@@ -176,7 +180,8 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
 def selects(study: Study, label: str) -> bool:
     """Return True if a method can select its solution from trials, and is not random search.
 
-    It can if it declares that it uses the reward of each trial.
+    A method can select if it declares that it uses the reward of each trial, and if one of its runs
+    made more than one trial.
     """
     method = study.methods.loc[label]
     return bool(method.algorithm != "random search" and method.information == BY_TRIAL)
@@ -186,14 +191,14 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     """Return the runs of random search that are the control of ``contexts``, or None.
 
     They are runs on the same two tasks, for the same goal and hand, with the same number of trials
-    as the method and, on each task, the most frequent hand sequence of the method's runs. Only the
-    first 500 solved runs on each task count.
+    as the method. On each task, they have the hand sequence that is most frequent in the method's
+    runs. Only the first 500 solved runs on each task count.
 
     The result is None if
 
     - the method is random search, or does not select its solution from trials (:func:`selects`);
     - there is no such random search on both tasks;
-    - none of its runs on one of the tasks hits the goal with the hand.
+    - on one of the tasks, no run of random search hits the goal with the hand.
     """
     if not selects(study, contexts.method):
         return None
@@ -213,10 +218,11 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
 
 
 def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
-    """Yield a method's runs on two tasks at each first goal that these share.
+    """Yield a method's runs on two tasks, for each goal that the tasks share.
 
-    There is an item for each pair of tasks (:func:`.context_pairs`), shared goal, and hand that
-    hits this goal on both tasks. Only the first 500 solved runs on each task count.
+    Two tasks share goals if they begin with the same goals (:func:`.context_pairs`). There is an
+    item for each pair of tasks, each shared goal, and each hand that hits this goal on both tasks.
+    Only the first 500 solved runs on each task count.
     """
     for first, second, shared in context_pairs(study.individual_tasks):
         keys = (first, label), (second, label)

@@ -50,8 +50,8 @@ def checked(
 ) -> pd.DataFrame:
     """Check a user's frame, and return a copy of the columns that are needed.
 
-    If ``numbers`` has ``reward`` and the frame has ``status``, this column is checked and returned
-    as well: a run has a reward if, and only if, its status is ``ok``.
+    If ``numbers`` has ``reward`` and the frame has a column ``status``, this column is also checked
+    and returned: a run must have a reward if its status is ``ok``, and no reward otherwise.
 
     Parameters
     ----------
@@ -134,9 +134,9 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     """Return a copy of checked columns with ``gap``, and with ``share`` if they have :data:`ZERO`.
 
     gap = (best known - reward) / |best known|
-    share = (reward - zero) / (best known - zero)
+    share = (reward - zero) / (best known - zero), where zero is column :data:`ZERO`
 
-    Both are NaN if the reward or the best known reward is NaN; ``share`` is also NaN if zero is NaN
+    Both are NaN if the reward or the best known reward is NaN. ``share`` is also NaN if zero is NaN
     or equals the best known reward.
 
     Raises
@@ -145,7 +145,7 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
         - A reward or a best known reward is above 0.
         - A best known reward is 0.
         - A reward is above the best known reward by more than rounding (:data:`NEGLIGIBLE`), or
-          :data:`ZERO` is above it at all.
+          :data:`ZERO` is above the best known reward.
     """
     for name in ("reward", "best_known"):
         sign = "a reward must be minus the ticks; for a cost, such as best_cost, use the negative"
@@ -175,18 +175,20 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        The columns that are needed, with
+        A copy of the columns that are needed, with
 
         - ``gap``, and ``share`` if the frame has ``corrective_best``;
         - ``method``, which includes the setting if the method has several settings in the frame;
         - ``task``, the number of the task in the order of names, from 0;
-        - ``key``, a number for each run, the same in all rows of the run (:data:`_SOURCES`).
+        - ``key``, a number for each run, the same in all rows of the run. Rows belong to the same
+          run if they agree in method, task and :data:`_SOURCES`. Without these columns, each row is
+          a run.
 
     Raises
     ------
     CoarticError
-        As :func:`checked` and :func:`_with_gaps`, and if a task has more than one ``best_known`` or
-        :data:`ZERO`.
+        The frame is wrong (:func:`checked`, :func:`_with_gaps`), or a task has more than one
+        ``best_known`` or :data:`ZERO`.
     """
     existing = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in existing), *more)
@@ -212,7 +214,7 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """Return :func:`scored` for a frame in which each run must have one row.
 
-    Raises CoarticError as :func:`scored`, and if a run has two rows.
+    Raises CoarticError if the frame is wrong (:func:`scored`), or if a run has two rows.
     """
     runs = scored(frame, *more)
     refuse_rows(runs, "method", runs.duplicated("key"), f"{DUPLICATE}; each run must have one row")
@@ -232,7 +234,7 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     -------
     Series
         (best known - reward) / \\|best known\\| by the frame's index: 0.01 is 1 % more ticks than
-        the best known reward; NaN if one of the two is NaN.
+        the best known reward. It is NaN if one of the two rewards is NaN.
 
     Raises
     ------
@@ -256,9 +258,10 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Parameters
     ----------
     frame : DataFrame
-        With columns ``reward``, ``best_known`` and ``corrective_best``, negative ticks. The last is
-        the reward of the corrective process alone with its best hands. If the task has more than
-        4,096 hand sequences, it is the reward with the task's initial hands.
+        With columns ``reward``, ``best_known`` and ``corrective_best``, in negative ticks.
+        ``corrective_best`` is the reward of the corrective process alone with its best hands. For a
+        task with more than 4,096 hand sequences, ``load(folder).runs`` has the reward with the
+        task's initial hands instead.
 
     Returns
     -------
@@ -294,7 +297,7 @@ def means(
     frame : DataFrame
         A row for each task, or each run.
     by : str or sequence of str
-        Columns whose values define the groups. NaN is a value like others.
+        Columns whose values define the groups. Rows with NaN form a group, too.
     columns : str or sequence of str
         Columns of numbers. NaN is left out of means.
 

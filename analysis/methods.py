@@ -1,4 +1,4 @@
-"""Describe methods: facts about built-in ones, and a frame of a study's methods.
+"""Describe methods: facts about the built-in methods, and a frame of the methods of a study.
 
 The facts are in ``methods.toml``. :func:`methods_of` returns the frame.
 """
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 CONDITION_OF = {f"{METHOD_PREFIX}{name}": name for name in EVERY_CONDITION}
 """Ids of the learner's conditions, including informed ones and ablations, by id of the method."""
 LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
-"""Ids of the learner under EC1 (for one arm) to EC4; each explores more than the previous one."""
+"""Ids of the learner under the paper's conditions: EC1 for one arm, and EC2, EC3 and EC4 for two
+arms."""
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two arms."""
 RANDOM_SEARCH = "random-search"
@@ -100,7 +101,7 @@ def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False
         Id or declaration. For a method from a file, the name is the title in its declaration; if
         only the id is passed, the name is the id.
     setting : str
-        Such as ``sigma=0.1, stop=1``; may be empty.
+        Setting of the method, such as ``sigma=0.1, stop=1``; it may be empty.
     short : bool
         True for the short name of a built-in method, if it has one, and for the id of a method from
         a file.
@@ -151,7 +152,7 @@ def methods_of(
     Returns
     -------
     DataFrame
-        By the label of the method, with the columns of :attr:`.Study.methods`.
+        The index is the label of the method. The columns are those of :attr:`.Study.methods`.
     """
     import pandas as pd  # other parts of this module are used without pandas
 
@@ -260,8 +261,9 @@ def _group_of(runs: pd.DataFrame) -> str:
 def ranked_as(runs: pd.DataFrame) -> pd.Series:
     """Return the name of the row of the ranking in which each run counts.
 
-    It is the run's label (column ``label``). But if one condition of the learner ran on tasks for
-    one arm, and another one on tasks for two arms, both share the row :func:`joined_label`.
+    The name is the run's label (column ``label``), with one exception: if one condition of the
+    learner ran on tasks for one arm, and another condition on other tasks, for two arms, both have
+    the same name (:func:`joined_label`).
     """
     tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
     names = runs.label
@@ -301,9 +303,9 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return rows without the settings and ablations of methods that are also in these rows.
+    """Return rows without the settings and ablations of methods that are also in ``rows``.
 
-    ``rows`` are rows of :attr:`.Study.methods`, whose column ``under`` is used. Values of a varied
+    ``rows`` are rows of :attr:`.Study.methods`; their column ``under`` is used. Values of a varied
     parameter are not left out.
     """
     return rows[~rows.under.isin(rows.index)]
@@ -312,7 +314,7 @@ def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
 def headline_methods(rows: pd.DataFrame) -> list[str]:
     """Return the labels of the rows that represent their algorithms, or all labels if none does.
 
-    ``rows`` are rows of :attr:`.Study.methods`, whose column ``headline`` is used. Settings and
+    ``rows`` are rows of :attr:`.Study.methods`; their column ``headline`` is used. Settings and
     ablations are left out as in :func:`without_settings`.
     """
     headlines = without_settings(rows)

@@ -56,7 +56,7 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
     Returns
     -------
     dict
-        By the name of the task.
+        Best known rewards by the name of the task.
     """
     solved = runs[(runs.status == "ok") & (restrictions(runs).base == BASE)]
     is_search = solved.method.isin(SEARCHES)
@@ -84,8 +84,8 @@ def best_known(runs: pd.DataFrame, tasks: Iterable[Task]) -> dict[str, BestKnown
 def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     """Return the parameters with which searches for the optimum restrict movements, for each run.
 
-    Columns are ``base`` and ``other_arm``, by the index of ``runs``. For other methods, whose
-    parameters may have the same names, they are ``task`` and ``free``.
+    The columns are ``base`` and ``other_arm``; the index is that of ``runs``. For methods that are
+    not searches, the values are ``task`` and ``free``, even if they have parameters of these names.
     """
     default = {"base": BASE, "other_arm": "free"}
     pairs = [*zip(runs.method, runs.parameters, strict=True)]

@@ -4,7 +4,7 @@ A recording is a table with a row for each hit, or a table with a row for each s
 which hits are found. A table that cannot be read raises CoarticError, with its first wrong row.
 Faults of a recording that can be read are not diagnosed, but they can be seen:
 :func:`consistency` gives two numbers for each hit, and :func:`draw_recording` shows all hits over
-the goals. There wrong units, axes, columns, clocks and sensors become visible.
+the goals. Wrong units, axes, columns, clocks and sensors are visible in this figure.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, num
 from coartic.robot import HANDS, Array, Hand
 
 FAR = 2.0
-"""Distance from the centre of a goal, radii, beyond which a hit does not fit the task."""
+"""Distance from the centre of a goal (in radii) beyond which a hit does not fit the task."""
 _KEY = ["subject", "trial", "goal"]
 _LONGEST_GAP = 0.05  # longest gap of a marker that is bridged, s
 _LONGEST_STEP = 0.04  # longest time between samples, s; with fewer samples hits are missed
@@ -78,7 +78,8 @@ def read_hits(path: str | Path, task: Task, *, ticks_per_unit: float = 1.0) -> p
 def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
     """Return recorded hits, checked and sorted by subject, trial and goal.
 
-    Angles are unwrapped from hit to hit in each trial, from the start of the task on.
+    In each trial, angles are unwrapped from the start of the task to the first hit, and from hit to
+    hit.
 
     Parameters
     ----------
@@ -87,7 +88,8 @@ def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
 
         - ``subject``; ``trial`` and ``goal``, both from 1; ``hand`` (left or right)
         - ``ticks``: the time since the previous hit of the trial, or since its start
-        - the posture at the hit: a column for each of ``task.robot.joint_names`` (length unit, rad)
+        - the posture at the hit (in length units and rad): a column for each name in
+          ``task.robot.joint_names``
 
         Hits may be missing. The columns of a locked base, and of an arm that is not among
         ``task.hands``, may also be missing: their values are then those at the start of the task.
@@ -97,19 +99,25 @@ def check_hits(frame: pd.DataFrame, task: Task) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        These columns only, with numbers as float64 and a new index. Subjects keep their order.
+        The columns above, and no others, with numbers as float64 and a new index. Subjects keep
+        their order.
 
     Raises
     ------
     CoarticError
-        A column is missing, a value cannot be what its column says, a hit occurs twice, or over
-        half of a subject's hits are more than two radii from the centres of their goals.
+        One of these is the case:
+
+        - a column is missing, or a value does not fit its column;
+        - a hit occurs twice;
+        - more than half of a subject's hits are more than two radii from the centres of their
+          goals.
 
     Warns
     -----
     UserWarning
         Some hits of a subject are more than two radii from the centres of their goals, or the
-        median movement takes less than a tenth or more than ten times the model's time.
+        median movement of a subject takes less than a tenth or more than ten times the model's
+        time.
     """
     return _judged(_readable(frame, task, "the frame"), task, "the frame")
 
@@ -130,8 +138,9 @@ def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
     DataFrame
         A row for each hit with ``subject``, ``trial``, ``goal``, ``hand`` and
 
-        - ``x``, ``y``: the position of the hand by forward kinematics from the posture, length unit
-        - ``off``: its distance from the centre of the goal, in radii of the goal
+        - ``x``, ``y``: the position of the hand (in length units), by forward kinematics from the
+          posture
+        - ``off``: the distance of the hand from the centre of the goal, in radii of the goal
         - ``pace``: the ticks of the movement divided by those of a straight movement of the model
           from the previous hit, or from the start; NaN if the previous hit is missing
 
@@ -186,7 +195,8 @@ def hits_from_markers(
     -------
     DataFrame
         The hits of the trials in which all goals are hit, as :func:`check_hits` returns them;
-        ``ticks`` is at least 1. ``attrs["unfinished"]`` has the number of other trials by subject.
+        ``ticks`` is at least 1. ``attrs["unfinished"]`` has, by subject, the number of trials in
+        which not all goals are hit.
 
     Raises
     ------
@@ -275,23 +285,23 @@ def draw_recording(
 ) -> Figure:
     """Draw a recording, also one that :func:`check_hits` or :func:`hits_from_markers` refuses.
 
-    The panels above show for each goal the postures in which it was hit, over all goals; later
-    trials are darker. Below, by trial, are the distances of the hands from the goals (``off``) and
-    the times of movements (``pace``) of :func:`consistency`. With ``samples`` the panels above also
-    show the paths of the hands, and a further panel shows when goals were hit, with rests shaded.
+    At the top, a panel for each goal shows the postures in which this goal was hit, drawn over the
+    circles of all goals. Later trials are darker. Below, two panels show ``off`` and ``pace`` of
+    :func:`consistency` by trial. With ``samples``, the panels at the top also show the paths of the
+    hands, and a further panel shows when goals were hit. In it, rests are shaded.
 
     Parameters
     ----------
     hits : DataFrame, str, pathlib.Path or None
-        Recorded hits or their file, as :func:`check_hits` and :func:`read_hits` describe them; None
-        to find hits in ``samples``, also of trials in which not all goals are hit.
+        Recorded hits or their file, as :func:`check_hits` and :func:`read_hits` describe them. With
+        None, hits are found in ``samples``, also in trials in which not all goals are hit.
     task : Task
         The task that was practised.
     samples : DataFrame, str or pathlib.Path, optional
         The positions of markers, as :func:`hits_from_markers` describes them.
     ticks_per_unit : float, optional
-        Number of ticks in a unit of time; by default as of :func:`read_hits` and
-        :func:`hits_from_markers`.
+        Number of ticks in a unit of time; by default 1 for a file of hits (:func:`read_hits`) and
+        100 for markers (:func:`hits_from_markers`).
 
     Returns
     -------
@@ -316,7 +326,7 @@ def draw_recording(
 
 
 def is_of_markers(path: str | Path) -> bool:
-    """Return whether columns of a CSV file are positions of markers."""
+    """Return True if a CSV file has the position of a hand's marker as a column."""
     return any(str(name).endswith("_tip_x") for name in _table(path))
 
 
@@ -339,7 +349,10 @@ def _hits_in_file(path: str | Path, task: Task, ticks_per_unit: float) -> pd.Dat
 
 
 def _table(path: str | Path) -> pd.DataFrame:
-    """Return a CSV file as a frame whose index counts rows from 1. Raises CoarticError."""
+    """Return a CSV file as a frame whose index counts rows from 1.
+
+    Raises CoarticError if the file cannot be read.
+    """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)  # of rows with too many values
@@ -374,8 +387,8 @@ def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
 def _numbers(frame: pd.DataFrame, columns: list[str], source: str, gaps: bool = False) -> Array:
     """Return columns as numbers, shape ``(rows, columns)``.
 
-    Values must be real numbers from -1e5 to 1e5 (CoarticError for others). With ``gaps`` they can
-    also be empty, and are then NaN.
+    Values must be real numbers from -1e5 to 1e5. With ``gaps`` they can also be empty, and are then
+    NaN. Raises CoarticError for other values.
     """
     numbers = np.empty((len(frame), len(columns)))
     for k, name in enumerate(columns):
@@ -394,7 +407,11 @@ def _numbers(frame: pd.DataFrame, columns: list[str], source: str, gaps: bool = 
 
 
 def _refuse(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str, source: str) -> None:
-    """Raise CoarticError if rows are ``wrong``, with the first wrong row and their number."""
+    """Raise CoarticError if rows are ``wrong``.
+
+    The message has the first wrong row, the number of wrong rows, and ``needed``: what would be
+    right. ``source`` is the name of the frame in the message.
+    """
     if rows := np.flatnonzero(np.asarray(wrong, dtype=bool)).tolist():
         (value,) = frame[column].iloc[rows[:1]].tolist()
         shown = f"{value:g}" if isinstance(value, float) else brief_value(value)
@@ -462,8 +479,9 @@ def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
     """Return hits of :func:`_readable` unchanged, after checking whether they fit the task.
 
     - Warns if hits of a subject are more than two radii from the centres of their goals. Raises
-      CoarticError if these are more than half of the subject's hits.
-    - Warns if the median movement takes less than a tenth or more than ten times the model's time.
+      CoarticError if more than half of the subject's hits are.
+    - Warns if the median movement of a subject takes less than a tenth or more than ten times the
+      model's time.
     """
     for subject, fit in _fit(hits, task).groupby("subject", sort=False):
         far, pace = fit.off > FAR, fit.pace.median()
@@ -496,9 +514,9 @@ class _Trial:
     subject: str
     number: float
     time: Array
-    """Shape ``(n,)``, s."""
+    """Times of the samples, shape ``(n,)``, in s."""
     tips: dict[Hand, Array]
-    """Positions of each hand with markers, shape ``(n, 2)``, length unit."""
+    """Positions of each hand with markers, shape ``(n, 2)``, in length units."""
     q: Array
     """Postures with unwrapped angles, shape ``(n, dof)``."""
     hits: list[tuple[float, Hand]]
@@ -521,7 +539,7 @@ def _trials_of(
 ) -> tuple[str, list[_Trial]]:
     """Return the name (for messages) and the trials of a recording of markers.
 
-    Raises CoarticError if it cannot be read.
+    Raises CoarticError if the recording cannot be read.
     """
     if isinstance(recording, pd.DataFrame):
         source, frame = "the frame", recording
@@ -607,8 +625,8 @@ def _trial(
 def _bridge(values: Array, time: Array, step: float) -> int:
     """Fill the gaps (NaN) of a marker's coordinate by straight lines, in place.
 
-    Returns the last sample before the first gap of more than 50 ms, or the number of samples if
-    there is no such gap.
+    Returns the last sample before the first gap of more than 50 ms, or 0 if the recording begins
+    with this gap. If there is no such gap, returns the number of samples.
     """
     known = np.flatnonzero(np.isfinite(values))
     if not len(known):

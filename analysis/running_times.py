@@ -1,8 +1,8 @@
 """Compute running times: the costs at which runs reach reward targets.
 
-They are as in COCO (Hansen et al. 2021). The empirical distribution (ECDF) of running times is the
-share of pairs of run and target that are reached within a budget. :func:`runtimes` returns it for a
-results folder, :func:`ecdf` for a plain frame.
+Running times are defined as in COCO (Hansen et al. 2021). Their empirical distribution (ECDF) is
+the share of pairs of run and target that are reached within a budget. :func:`runtimes` returns it
+for a results folder, :func:`ecdf` for a plain frame.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from coartic.internal.limits import brief_value, real_array
 from coartic.robot import Array
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
-"""Costs, as columns of :attr:`.Study.runs`; ``solve_s`` is wall time, s."""
+"""Costs, as columns of :attr:`.Study.runs`; ``solve_s`` is wall time, in s."""
 TARGETS = tuple(n / 20 for n in range(1, 21))
-"""Targets, as shares of the distance from the reward of the corrective process alone, with its best
-hands, to the optimum."""
+"""Targets, as shares of the distance between two rewards: that of the corrective process alone with
+its best hands, and the best known reward."""
 
 _MOST_RUNS_DRAWN = 20_000_000  # in all resamples together; with very many runs, fewer resamples
 RunningTimes = Sequence[Array]
@@ -39,11 +39,11 @@ RunningTimes = Sequence[Array]
 
 
 def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Return the finite running times, their weights, and their runs, shape ``(k,)`` each.
+    """Return the finite running times, their weights, and the numbers of their runs.
 
-    Running times are in ascending order. Runs are numbered from 0 through all tasks. All tasks have
-    the same weight. The weights of all pairs of run and target, including pairs that are not
-    reached, sum to 1. Each task must have a run.
+    Each array has shape ``(k,)``. Running times are in ascending order. Runs are numbered from 0
+    through all tasks. All tasks have the same weight. The weights of all pairs of run and target,
+    including pairs that are not reached, sum to 1. Each task must have a run.
     """
     values = np.concatenate([of_task.ravel() for of_task in times])
     order = np.argsort(values, kind="stable")
@@ -68,7 +68,7 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 def share_reached(times: RunningTimes) -> float:
     """Return the share of pairs of run and target that are reached at any cost.
 
-    It is from 0 to 1. All tasks have the same weight.
+    The share is from 0 to 1. All tasks have the same weight.
     """
     return float(_pairs(times)[1].sum())
 
@@ -86,9 +86,10 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     Returns
     -------
     Estimate
-        The budget, infinite if no budget is enough. The interval has percentiles of bootstrap
-        samples of runs within tasks. It is not widened, because budgets can be infinite. There is
-        none if a task has fewer than five runs.
+        The budget. It is infinite if no budget is enough. The ends of the interval are percentiles
+        of a bootstrap that resamples runs within tasks. Unlike other intervals, this one is not
+        widened for few runs, because budgets can be infinite. There is no interval if a task has
+        fewer than five runs.
     """
     values, weights, runs = _pairs(times)
 
@@ -109,14 +110,15 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
 def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Array]:
     """Return the 95 % interval of the share of targets that are reached within each budget.
 
-    It has percentiles of bootstrap samples of runs within tasks.
+    The ends are percentiles of a bootstrap that resamples runs within tasks. All tasks have the
+    same weight.
 
     Parameters
     ----------
     times : sequence of arrays, shape (runs, targets)
         Running times on each task.
     budgets : ndarray, shape (budgets,)
-        Finite, in the unit of ``times``.
+        Finite budgets, in the unit of ``times``.
 
     Returns
     -------
@@ -154,10 +156,10 @@ def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=4)
 def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
-    """Return the trials that improved the best reward, and these rewards, by run id.
+    """Return the trials of each run that improved its best reward, and the new best rewards.
 
-    Runs without rewards of trials are left out. Trials are numbered from 1; rewards are negative
-    ticks. Both arrays have shape ``(n,)``.
+    The keys are run ids. Runs without rewards of trials are left out. Trials are numbered from 1.
+    Rewards are in negative ticks. Both arrays have shape ``(n,)``.
     """
     by_run = {}
     for run_id, rewards in study.rewards():
@@ -168,10 +170,10 @@ def improvements(study: Study) -> dict[str, tuple[Array, Array]]:
 
 
 def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
-    """Return a run's best reward after each number of trials, negative ticks.
+    """Return a run's best reward (in negative ticks) after each of some numbers of trials.
 
     ``steps`` are the trials and rewards of the run in :func:`improvements`. The result has the
-    shape of ``trials``; it is NaN before the first reward.
+    shape of ``trials``. It is NaN before the first reward.
     """
     numbers, rewards = steps
     return np.asarray(np.append(math.nan, rewards)[np.searchsorted(numbers, trials, "right")])
@@ -181,8 +183,8 @@ def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
 def target_ranges(study: Study) -> dict[str, tuple[float, int]]:
     """Return the two rewards between which the targets of each task lie, by task name.
 
-    They are :attr:`.Study.corrective_best` and the best known reward, negative ticks. Tasks are
-    left out if one of the two is missing, or both are equal.
+    They are :attr:`.Study.corrective_best` and the best known reward, both in negative ticks. A
+    task is left out if one of the two is missing, or if both are equal.
     """
     zero = study.corrective_best
     rewards = {name: (zero[name], best.reward) for name, best in study.optima.items()}
@@ -241,10 +243,11 @@ def times_of(
 
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:
-    """Return the wall time of solving of the runs that were made in warm processes, s.
+    """Return the wall time of solving (in s) for the runs that were made in warm processes.
 
-    If no process was warm, all runs are returned. A run whose time of solving is 0 or missing has
-    its total wall time. The result keeps the index of ``runs``.
+    A process is warm if it has performed the method before. If no run was made in a warm process,
+    the times of all runs are returned. A run whose time of solving is 0 or missing has its total
+    wall time. The result keeps the index of ``runs``.
     """
     times = runs.solve_s.where(runs.solve_s > 0, runs.wall_s)
     warm = runs.warm.to_numpy(bool, na_value=False)
@@ -346,9 +349,10 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
     -------
     DataFrame
         A row for each number of trials at which a method's share rises: ``method``, ``trials`` and
-        ``share``, the share of all pairs of run and target reached within these trials. All tasks
-        have the same weight. If a task has no runs, or a run has no reward, no target is reached
-        there. A method that reaches no target has one row, with share 0 and infinite trials.
+        ``share``, the share of all pairs of run and target that are reached within these trials.
+        All tasks have the same weight. A run without a reward reaches no target, and on a task
+        without runs of the method no target is reached. A method that reaches no target has one
+        row, with share 0 and infinite trials.
 
     Raises
     ------

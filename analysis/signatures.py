@@ -13,9 +13,9 @@ Notation, for run i and goal g = 1..G:
 
 A signature has shape ``(n,)`` for n runs, and is NaN for a run without this signature.
 
-Configurations mix length unit (base) and rad (joints), as the joint-space distance of the model
-does. Permutation tests exchange whole runs. Runs are exchangeable if the context has no effect, and
-the tests assume no distribution.
+Configurations mix length units (base) and rad (joints), as the joint-space distance of the model
+does. Permutation tests exchange whole runs. Runs are exchangeable if the context has no effect. The
+tests assume no distribution.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Solutions:
 
     @cached_property
     def configurations(self) -> Array:
-        """Configurations that hit the goals, shape ``(n, G, dof)``, length unit and rad."""
+        """Configurations that hit the goals, shape ``(n, G, dof)``, in length units and rad."""
         shape = len(self.runs), len(self.task.goals), self.task.robot.dof
         return np.array([run.configurations for run in self.runs]).reshape(shape)
 
@@ -86,7 +86,8 @@ class Solutions:
     def starts(self) -> Array:
         """Configurations at the start of each subtask, shape ``(n, G, dof)``.
 
-        A subtask starts at the hit of the previous goal, the first at the start of the task.
+        A subtask starts at the hit of the previous goal. The first subtask starts at the start of
+        the task.
         """
         starts = np.empty_like(self.configurations)
         starts[:, 0], starts[:, 1:] = self.task.q0, self.configurations[:, :-1]
@@ -96,8 +97,8 @@ class Solutions:
     def against_same_hands(self) -> Array:
         """Ticks of each subtask less those of the corrective process alone, shape ``(n, G)``.
 
-        The corrective process uses the hands of the run. Values are NaN if it does not complete the
-        task with them.
+        The corrective process uses the hands of the run. The values of a run are NaN if the
+        corrective process does not complete the task with them.
         """
         hand_sequences = {run.hands for run in self.runs}
         references = {hands: corrective_trial(self.task, hands) for hands in hand_sequences}
@@ -111,9 +112,12 @@ class Solutions:
 def initial_solution(task: Task) -> Execution | None:
     """Return the execution of the corrective process alone with the initial hands of a task.
 
-    Returns None if the corrective process does not complete the task with these hands, or if no
-    initial hands are found: the task does not name them, and either no hand sequence of its policy
-    completes the task, or there are more than 4,096 to try.
+    Returns None if
+
+    - the corrective process does not complete the task with the initial hands;
+    - the task does not name initial hands, and no hand sequence that its policy allows completes
+      the task;
+    - the task does not name initial hands, and there are more than 4,096 hand sequences to try.
     """
     try:
         execution = corrective_trial(task, initial_hands(task))
@@ -132,13 +136,13 @@ def isolated_reaches(
 ) -> tuple[Array, Array]:
     """Reach single goals by the corrective process, and return ticks and final configurations.
 
-    These are r(q, g, h) and R(q, g, h) of the notation above.
+    These are r(q, g, h) and R(q, g, h) in the notation of this module.
 
     Parameters
     ----------
     task : Task
     q : ndarray, shape (..., dof)
-        Configurations at the start, length unit and rad.
+        Configurations at the start, in length units and rad.
     goals, hands : array_like of int, shapes that broadcast to (...)
         Numbers of goals, from 1, and indices of hands in HANDS.
 
@@ -188,8 +192,8 @@ def gain_at_next(runs: Solutions) -> Array:
     - q'' is q(i, g) with the joints of the idle arm as in q', so that movements of the idle arm do
       not count.
 
-    It is positive if the movement to the next goal is shorter from q'', and NaN if a reach ends
-    without a hit.
+    A value is positive if the movement to the next goal is shorter from q'', and NaN if a reach
+    ends without a hit.
     """
     task, hands = runs.task, runs.hands
     goals = 1 + np.arange(len(task.goals))
@@ -210,9 +214,10 @@ def ticks_slower(runs: Solutions) -> Array:
 
     r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h)
 
-    These are the ticks of the corrective process from the previous hit, with the chosen hand less
-    those with the fastest hand. The value is above 0 if the chosen hand is not the fastest for this
-    goal alone. It is infinite if the reach with the chosen hand ends without a hit.
+    This is the number of ticks that the corrective process takes from the previous hit with the
+    chosen hand, minus the number that it takes with the fastest hand. The value is above 0 if the
+    chosen hand is not the fastest for this goal alone. It is infinite if the reach with the chosen
+    hand ends without a hit.
     """
     goals = 1 + np.arange(len(runs.task.goals))
     isolated = np.full((len(HANDS), *runs.hands.shape), np.inf)
@@ -228,7 +233,7 @@ def ticks_slower(runs: Solutions) -> Array:
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     """Return how much of the path to its next goal the idle hand covers.
 
-    It is a share for each goal, shape ``(G,)``:
+    The result has a share for each goal, shape ``(G,)``:
 
     (d_held(g) − d(g)) / d_initial(g),
 
@@ -240,9 +245,9 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
     - d_initial(g) is the distance of the same hand to the same goal at the hit of goal g in
       ``initial``.
 
-    It is NaN if the idle hand hits no later goal (always under exploration condition 1), or
-    d_initial(g) is 0. Otherwise it is 0 if the joints of the idle arm do not move, even if the base
-    moves (always under condition 3).
+    The share is NaN if the idle hand hits no later goal (always under exploration condition 1), or
+    if d_initial(g) is 0. Otherwise it is 0 if the joints of the idle arm do not move (always under
+    condition 3), even if the base moves.
 
     Parameters
     ----------
@@ -286,8 +291,8 @@ def hand(runs: Solutions) -> Array:
     """Return the share of goals that are not hit with their fastest hand, shape ``(n,)``.
 
     The fastest hand is that for the goal alone. The share is 1 − mean over g < G of a(i, g) of
-    :func:`as_in_isolation`: the last goal does not count. NaN on a task for one hand or with one
-    goal.
+    :func:`as_in_isolation`: the last goal does not count. The share is NaN on a task for one hand,
+    and on a task with one goal.
     """
     alike = as_in_isolation(runs)[:, :-1]
     return np.asarray(1.0 - alike.mean(axis=1)) if alike.size else np.full(len(alike), np.nan)
@@ -296,9 +301,9 @@ def hand(runs: Solutions) -> Array:
 def as_in_isolation(runs: Solutions) -> Array:
     """Return 1 where the chosen hand is the fastest for the goal alone, otherwise 0.
 
-    The shape is ``(n, G)``. Values are NaN on a task for one hand.
+    The shape is ``(n, G)``. Values are NaN on a task for one hand. a(i, g) is 1 if
 
-    a(i, g) = [r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h)].
+    r(q(i, g − 1), g, h(i, g)) = min over h of r(q(i, g − 1), g, h).
     """
     if not runs.runs or len(runs.task.hands) < 2:
         return np.full((len(runs.runs), len(runs.task.goals)), np.nan)
@@ -308,10 +313,12 @@ def as_in_isolation(runs: Solutions) -> Array:
 def other_arm(runs: Solutions) -> Array:
     """Return how much of the path to its next goal the idle hand covers.
 
-    It is a share for each run, shape ``(n,)``: the mean of :func:`preshaping` over the goals for
-    which this is not NaN, and negative if the idle hand moves away on average. It is NaN on a task
-    for one hand or without an initial solution (:func:`initial_solution`), and for a run in which
-    :func:`preshaping` is NaN for all goals.
+    The result has a share for each run, shape ``(n,)``: the mean of :func:`preshaping` over the
+    goals for which this is not NaN. The share is negative if the idle hand moves away on average.
+    It is NaN
+
+    - on a task for one hand, or without an initial solution (:func:`initial_solution`);
+    - for a run in which :func:`preshaping` is NaN for all goals.
     """
     initial = initial_solution(runs.task)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:
@@ -323,11 +330,11 @@ def other_arm(runs: Solutions) -> Array:
 
 
 def arm(runs: Solutions) -> Array:
-    """Return the ticks that postures save for the next goal, a mean over goals.
+    """Return the mean number of ticks that postures save for the next goal.
 
     Postures are those of base and chosen arm. The result has shape ``(n,)``: the mean of
-    :func:`gain_at_next` over goals g < G. It is NaN on a task with one goal, and if one of these
-    gains is NaN.
+    :func:`gain_at_next` over goals g < G. It is NaN on a task with one goal, and for a run with a
+    gain that is NaN.
     """
     if not runs.runs or len(runs.task.goals) < 2:
         return np.full(len(runs.runs), np.nan)
@@ -384,8 +391,8 @@ def _groups(*groups: Numbers) -> list[Array]:
 def distance_of_means(first: Array, second: Array) -> float:
     """Return the distance ‖mean(first) − mean(second)‖ of the mean configurations of two contexts.
 
-    ``first`` and ``second`` have shape ``(runs, dof)`` (ValueError for others). The distance mixes
-    length unit and rad.
+    ``first`` and ``second`` have shape ``(runs, dof)``. The distance mixes length units and rad.
+    Raises ValueError for other shapes.
     """
     first, second = _groups(first, second)
     return float(np.linalg.norm(first.mean(axis=0) - second.mean(axis=0)))
@@ -396,11 +403,12 @@ def standardised_posture_difference(first: Array, second: Array) -> float:
 
     d = ‖m₁ − m₂‖ / s, s² = (Σ‖x − m₁‖² + Σ‖x − m₂‖²) / (n₁ + n₂ − 2),
 
-    for the n₁ runs of the first and the n₂ runs of the second context with means m₁ and m₂. It is a
-    multivariate form of Cohen's d (Cohen 1988), from 0 to ∞. If the context has no effect, d² is
-    about 1/n₁ + 1/n₂ on average, not 0. d is NaN if no context has two runs, or s = 0.
+    where m₁ and m₂ are the mean configurations of the n₁ runs of the first context and of the n₂
+    runs of the second. d is a multivariate form of Cohen's d (Cohen 1988), from 0 to ∞. If the
+    context has no effect, d² is about 1/n₁ + 1/n₂ on average, not 0. d is NaN if no context has two
+    runs, or if s = 0.
 
-    ``first`` and ``second`` have shape ``(runs, dof)`` (ValueError for others).
+    ``first`` and ``second`` have shape ``(runs, dof)``. Raises ValueError for other shapes.
     """
     first, second = _groups(first, second)
     freedom = len(first) + len(second) - 2
@@ -428,14 +436,15 @@ def posture_difference_below(
     Parameters
     ----------
     first, second : array_like, shape (runs, dof)
-        Configurations in the two contexts, length unit and rad.
+        Configurations in the two contexts, in length units and rad.
     bound : float
-        In the unit of the posture difference.
+        The bound, in the unit of the posture difference.
     rng : numpy.random.Generator
         Generator of the bootstrap samples.
     standardised : bool
-        True if the posture difference is :func:`standardised_posture_difference`, in SDs, False if
-        it is :func:`distance_of_means`. A sample without spread counts as at least ``bound``.
+        True if the posture difference is :func:`standardised_posture_difference` (in SDs), False if
+        it is :func:`distance_of_means`. If True, a sample without spread counts as at least
+        ``bound``.
     resamples : int
         Number of bootstrap samples.
 
@@ -475,7 +484,7 @@ def permutation_p(
     Parameters
     ----------
     first, second : ndarray, shape (runs, dof)
-        Configurations in the two contexts, length unit and rad.
+        Configurations in the two contexts, in length units and rad.
     rng : numpy.random.Generator
         Generator of the permutations.
     resamples : int
@@ -521,7 +530,7 @@ def beyond_p(
     Parameters
     ----------
     method, other : sequence of arrays, shape (runs, dof)
-        Configurations in each of the two contexts, length unit and rad.
+        Configurations in each of the two contexts, in length units and rad.
     rng : numpy.random.Generator
         Generator of the permutations.
     resamples : int
@@ -585,9 +594,11 @@ def _distances(first: Array, second: Array) -> Array:
 
 
 NEXT_APART = 0.1
-"""Smallest distance of the mean next postures of two contexts for a lean, length unit and rad."""
+"""Smallest distance between the mean next postures of two contexts at which a lean is computed.
+
+It mixes length units and rad."""
 STANDARD_ERRORS = 3
-"""Smallest distance of these means in their standard errors."""
+"""Smallest distance between the mean next postures, in standard errors, for a lean."""
 FEWEST_RUNS = 5
 """Smallest number of runs in each context for the interval of a lean or posture difference."""
 
@@ -603,7 +614,7 @@ class Lean(NamedTuple):
     at_start: float
     """Lean of the postures from which the movements to the shared goal start: the control."""
     apart: float
-    """Distance of the mean next postures of the two contexts; it mixes length unit and rad."""
+    """Distance between the mean next postures of both contexts; it mixes length units and rad."""
 
 
 def lean(
@@ -617,12 +628,13 @@ def lean(
 ) -> Lean:
     """Return how much of the path to the next posture is covered at a shared goal.
 
-    The lean of contexts A and B is
+    In two contexts A and B, the same goal (the shared goal) is followed by different goals. The
+    lean is
 
     (p_A − p_B)·(n_A − n_B) / ‖n_A − n_B‖²,
 
-    where p are mean postures at the shared goal, and n mean postures in which the next goal is
-    hit. The lean is
+    where p_A and p_B are the mean postures at the shared goal, and n_A and n_B the mean postures in
+    which the next goal is hit. The lean is
 
     - 0 if the posture at the shared goal does not depend on the next goal;
     - 1 if it is already the posture for the next goal;
@@ -662,10 +674,10 @@ def lean(
     Returns
     -------
     Lean
-        The interval has percentiles of bootstrap samples. Runs are resampled within the odd and
-        within the even runs of each context (with ``toward``, within each context); deviations from
-        the mean of m runs are multiplied by √(m / (m − 1)). There is no interval if a context has
-        fewer than five runs, or if ``deterministic``.
+        The ends of the interval are percentiles of bootstrap samples. Runs are resampled within the
+        odd and within the even runs of each context (with ``toward``, within each context).
+        Deviations from the mean of m runs are multiplied by √(m / (m − 1)). There is no interval if
+        a context has fewer than five runs, or if ``deterministic``.
 
     Raises
     ------
@@ -775,7 +787,7 @@ def _means_drawn(runs: Array, rng: np.random.Generator, resamples: int) -> Array
 SAME = 0.01
 """Posture difference below which postures count as the same: the robot's step.
 
-It mixes length unit and rad."""
+It mixes length units and rad."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
@@ -803,7 +815,7 @@ def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
 def movable(task: Task, hand: Hand) -> Array:
     """Return the indices of the coordinates that move a hand, shape ``(k,)``.
 
-    These are the base coordinates that are not locked, and the joints of its arm.
+    These are the base coordinates that are not locked, and the joints of the hand's arm.
     """
     base = [k for k, name in enumerate("xy") if name not in task.locked_base]
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
@@ -823,7 +835,7 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
     Parameters
     ----------
     difference : ndarray, shape (k,)
-        Δq of the k coordinates that can move, length unit and rad.
+        Δq of the k coordinates that can move, in length units and rad.
     jacobian : ndarray, shape (2, k)
         J.
 
@@ -858,7 +870,7 @@ def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]
 class TwoContexts:
     """Compare the runs of a method at a goal that two tasks share.
 
-    The tasks have different later goals. Runs are compared that hit the goal with the same hand.
+    The tasks have different later goals. Only runs that hit the goal with ``hand`` are compared.
 
     Parameters
     ----------
@@ -867,7 +879,7 @@ class TwoContexts:
     goal : int
         Number of the goal, from 1.
     hand : {"left", "right"}
-        Hand that hits the goal; runs with the other hand do not count.
+        Hand that hits the goal.
     """
 
     first: Solutions
@@ -887,9 +899,10 @@ class TwoContexts:
 
     @cached_property
     def configurations(self) -> tuple[Array, Array]:
-        """Configurations at the goal of the runs with this hand, for each context.
+        """Configurations of the compared runs at the goal, for each context.
 
-        Each has shape ``(runs, dof)``, length unit and rad.
+        Each array has shape ``(runs, dof)``, in length units and rad. A run is compared if it hits
+        ``goal`` with ``hand``.
         """
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         first, second = (
@@ -908,26 +921,27 @@ class TwoContexts:
 
     @property
     def n(self) -> int:
-        """Total number of runs with this hand in the two contexts."""
+        """Number of compared runs in the two contexts together."""
         return sum(map(len, self.configurations))
 
     @property
     def can_test(self) -> bool:
-        """True if each context has the five runs that a test needs."""
+        """True if each context has the five compared runs that a test needs."""
         return min(map(len, self.configurations)) >= FEWEST
 
     @property
     def posture_difference(self) -> float:
-        """Distance between the mean postures of the two contexts; it mixes length unit and rad."""
+        """Distance between the mean postures of the two contexts; it mixes length units and rad."""
         return distance_of_means(*self.configurations)
 
     @cached_property
     def difference(self) -> Estimate:
         """The posture difference with its interval.
 
-        The interval has percentiles of bootstrap samples of runs within each context. There is none
-        if a context has fewer than five runs, or the method is deterministic. Noise makes distances
-        larger, so the interval of a small difference tends to be too high.
+        The ends of the interval are percentiles of a bootstrap that resamples runs within each
+        context. There is no interval if a context has fewer than five runs, or if the method is
+        deterministic. Noise makes distances larger, so the interval of a small difference tends to
+        be too high.
         """
         value, n = self.posture_difference, tuple(map(len, self.configurations))
         if min(n) < FEWEST_RUNS or self.first.deterministic:
@@ -939,10 +953,12 @@ class TwoContexts:
 
     @cached_property
     def lean(self) -> Lean:
-        """Share of the path to the next posture that is already covered at the goal.
+        """Lean of the postures at the goal, over the coordinates that move the hand.
 
-        It is :func:`.lean` over the coordinates that move the hand. Of each context, only the runs
-        count that hit the next goal with the hand that most of the runs use for it.
+        The lean (:func:`.lean`) says how much of the difference between the two contexts' next
+        postures is already there at the shared goal, compared with the start of the movement. In
+        each context, only those compared runs count that hit the next goal with the hand that is
+        used most often for it.
         """
         joints = movable(self.first.task, self.hand)
         goal, hand = self.goal - 1, HANDS.index(self.hand)
@@ -961,7 +977,7 @@ class TwoContexts:
     def standardised_posture_difference(self) -> float:
         """Posture difference in pooled SDs within contexts.
 
-        NaN if the runs of a context do not differ in either context, or if each context has a
+        It is NaN if the postures do not differ within either context, or if each context has a
         single run.
         """
         return standardised_posture_difference(*self.configurations)
@@ -982,7 +998,8 @@ class TwoContexts:
     def p(self) -> float:
         """p of the permutation test that the posture difference exceeds chance.
 
-        The test is one-tailed (:func:`.permutation_p`). NaN if a context has fewer than five runs.
+        The test is one-tailed (:func:`.permutation_p`). p is NaN if a context has fewer than five
+        runs.
         """
         if not self.can_test:
             return math.nan
@@ -992,7 +1009,7 @@ class TwoContexts:
     def p_same(self) -> float:
         """p of the bootstrap test that the posture difference is below :data:`SAME`.
 
-        See :func:`.posture_difference_below`. NaN if a context has fewer than five runs.
+        See :func:`.posture_difference_below`. p is NaN if a context has fewer than five runs.
         """
         if not self.can_test:
             return math.nan

@@ -1,7 +1,7 @@
 """Rank the methods of a study, and say why some are not ranked.
 
-A method is ranked if it solved all tasks that were asked for. Searches for the optimum are
-references and are not ranked.
+A method is ranked if it solved all tasks that were asked for, with the same number of trials as the
+other methods (:func:`ranking_budget`). Searches for the optimum are references and are not ranked.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
 
     - ``optimum`` if all rewards are proven, or if there are no tasks;
     - ``best known reward`` if some are not proven;
-    - ``best of this folder`` if all are known only from methods of this folder, and none is proven.
+    - ``best of this folder`` if none is proven, and all are known only from methods of this folder.
 
-    If only some are known only from this folder, and not proven, the name is the one for the other
-    rewards with ``or best of this folder``. Raises KeyError for a task without a best known reward.
+    If only some rewards are not proven and known only from this folder, ``or best of this folder``
+    is added to the name for the other rewards. Raises KeyError for a task without a best known
+    reward.
     """
     best = [study.optima[task] for task in tasks]
     others = [known.proven for known in best if known.proven or not known.only_here]

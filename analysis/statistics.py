@@ -83,7 +83,7 @@ def bootstrap_test(
     alternative : {"greater", "less", "two-sided"}
         ``"greater"``: the mean of ``values`` is above ``bound``.
     resamples : int
-        By default 9,999, so that the smallest p is 0.0001.
+        Number of bootstrap samples; by default 9,999, so that the smallest p is 0.0001.
 
     Returns
     -------
@@ -127,9 +127,9 @@ def exchange_test(
     """Test the difference of two means by exchanging the labels of the values.
 
     The statistic is the difference of means divided by its standard error. Each sample has its own
-    variance, so the test also holds for samples of unequal spread (A. Janssen 1997, Statistics &
-    Probability Letters 36). If both variances are 0, the statistic is infinite, or 0 if the means
-    are equal.
+    variance, so the test also holds asymptotically for samples of unequal spread (A. Janssen 1997,
+    Statistics & Probability Letters 36). If both variances are 0, the statistic is infinite, or 0
+    if the means are equal.
 
     Parameters
     ----------
@@ -138,8 +138,8 @@ def exchange_test(
         ``"greater"``: the mean of ``first`` is higher. ``"two-sided"`` compares absolute values of
         the statistic.
     resamples : int
-        Number of random exchanges. If there are no more exchanges than this, all are made, and p is
-        exact; otherwise p = (1 + exchanges at least as extreme) / (1 + resamples).
+        Number of random exchanges. If there are at most this many different exchanges, all are
+        made, and p is exact. Otherwise p = (1 + exchanges at least as extreme) / (1 + resamples).
 
     Returns
     -------
@@ -164,7 +164,9 @@ def exchange_test(
 
 
 def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool = True) -> float:
-    """Return the smallest p that a test by exchange can give.
+    """Return the smallest p that a permutation test of two samples can give.
+
+    The test is :func:`exchange_test`.
 
     Parameters
     ----------
@@ -173,7 +175,8 @@ def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool =
     resamples : int
         Number of random exchanges.
     two_tailed : bool
-        True if the statistic is the same when the samples are swapped.
+        True for a two-tailed test. Swapping samples of equal size then gives an equally extreme
+        statistic, so the smallest exact p is doubled.
     """
     ways = math.comb(n + m, n)
     if ways > resamples:  # exchanges are random, and perhaps none is as extreme as the samples
@@ -184,8 +187,8 @@ def smallest_p(n: int, m: int, resamples: int = RESAMPLES, *, two_tailed: bool =
 def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> float:
     """Return the two-sided p-value of a difference of means, averaged over strata such as tasks.
 
-    In each stratum labels are exchanged, as in :func:`exchange_test`; a sample that is compared
-    with an exact number is resampled, as in :func:`bootstrap_test`. The statistic is the sum of the
+    In each stratum, labels are exchanged as in :func:`exchange_test`. A sample that is compared
+    with an exact number is resampled as in :func:`bootstrap_test`. The statistic is the sum of the
     differences divided by the root of the sum of their variances. p = (1 + resamples at least as
     extreme) / (1 + resamples).
 
@@ -198,7 +201,7 @@ def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> fl
     Returns
     -------
     float
-        p; NaN with fewer than five values in a sample, and if there are only exact numbers.
+        p. It is NaN if a sample has fewer than five values, or if there are only exact numbers.
 
     Examples
     --------
@@ -348,9 +351,9 @@ def _moments(pool: Array, rows: NDArray[Any], n: int) -> tuple[Array, Array]:
 def _studentised(moments: Array, size: float) -> Array:
     """Return differences divided by the square roots of their variances.
 
-    ``moments`` has the differences in its first row and the variances in its second. Differences
-    and variances within the rounding of values of ``size`` count as 0. The result is 0 if the
-    difference is 0, otherwise infinite if the variance is 0.
+    ``moments`` has the differences in its first row and the variances in its second. ``size`` is
+    the size of the values: differences and variances that can be their rounding count as 0. The
+    result is 0 if the difference is 0, and otherwise infinite if the variance is 0.
     """
     differences = np.where(np.abs(moments[0]) < NEGLIGIBLE * size, 0.0, moments[0])
     variances = np.where(moments[1] < (NEGLIGIBLE * size) ** 2, 0.0, moments[1])
@@ -500,11 +503,11 @@ def other_tasks(scores: Scores) -> Estimate:
 
     Notes
     -----
-    The interval has percentiles of bootstrap samples, widened by √(k / (k − 1)) for the k instances
-    of a family, because the bootstrap underestimates the spread of a mean by this factor. It is a
-    little too wide for few runs with much noise, because the means of instances already contain
-    this noise. It does not exceed the mean over families of the lowest and of the highest score of
-    a run.
+    The ends of the interval are percentiles of bootstrap samples. For the k instances of a family,
+    deviations are multiplied by √(k / (k − 1)), because the bootstrap underestimates the spread of
+    a mean by this factor. The interval is a little too wide for few runs with much noise, because
+    the means of instances already contain this noise. Its ends are limited by the lowest and by the
+    highest score of a run, each as a mean over families.
     """
     if not scores or not all(scores.values()):
         raise ValueError("scores must have at least one family, and one instance of each family")

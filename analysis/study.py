@@ -167,10 +167,10 @@ class Study:
 
     @property
     def folder_in_commands(self) -> str:
-        """The folder as commands on a page should name it, quoted for a shell.
+        """Path of the results folder for the commands that the report shows, quoted for a shell.
 
-        It is the path from the working folder, or only the folder's name if it is not below the
-        working folder.
+        The path is relative to the working folder. If the results folder is not below the working
+        folder, only its name is returned.
         """
         path = Path(os.path.abspath(self.folder))  # without ..
         return quote(str(path.relative_to(Path.cwd()) if Path.cwd() in path.parents else path.name))
@@ -179,7 +179,7 @@ class Study:
     def question(self) -> tuple[str, str]:
         """Title and description of a user's suite that was run on its own tasks.
 
-        For other suites, two empty strings.
+        For other suites, both are empty.
         """
         title, description = self.made_with.get("question", ("", ""))
         return title, description
@@ -221,11 +221,12 @@ class Study:
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:
-        """Reward of the corrective process alone with its best hands, negative ticks, by task name.
+        """Reward (in negative ticks) of the corrective process alone with its best hands, by task.
 
-        The gain, shares and targets start from this reward. If a task has more than 4,096 hand
-        sequences, it is the reward with the task's initial hands. It is NaN if the corrective
-        process does not complete the task with any of these hands, or no hands are found.
+        The gain, shares and targets start from this reward. For a task with more than 4,096 hand
+        sequences, it is the reward with the task's initial hands. The reward is NaN if the
+        corrective process does not complete the task with any of these hands, or if no hands are
+        found.
         """
         alone = {}
         for name, task in self.tasks.items():
@@ -250,9 +251,10 @@ class Study:
         - ``best_known``: best known reward of the task, missing if there is none, and for a search
           with another base;
         - ``corrective_best``: as in :attr:`corrective_best`;
-        - ``gap``: as a share of the best known reward;
-        - a column for each parameter of methods, unless there is a column of this name already:
-          ``trials`` is the number of trials made, ``hands`` the hands of the solution.
+        - ``gap``: the gap to the best known reward, as a share of it (:func:`.gaps`);
+        - a column for each parameter of methods, unless there is a column of this name already.
+          ``trials`` is the number of trials that were made, and ``hands`` are the hands of the
+          solution.
         """
         labels = [*map(label_of, self.stored.method, self.stored.setting)]
         runs, cells = self.stored.assign(label=labels), [job.cell for job in self.plan]
@@ -329,14 +331,19 @@ class Study:
         Parameters
         ----------
         task : str
-            Name of a task of the study (CoarticError for others).
+            Name of a task of the study.
 
         Returns
         -------
         DataFrame
-            A row for each sequence, the best first: ``hands``, ``reward`` (negative ticks, missing
-            if it failed) and ``reason`` of the failure. It has no rows if the task has more than
-            4,096 sequences. It is cached: do not change it.
+            A row for each sequence, the best first: ``hands``, ``reward`` (in negative ticks,
+            missing if the trial failed) and ``reason`` of the failure. The frame has no rows if the
+            task has more than 4,096 sequences. The frame is cached: do not change it.
+
+        Raises
+        ------
+        CoarticError
+            The study has no task of this name.
         """
         if task not in self.tasks:
             raise CoarticError(f"{self.folder}: {unknown('task', task, self.tasks)}")
@@ -437,7 +444,7 @@ class Study:
         Returns
         -------
         ndarray, shape (runs, goals, dof)
-            Configurations of the first 500 solved runs, length unit (base) and rad (joints).
+            Configurations of the first 500 solved runs, in length units (base) and rad (joints).
 
         Raises
         ------
@@ -497,8 +504,8 @@ class Study:
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
         """Return the movements of solutions, or of replays, by run id.
 
-        Only the first 500 solved runs of each method on each task are included; for ``"replay"``,
-        only runs with a replay.
+        Only the first 500 solved runs of each method on each task are included. For ``"replay"``,
+        runs without a replay are left out.
         """
         if part not in self._movements:
             with open_results(self.folder) as store:
@@ -525,7 +532,7 @@ class Study:
     def individual_tasks(self) -> dict[str, Task]:
         """Tasks that a report shows individually, by name.
 
-        If the study has more than eight instances of families, these are left out. Changed
+        If the study has more than eight instances of families, all instances are left out. Changed
         instances, such as ``two-armed/v1/i017.radius-0.2``, count as instances.
         """
         drawn = {name for name in self.tasks if address_of(name.partition(".")[0]) is not None}

@@ -1,7 +1,7 @@
 """Check a results folder: execute every stored solution again.
 
-It only needs Python and NumPy, and does not import coartic. ``python verify.py FOLDER`` opens
-``FOLDER/runs.sqlite`` and checks that
+This file needs only Python and NumPy, and does not import coartic. ``python verify.py FOLDER``
+opens ``FOLDER/runs.sqlite`` and checks that
 
 - the solution of each run (and the first trial and the replay of a learner) obeys the rules, hits
   all goals, and has the stored ticks, reward and hands;
@@ -66,9 +66,10 @@ C4, C6, C8, C10, C12, C14, C16 = ((-1) ** n / math.factorial(2 * n) for n in ran
 
 
 def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
-    """Return cosine and sine of angles, rad, exact for angles from -1e5 to 1e5 rad.
+    """Return the cosine and the sine of angles from -1e5 to 1e5 rad.
 
-    An angle is k quarters of a turn (π/2) and a remainder, of which the Taylor series is computed.
+    An angle is k quarters of a turn (π/2) plus a remainder. The Taylor series of the remainder is
+    computed.
     """
     quarters = np.rint(angles * (2.0 / math.pi))
     x = ((angles - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
@@ -153,7 +154,8 @@ def make(
 ) -> tuple[Floats, int, bool]:
     """Make a movement, and return where it stops, its ticks, and whether it hits.
 
-    It starts at ``q``. ``corners`` has a row with the target, or a row for each waypoint of a path.
+    The movement starts at ``q``. ``corners`` has a row with the target, or a row for each waypoint
+    of a path.
     """
     model, arm, on_path = task.model, task.arms[hand], kind == "path"
     points = path(q, corners, model) if on_path else line(q, corners[-1], model)
@@ -165,7 +167,7 @@ def make(
         dx, dy = x[-1] - x, y[-1] - y
         stops |= np.sqrt(dx * dx + dy * dy) <= model.arrival_tolerance
     stops[-1] = True
-    k = int(np.argmax(stops))  # the first point at which it stops
+    k = int(np.argmax(stops))  # the first point at which the movement stops
     return points[:, k], k + 1, bool(hits[k])
 
 
@@ -178,8 +180,8 @@ def _recompute(task: Any, movements: list[list[Any]]) -> tuple[int, str, int, fl
     Returns
     -------
     (int, str, int, float)
-        Reward, letters of the hands, number of corrections, and the distance in joint space that
-        idle arms travel, added over goals, rad.
+        Reward, letters of the hands, number of corrections, and the distance in joint space (in
+        rad) that idle arms travel, added over goals.
     """
     goals = [movement[0] for movement in movements]
     order = [*range(1, len(task.goals) + 1)]

@@ -1,4 +1,4 @@
-"""Write numbers and names alike on the page, in tables and on the terminal."""
+"""Write numbers and names in the same way on the page, in tables and on the terminal."""
 
 from __future__ import annotations
 
@@ -78,7 +78,8 @@ def p_value(p: float) -> str:
 def in_brackets(low: float, high: float, digits: int | None = None) -> str:
     """Return an interval as ``[1.3, 2.9]``, with ``digits`` decimals or as :func:`number` chooses.
 
-    Empty if an end is NaN, and if both ends are equal, because this would look like certainty.
+    The result is empty if an end is NaN, or if both ends are equal, because this would look like
+    certainty.
     """
     if math.isnan(low) or math.isnan(high) or low == high:
         return ""
@@ -104,7 +105,8 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     Returns
     -------
     str
-        Such as ``7.8 [7.3, 8.1]``, or only the number if an end is NaN or both ends are equal.
+        A string such as ``7.8 [7.3, 8.1]``. It has only the number if an end is NaN, or if both
+        ends are equal.
 
     Raises
     ------
@@ -166,7 +168,7 @@ def tally(names: Iterable[str]) -> str:
 def commonest(texts: Iterable[str], most: int | None = 3) -> list[str]:
     """Return the most frequent strings with their numbers, as in ``12 × no hit``.
 
-    There are at most ``most``; None stands for all.
+    The list has at most ``most`` strings; None stands for all.
     """
     return [f"{count} × {text}" for text, count in Counter(texts).most_common(most)]
 

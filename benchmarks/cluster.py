@@ -50,8 +50,8 @@ class Dask:
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with the outcomes of its runs, as jobs finish.
 
-        If a worker dies, another worker performs its jobs. The outcomes of a job whose workers die
-        again and again are ``crashed``.
+        If a worker dies, another worker performs its jobs. If several workers die while they
+        perform the same job, its outcomes have status ``crashed``.
 
         Parameters
         ----------
@@ -68,9 +68,9 @@ class Dask:
             One of these is the case:
 
             - the scheduler is missing or lost, or has no worker for 10 minutes;
-            - a job fails on workers three times, because they have another version or code of its
-              method or cannot perform it;
-            - this machine lacks the extra ``cluster``.
+            - a job fails three times because the workers have another version or code of its
+              method, or cannot perform it;
+            - the extra ``cluster`` is not installed on this machine.
         """
         client = self._client()
         from distributed import CancelledError, KilledWorker, as_completed
@@ -104,9 +104,9 @@ class Dask:
             from distributed import Client
             from distributed.comm.addressing import resolve_address
 
-            for name in _LOGGERS:  # Dask has set their levels when it was imported
+            for name in _LOGGERS:  # Dask sets their levels when it is imported
                 logging.getLogger(name).setLevel(logging.CRITICAL)  # this class reports errors
-            resolve_address(self.address)  # raises without a port, where a client would wait
+            resolve_address(self.address)  # raises without a port; a client would wait instead
             return Client(self.address, set_as_default=False)
         except ImportError:
             raise CoarticError(
@@ -134,10 +134,10 @@ class Dask:
 
 
 def _remote(job: Job) -> list[Outcome]:
-    """Perform a job on the machine of a Dask worker, in a process of its own.
+    """Perform a job on the machine of a Dask worker, in a separate process.
 
-    The outcomes have the environment of this machine. Raises CoarticError if the method has another
-    version or code on this machine, or if processes cannot start.
+    The outcomes have the environment of the worker's machine. Raises CoarticError if the method has
+    another version or code on that machine, or if processes cannot start.
     """
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method, used = job.cell.method, current_environment()

@@ -1,4 +1,4 @@
-"""Check whether a new method or task keeps the rules.
+"""Check whether a new method or task follows the rules of the benchmark.
 
 A worker process makes the runs of a method, each with a limit of CPU time. Another process repeats
 one of them.
@@ -57,11 +57,11 @@ def check_method(
     ----------
     info : MethodInfo
     tasks : sequence of Task, optional
-        Tasks to run the method on, by default the shipped tasks. Tasks to which it does not apply
-        are left out.
+        Tasks to run the method on, by default the shipped tasks. Tasks to which the method does not
+        apply are left out.
     verbose : bool
-        True to show what the method prints and logs, and the tracebacks of its errors. The run that
-        another process repeats is not shown.
+        True to show what the method prints and logs, and the tracebacks of its errors. Output of
+        the repeat in another process is not shown.
 
     Returns
     -------
@@ -236,13 +236,13 @@ def check_task_file(path: Path, registered: Registry) -> list[CheckResult]:
     path : Path
         The file.
     registered : mapping
-        Known methods by id.
+        Known methods by id. The result of ``valid`` says how many of them can run on the task.
 
     Returns
     -------
     list of CheckResult
-        Results of ``valid``, ``distinct goals`` and ``solvable``; for an invalid file only of
-        ``valid``.
+        Results of the checks ``valid``, ``distinct goals`` and ``solvable``. If the file is
+        invalid, only the result of ``valid``.
     """
     try:
         task = check_task(load_task(path))

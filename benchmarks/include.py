@@ -38,19 +38,21 @@ def include_folders(
 ) -> list[Job]:
     """Copy the runs of other folders into a results folder, and join the plans.
 
-    The joined plan has the cells of ``plan``, and the cells of the folders that have a run 0. It
-    replaces the plan of ``out``. This function performs no missing runs; :func:`.perform` does.
+    The joined plan has the cells of ``plan``, and those cells of the folders of which run 0 is
+    stored. The joined plan replaces the plan of ``out``. This function performs no missing runs;
+    :func:`.perform` does.
 
     Parameters
     ----------
     plan : sequence of Job
-        Jobs of this command, at least one. Their runs begin at 0.
+        Jobs of this command, at least one. The numbers of their runs begin at 0.
     folders : sequence of str or Path
         Folders to include. ``"shipped"`` stands for the shipped results.
     out : Path
         Results folder to copy into.
     tasks : collection of str, optional
-        Names of tasks. Only cells of the folders on these tasks are joined; by default all are.
+        Names of tasks. Cells of the folders on other tasks are left out. By default, the cells on
+        all tasks are joined.
 
     Returns
     -------
@@ -60,18 +62,21 @@ def include_folders(
     Raises
     ------
     CoarticError
-        One of these is the case. Then nothing is copied:
+        Nothing is copied, because
 
         - a folder cannot be read, or is ``out``;
-        - runs of ``plan`` do not begin at 0;
-        - the folders cannot be joined;
-        - two of the folders and ``out`` have different results of a run.
+        - the numbers of the runs of ``plan`` do not begin at 0;
+        - the folders cannot be joined (:mod:`.include` lists what must be equal);
+        - two folders, one of which may be ``out``, have different results of the same run.
 
     Warns
     -----
     UserWarning
-        A folder lacks runs of its own plan, or has fewer runs of a cell than ``plan`` asks for of
-        its own cells.
+        One of these is the case:
+
+        - a folder lacks runs of its own plan;
+        - a folder has a stochastic cell that ``plan`` lacks, with fewer runs than the largest
+          number that ``plan`` asks for.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
@@ -106,11 +111,13 @@ def include_folders(
 def _join(
     plan: Sequence[Job], sources: Mapping[str, Store], tasks: Collection[str] | None
 ) -> list[Job]:
-    """Return the plan with the cells of the sources (stores by name), on ``tasks`` if there are
-    any.
+    """Return the plan joined with the plans of ``sources``, which are stores by name.
 
-    A cell has the runs that the plan asks for, and the runs that follow in the sources without a
-    gap. A cell without runs is left out. Raises CoarticError if the sources cannot be joined.
+    - Cells of the sources on tasks that are not in ``tasks`` are left out, unless it is None.
+    - A cell has the runs that the plan asks for, and the following runs that the sources have, up
+      to the first missing one. A cell without runs is left out.
+
+    Raises CoarticError if the sources cannot be joined.
     """
     all_jobs = {name: source.plan() for name, source in sources.items()}
     plans = {
@@ -150,11 +157,13 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of each source that lacks runs of its plan, or has few runs of a further cell.
+    """Warn of each source that lacks runs of its plan, or has few runs of an additional cell.
 
-    A stochastic cell that ``asked`` lacks has few runs if it has fewer than the largest number in
-    ``asked``. ``asked`` has numbers of runs by digest of the cell, ``plans`` has plans by name of
-    the source, and ``jobs`` is the joined plan by digest.
+    An additional cell is a stochastic cell that ``asked`` lacks. It has few runs if it has fewer
+    than the largest number in ``asked``.
+
+    ``asked`` has the number of runs by the digest of a cell. ``plans`` has the plan by the name of
+    a source. ``jobs`` is the joined plan by the digest of a cell.
     """
     most_runs = max(asked.values())
     for name, part in plans.items():
@@ -190,8 +199,8 @@ def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
     """Raise CoarticError if the parts of a plan contradict each other.
 
     ``parts`` has jobs by their origin, such as a folder. Suite, seed and trial budget of a part are
-    those of its first job, or of ``default`` if it has no jobs. Module :mod:`.include` has the list
-    of what must be equal.
+    those of its first job, or of ``default`` if the part has no jobs. The docstring of this module
+    lists what must be equal.
     """
     first_values: dict[str, tuple[str, object]] = {}
 
@@ -222,9 +231,10 @@ def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 
 def _check_same_results(stores: Mapping[str, Store]) -> None:
-    """Raise CoarticError if two stores, by name of the folder, have different results of a run.
+    """Raise CoarticError if two stores have different results of the same run.
 
-    Rewards that one of them did not store are not compared.
+    ``stores`` has stores by the name of their folder. Rewards of trials that are missing in one of
+    the two stores are not compared.
     """
     first_results = dict[str, tuple[str, str]]()
     for name, store in stores.items():

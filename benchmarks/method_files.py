@@ -45,8 +45,8 @@ _ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to impo
 def read_file(path: Path) -> list[MethodInfo]:
     """Return the declarations of the methods of a file.
 
-    A new process imports the file. Later it answers questions about the methods (:data:`READERS`).
-    Raises CoarticError for a file that cannot be used.
+    A new process imports the file. The same process later answers questions about the methods
+    (:data:`READERS`). Raises CoarticError for a file that cannot be used.
     """
     shown = plain(str(path), LONGEST_LINE)
     read_bytes(path)
@@ -59,9 +59,10 @@ def read_file(path: Path) -> list[MethodInfo]:
 
 
 def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
-    """Return the result of a function in the process that reads a file, ``shown`` in messages.
+    """Call a function in the process that reads a file, and return the result.
 
-    Raises CoarticError if the process gives no result.
+    ``shown`` is the name of the file in messages. Raises CoarticError if the process gives no
+    result.
     """
     try:
         return reader.schedule(function, args=arguments, timeout=_ANSWER_S).result()
@@ -110,10 +111,11 @@ def check_code(info: MethodInfo) -> None:
 
 
 def _declarations(path: Path, shown: str) -> list[MethodInfo]:
-    """Import a file, ``shown`` in messages, and return the declarations of its methods.
+    """Import a method file, and return the declarations of its methods.
 
-    They have the code of the methods, and the packages that the file imports. Raises CoarticError
-    if the file has no methods, or a declaration has a wrong form.
+    A declaration has the code of its method (:func:`_code_of`), and the packages that the file
+    imports. ``shown`` is the name of the file in messages. Raises CoarticError if the file has no
+    methods, or if an attribute of a method is wrong.
     """
     try:
         module, loaded = load_file(path)
@@ -152,14 +154,14 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
 
 
 def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
-    """Return a hash, 12 hex digits, of the code of a method from a file.
+    """Return a hash (12 hex digits) of the code of a method from a file.
 
     The hash covers
 
     - the versions of the model and the method;
-    - the file;
+    - the file at ``path``;
     - the data files that the method declares;
-    - the user's ``files`` that its import loads.
+    - ``files``, the user's files that are loaded when the file is imported.
 
     Raises CoarticError for a file that cannot be read.
     """
@@ -175,9 +177,10 @@ def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
 
 
 def _user_files(names: Iterable[str]) -> set[Path]:
-    """Return the user's files among the loaded modules of these names.
+    """Return the files of the loaded modules ``names``, if they are the user's.
 
-    They are files outside of this project, the standard library and installed packages.
+    A file is the user's if it does not belong to this project, the standard library or an
+    installed package.
     """
     folders = [sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")]
     folders += [*site.getsitepackages(), site.getusersitepackages()]

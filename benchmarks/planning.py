@@ -72,29 +72,30 @@ class Request(FileData):
 
     tasks: tuple[Annotated[Any, PlainValidator(_task_or_name)], ...] = ()
     """Names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, task files, and tasks
-    (Task); by default all tasks of the suite. Instances and tasks of your own that the suite does
-    not have are run with all methods that apply to them, of ``methods`` or else of the suite."""
+    (Task); by default all tasks of the suite. On an instance, or a task of your own, that the suite
+    lacks, all ``methods`` (by default those of the suite) are run that apply to it."""
     methods: tuple[str, ...] = ()
     """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite.
-    Methods that the suite does not have are run on all tasks of the suite that they apply to."""
+    Methods that the suite lacks are run on all tasks of the suite to which they apply."""
     method_files: tuple[Path, ...] = ()
     """Files with your own methods. If neither ``methods`` nor the suite names a method of a file,
-    all methods of the file run in addition to the other methods. A wildcard that matches a method
-    names it."""
+    all methods of the file run in addition to the other methods. A wildcard names all methods that
+    match it."""
     family_files: tuple[Path, ...] = ()
     """Files with your own families."""
     runs: Annotated[Any, PlainValidator(_runs_asked)] = None
     """Number of runs of each cell; by default the number of the suite. A range such as
-    ``range(50, 100)`` is a part of the runs, for a job of an array."""
+    ``range(50, 100)`` stands for the runs with these numbers, for one job of a cluster's array of
+    jobs."""
     trials: TrialCount | None = None
     """Trials of each run, for methods that have this parameter; by default the number of the
     suite, or else of the method."""
     seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)] = 0
     """Seed of the suite."""
     time_limit_s: Seconds | None = None
-    """Most CPU time of a job, s; by default the limit of the suite."""
+    """Limit of the CPU time of a job, in s; by default the limit of the suite."""
     trial_budget: TrialCount | None = None
-    """Most physical trials of a run, for all methods."""
+    """Largest number of physical trials of a run, for all methods; by default there is no limit."""
 
 
 def request_for(**options: Any) -> Request:
@@ -131,9 +132,9 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
         - a name is unknown, or belongs to something else already;
         - a number or a parameter is wrong;
         - ``trials``, ``runs`` (except 1) or a family file has no effect;
-        - a task or method that is named has no runs;
-        - a cell has two different numbers of runs;
-        - a method does not apply to a task of a block that names both without a wildcard.
+        - a named task or method has no runs;
+        - two blocks of the suite ask for different numbers of runs of the same cell;
+        - a block without wildcards names a method that does not apply to all of its tasks.
     """
     request = request_for(**options)
     if not isinstance(suite, Suite):
@@ -184,7 +185,10 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 
 
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
-    """Return the ids of the methods in the user's files of which no method is named."""
+    """Return the ids of the methods of each user's file of which no method is named.
+
+    Methods are named by the request (``methods``) or by the suite.
+    """
     files = {
         registered[method].where
         for names in (request.methods, *(block.methods for block in suite.blocks))
@@ -238,7 +242,7 @@ def _asked_tasks(
     Raises
     ------
     CoarticError
-        A task has the name of another task.
+        A file is wrong, a name is unknown, or a task has the name of another task.
     """
     for path in request.family_files:
         check_kind(str(path), "family")
@@ -292,7 +296,8 @@ def _suite_jobs(
     """
     for block in suite.blocks:
         ids = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
-        is_open = WILDCARD in "".join((*block.methods, *block.tasks))  # skip what does not apply
+        # In a block with a wildcard, methods are skipped on tasks to which they do not apply.
+        is_open = WILDCARD in "".join((*block.methods, *block.tasks))
         for task in tasks_of(suite, block, own, task_named):
             for method in map(registered.__getitem__, ids):
                 for values in itertools.product(*block.grid.values()):
@@ -317,10 +322,12 @@ def _job_of(
 ) -> Job:
     """Return the job of a method with parameters on a task.
 
-    The number of runs comes from the request, the block (``runs``) or the suite, whichever has it
-    first. The number of trials comes from the request, the block (``parameters``), the suite or the
-    method. A method that is not stochastic has only run 0, and no run if the runs of the request do
-    not begin at 0.
+    - The number of runs is that of the request, or else of the block (``runs``), or else of the
+      suite.
+    - The number of trials is that of the request, or else of the block (``parameters``), or else of
+      the suite, or else the default of the method.
+    - A method that is not stochastic has only run 0. It has no run if the runs of the request do
+      not begin at 0.
     """
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
@@ -337,9 +344,10 @@ def _job_of(
 def _why_nothing_runs(
     suite: Suite, idle: Sequence[Task], methods: Iterable[MethodInfo], jobs: Sequence[Job]
 ) -> str:
-    """Return a sentence on why methods have no runs on the first task of ``idle``, or on any task.
+    """Return a sentence on why methods have no runs.
 
-    ``idle`` has the tasks that a request names and for which the methods have no job.
+    ``idle`` has the tasks that a request names and for which the methods have no job. The sentence
+    is on the first of them. If there are none, it is on all tasks of ``jobs``.
     """
     tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
     reasons = dict.fromkeys(method.why_not(task) for task in tasks for method in methods)

@@ -1,7 +1,8 @@
 """Perform jobs in worker processes on this machine, with a limit of CPU time for each job.
 
 Built-in methods share processes. Each method of a file has processes of its own, so that it cannot
-break other methods. Package ``pebble`` starts and restarts processes, and ends jobs that are late.
+break other methods. Package ``pebble`` starts and restarts processes, and ends jobs that exceed
+their limit of wall time.
 The system counts the CPU time of all threads of a process, and ends the process when a job has used
 up its limit. When a worker ends, the processes that it has started end, too, unless they have left
 its process group.
@@ -52,11 +53,10 @@ _REPEATED = (-signal.SIGKILL, 255)  # exit codes of a process that was killed or
 
 @contextlib.contextmanager
 def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes that round alike, for programs that run methods or proofs
-    themselves.
+    """Open a pool of processes that round as the workers of suites do.
 
-    The processes have the environment variables of workers, with which x86-64 processors with AVX2
-    round alike.
+    It is for programs that run methods or proofs themselves. The processes have the environment
+    variables of workers. With these variables, all x86-64 processors with AVX2 round alike.
 
     Parameters
     ----------
@@ -79,15 +79,16 @@ def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
 class Local:
     """Executor that performs jobs in processes on this machine.
 
-    A job ends when it has used its limit of CPU time, or a day of CPU time if it has no limit. It
-    also ends after ``timeout_s`` plus three times this limit in wall time.
+    A job has a limit of CPU time, which is a day if the job does not set it. The limit of its wall
+    time is three times the limit of CPU time plus ``timeout_s``. A job that reaches one of the
+    limits is ended.
 
     Parameters
     ----------
     jobs : int
-        Most jobs at once; -1 for one on each core.
+        Largest number of jobs at once; -1 for the number of cores.
     timeout_s : float
-        Additional wall time of a job, s.
+        Additional wall time of a job, in s.
     verbose : bool
         True to show what methods print, their log messages from level INFO, and the tracebacks of
         their errors.
@@ -110,9 +111,9 @@ class Local:
     ) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with the outcomes of its runs, as jobs finish.
 
-        A job whose process was killed, or that exceeded its wall time, is repeated once. If it
-        fails in the same way again, or ends its process in another way, its outcomes are
-        ``crashed`` or ``timeout``.
+        A job whose process is killed, or that exceeds its limit of wall time, is performed once
+        more. If this happens again, or if the process of a job ends for another reason, such as its
+        limit of CPU time, the outcomes of the job have status ``crashed`` or ``timeout``.
 
         Parameters
         ----------
@@ -193,7 +194,7 @@ class Local:
                     group.close()
 
     def wall_limit_s(self, job: Job) -> float:
-        """Return the limit of wall time for a job, s."""
+        """Return the limit of wall time for a job, in s."""
         return 3 * (job.time_limit_s or _LONGEST_S) + self.timeout_s
 
     def _failure(self, job: Job, error: BaseException, printed: str) -> list[Outcome]:
@@ -224,7 +225,7 @@ class _Group:
     waiting: deque[tuple[int, Job]] = field(default_factory=deque)
     """Numbers and jobs that were not yet given to a process."""
     processes: int = 1
-    """Most processes of the group."""
+    """Largest number of processes of the group."""
     running: int = 0
     """Number of jobs that were given to processes and have no answer yet."""
     folder: Path = Path()
@@ -300,8 +301,8 @@ def _begin_plainly() -> None:
 def _begin(folder: Path, workers: int, verbose: bool) -> None:
     """Set up a process that performs jobs.
 
-    It works in a new folder in ``folder``, and prints only if ``verbose``. Each of the ``workers``
-    may use an equal share of 80 % of the machine's memory, but at least 1 GiB.
+    The process works in a new folder in ``folder``, and prints only if ``verbose``. Its limit of
+    memory is 80 % of the machine's memory divided by the number of ``workers``, but at least 1 GiB.
     """
     os.environ.pop("PYTHONSAFEPATH", None)  # see WorkerProcess
     begin_worker(folder, streams=1 if verbose else 3)

@@ -1,4 +1,4 @@
-"""Processes for methods, which round alike on all processors and import only installed code."""
+"""Start worker processes, which round alike and import nothing from the working folder."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from typing import Any
 from coartic.internal.interruption import blocked_signals
 from coartic.internal.threads import environment, worker_variables
 
-# Processes are forked from a server that has imported their modules. The path of its socket must be
-# short: the system allows 103 characters, and Python adds some to the folder. Otherwise processes
-# are started anew.
+# Processes are forked from a server that has imported their modules. The path of the server's
+# socket must be short: the system allows 103 characters, and Python adds some to the temporary
+# folder. If that folder's path is too long, each process imports its modules itself (spawn).
 _BASE: Any = multiprocessing.get_context(
     "forkserver" if len(tempfile.gettempdir()) <= 70 else "spawn"
 )

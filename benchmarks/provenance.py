@@ -32,7 +32,7 @@ _LIBRARIES = ("casadi", "daqp", "llvmlite", "numba", "numpy", "pandas", "pydanti
 def current_environment() -> dict[str, Any]:
     """Return the environment on which results of this process can depend.
 
-    It is the same dictionary in each call: do not change it.
+    Each call returns the same dictionary: do not change it.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def current_environment() -> dict[str, Any]:
 
 
 def now() -> str:
-    """Return date and time, UTC, to the second, in ISO 8601 format."""
+    """Return the date and time in UTC, to the second, in ISO 8601 format."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
@@ -88,8 +88,8 @@ def _commit_of_checkout() -> dict[str, Any] | None:
     Returns
     -------
     dict or None
-        ``id`` of the commit, and ``dirty``, True if tracked files have changed since. None for an
-        installed package, or if Git fails.
+        ``id`` is that of the commit; ``dirty`` is True if tracked files have changed since. None is
+        returned for an installed package, or if Git fails.
     """
     # A GIT_DIR of the caller, such as a hook, must not replace this checkout.
     clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}

@@ -50,7 +50,7 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
 def built_in() -> Mapping[str, MethodInfo]:
     """Return the declarations of the built-in methods by id.
 
-    It is the same mapping in each call: do not change it.
+    Each call returns the same mapping: do not change it.
     """
     return {
         method.name: method_info(method, BUILT_IN, name, f"{MODEL_VERSION}.{method.version}")

@@ -72,7 +72,7 @@ def perform_in_order(
     ----------
     jobs : sequence of Job
     workers : int
-        Most processes at once; -1 for one on each core.
+        Largest number of processes at once; -1 for the number of cores.
     verbose : bool
         True to show what methods print and log.
 
@@ -127,7 +127,7 @@ def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tu
 
 
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
-    """Select runs of a folder that can be performed here, evenly over its plan.
+    """Select runs of a folder that can be performed here, evenly spaced over its plan.
 
     A run can be performed if its method has the same version or code in ``registered``.
 
@@ -136,7 +136,7 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
     folder : Path
         Results folder.
     count : int
-        Most runs, at least 1.
+        Largest number of runs to select, at least 1.
     registered : mapping
         Known methods by id.
 
@@ -169,14 +169,14 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
 def compare_runs(a: Run, b: Run) -> list[str]:
     """Compare the results of two runs.
 
-    Compared are status, reason, details, counts, movements and rewards, and for two runs with one
-    id the ticks with motor noise. If one of the runs did not store all of its rewards, only the
-    stored ones are compared.
+    The function compares status, reason, details, counts, movements and rewards. If both runs have
+    the same id, it also compares the ticks with motor noise. If one of the runs did not store all
+    of its rewards, only the stored ones are compared.
 
     Returns
     -------
     list of str
-        A phrase for each difference; empty for equal results.
+        A phrase for each difference. The list is empty if the results are equal.
     """
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
@@ -186,7 +186,7 @@ def compare_runs(a: Run, b: Run) -> list[str]:
         for run in (a, b)
     )
     names = ["status", "reason", "details", *Meter.COUNTS]
-    if a.id == b.id:  # from which the motor noise is drawn
+    if a.id == b.id:  # the id is the seed of the motor noise
         names.append("noisy_ticks")
     changes = [
         f"{name}: {brief_value(row_a[name])} against {brief_value(row_b[name])}"

@@ -35,17 +35,17 @@ from coartic.runs.record import UNREPEATED, Run
 from coartic.runs.store import Store, writing
 
 _LEAST_BATCH = 8
-"""Least number of runs of a job, if its cell has so many and its method performs them side by
-side."""
+"""Smallest number of runs of a job whose method performs runs side by side, if its cell has as
+many."""
 _MOST_TRIALS = 400_000
-"""Most trials of a job with more than :data:`_LEAST_BATCH` runs. They take some seconds, which are
-lost in an interruption."""
+"""Largest number of trials of a job with more than :data:`_LEAST_BATCH` runs. They take some
+seconds, which is what an interruption can lose."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
 
 @dataclass
 class Progress:
-    """Progress of a plan in a results folder, as numbers of runs."""
+    """How far a plan is performed in a results folder: numbers of runs, warnings and times."""
 
     folder: Path
     total: int
@@ -53,8 +53,9 @@ class Progress:
     present: int = 0
     """Runs of the plan that the folder had before, without those that are performed again."""
     stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    """Runs in the folder by another version or code of their method. The keys are method, that
-    version and the present version. These runs stay in the folder, and reports do not show them."""
+    """Numbers of runs in the folder that another version or code of their method made. A key has
+    the method, the version that made the runs, and the present version. These runs stay in the
+    folder, but reports do not show them."""
     done: int = 0
     """Runs performed by this call."""
     failed: int = 0
@@ -66,12 +67,12 @@ class Progress:
     others: int = 0
     """Runs in the folder that the plan does not ask for, without :attr:`stale` runs."""
     wall_s: float = 0.0
-    """Wall time of the call, s; 0 until it ends."""
+    """Wall time of the call, in s; 0 until the call ends."""
     time_left: TimeLeft = field(default_factory=TimeLeft)
     """Estimate of the time until all runs are performed."""
     repeats: int = 0
-    """Repeated runs that are still to be performed. They check whether results of methods from
-    files repeat."""
+    """Number of repeats that are still to be performed. A repeat checks whether a run of a method
+    from a file gives the same result again."""
 
     def count(self, status: str) -> None:
         """Count a run of the plan in :attr:`failed` and :attr:`crashed` by its status."""
@@ -122,7 +123,7 @@ Watcher = Callable[[Progress, Cell | None], None]
 - after each run and each repeated run, with the cell of the run;
 - before the first repeated run, with its cell.
 
-After an exception in it, a warning is given, and it is not called again."""
+If the function raises an exception, :func:`perform` warns, and does not call it again."""
 
 
 def run_suite(
@@ -133,8 +134,9 @@ def run_suite(
     watch: Watcher | None = None,
     **options: Any,
 ) -> Progress:
-    """Plan a suite (:func:`plan_suite`), and perform the runs that a folder lacks
-    (:func:`perform`).
+    """Plan a suite, and perform the runs that a folder lacks.
+
+    This function calls :func:`plan_suite` and :func:`perform`.
 
     Parameters
     ----------
@@ -153,7 +155,7 @@ def run_suite(
     Returns
     -------
     Progress
-        Numbers of runs. ``str`` of it is a sentence.
+        Numbers of runs. ``str(progress)`` is a sentence about them.
 
     Raises
     ------
@@ -177,12 +179,13 @@ def perform(
 ) -> Progress:
     """Perform the runs of a plan that a results folder lacks.
 
-    - The plan replaces the plan of the folder. Other runs stay there, and reports do not show them.
+    - The plan replaces the plan of the folder. Runs that the new plan does not ask for stay in the
+      folder, but reports do not show them.
     - Runs that fail are stored and counted. They do not raise an error. The next call performs
       crashed runs again, and runs that timed out under a lower limit.
     - Finished runs are stored even if the call is interrupted.
-    - The quickest ok run of each method from a file is made again in another process. If the result
-      differs, this call warns, and reports mark the method.
+    - The quickest ok run that this call makes with each method from a file is made again in another
+      process. If the result differs, this call warns, and reports mark the method.
 
     Parameters
     ----------
@@ -200,17 +203,17 @@ def perform(
     Returns
     -------
     Progress
-        Numbers of runs. ``str`` of it is a sentence.
+        Numbers of runs. ``str(progress)`` is a sentence about them.
 
     Raises
     ------
     CoarticError
         One of these is the case:
 
-        - the plan has no jobs;
+        - the plan has no jobs, or ``executor`` is neither a Local nor a Dask;
         - the folder contains something else, or cannot be written;
         - another process writes into the folder;
-        - a method with missing runs has no code here.
+        - the code of a method with missing runs is not available here.
     """
     folder, started = folder_named(folder), time.perf_counter()
     watchers = [watch] if watch else []
@@ -242,7 +245,7 @@ def perform(
         jobs, quickest = _divided(missing, executor.workers), dict[str, Run]()
         while jobs:
             retried: list[Job] = []
-            with closing(executor.perform(jobs)) as answers:  # ends workers after an error here
+            with closing(executor.perform(jobs)) as answers:  # an error below ends the workers
                 for job, outcomes in answers:
                     runs = score(job, outcomes)
                     if len(runs) > 1:  # other runs of the job may have caused a failure
@@ -264,7 +267,10 @@ def perform(
 
 
 def _note_quickest(run: Run, quickest: dict[str, Run]) -> None:
-    """Enter an ok run of a method from a file if it is the method's quickest run so far."""
+    """Set ``quickest[method]`` to ``run`` if the run is quicker than the one stored there.
+
+    Runs that are not ok, and runs of built-in methods, are ignored.
+    """
 
     def seconds(run: Run) -> float:
         return run.outcome.times.wall_s or math.inf
@@ -281,7 +287,11 @@ def _repeat_runs(
     workers: int,
     tell: Callable[[Cell | None], None],
 ) -> None:
-    """Repeat a run of each method in another process; mark in the store the runs that differ."""
+    """Perform each run in ``quickest`` again in another process, and mark runs that differ.
+
+    If the result differs, the stored run is marked. ``quickest`` has a run of each method from a
+    file, by the id of the method.
+    """
     progress.time_left.expect([run.job for run in quickest.values()])
     progress.repeats = len(quickest)
     for run in list(quickest.values())[:1]:
@@ -299,9 +309,9 @@ def _repeat_runs(
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
     """Return the runs of a plan that are to be performed, as a job for each cell.
 
-    These are the runs that the store lacks. Runs that crashed, or timed out under a lower limit,
-    are performed again if the code of their method is here. All other runs are counted in
-    ``progress``. Raises CoarticError if the method of a missing run has no code here.
+    They are the runs that the store lacks, and, if the code of their method is available here, the
+    runs that crashed or timed out under a lower limit. All other runs are counted in ``progress``.
+    Raises CoarticError if the code of a method with missing runs is not available here.
     """
     present: set[tuple[int, int]] = set()
     for position, number, status, old_limit_s in store.present():

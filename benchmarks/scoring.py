@@ -63,10 +63,11 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
 
 
 def with_noise(runs: Sequence[Run]) -> list[Run]:
-    """Return runs of one task whose solutions have ``noisy_ticks``.
+    """Set ``noisy_ticks`` in the scores of solutions, and return the runs.
 
-    Each solution is executed with motor noise from a seed that is made from the id of its run, so
-    the number does not depend on the other runs.
+    ``noisy_ticks`` is the mean number of ticks over executions with motor noise, or None if an
+    execution fails. The seed of the noise is made from the id of the run, so the number does not
+    depend on the other runs. All runs must be on one task.
     """
     solved = {run.id: run for run in runs if "solution" in run.scores}
     seeds = [int(run_id.partition("-")[0], 16) for run_id in solved]

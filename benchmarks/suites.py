@@ -57,7 +57,7 @@ class Move(FileData):
     goal: _Number
     """Number of the goal, from 1."""
     by: Annotated[tuple[tuple[Finite, Finite], ...], _SOME]
-    """Displacements of the goal in x and y, length unit; each makes a task."""
+    """Displacements (x, y) of the goal, in length units. Each of them makes a new task."""
 
 
 class _Block(FileData):
@@ -80,8 +80,8 @@ class _Block(FileData):
     parameters: dict[str, _Value] = Field(default_factory=dict)
     """Parameters of the methods, by name."""
     grid: dict[str, Annotated[tuple[_Value, ...], _SOME]] = Field(default_factory=dict)
-    """Lists of values by name of a parameter. All combinations are run. They replace values of
-    ``parameters``."""
+    """Lists of values, by name of the parameter. All combinations of values are run. A value in
+    ``grid`` replaces that in ``parameters``."""
 
 
 class Suite(FileData):
@@ -98,7 +98,8 @@ class Suite(FileData):
     trials: TrialCount | None = None
     """Trials of a run, for methods that have this parameter."""
     time_limit_s: Seconds | None = 600.0
-    """Most CPU time of a job, s. A job is one run, or runs that are performed side by side."""
+    """Limit of the CPU time of a job, in s. A job is one run, or several runs that are performed
+    side by side."""
     blocks: Annotated[tuple[_Block, ...], _SOME]
     """Tables ``[[blocks]]``: tasks and methods."""
 
@@ -193,7 +194,9 @@ def _read_suite(path: Path) -> Suite:
 def tasks_of(
     suite: Suite, block: _Block, own: Collection[str], task_named: TaskNamed
 ) -> Iterator[Task]:
-    """Yield the tasks of a block, in order, with a freed base or a moved goal if it asks for them.
+    """Yield the tasks of a block in order, with the changes that the block asks for.
+
+    A block can ask for a free base, or for tasks with a moved goal.
 
     Parameters
     ----------
@@ -254,7 +257,7 @@ def _changed_tasks(task: Task, suite: Suite, block: _Block) -> list[Task]:
         )
     moved = []
     for x, y in block.move.by:
-        # Six digits are enough for the name, unless they are those of another number.
+        # Names have six digits of a number if these are exact, and otherwise all digits.
         dx, dy = (f"{d:g}" if float(f"{d:g}") == d else repr(d) for d in (x, y))
         goals = [list(goal) for goal in task.goals]
         goals[number - 1] = [goals[number - 1][0] + x, goals[number - 1][1] + y]

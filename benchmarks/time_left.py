@@ -24,7 +24,9 @@ changes."""
 
 
 class TimeLeft:
-    """Estimate of the time until all expected runs are made. It can be used in threads.
+    """Estimate of the time until all expected runs are made.
+
+    Several threads can use the same object.
 
     The estimate assumes that
 
@@ -66,10 +68,10 @@ class TimeLeft:
 
     @property
     def seconds(self) -> float:
-        """Time left, s.
+        """Time left, in s.
 
-        It is NaN until a tenth of the work is done, and while there are runs of a method whose time
-        is unknown. If no run finishes for a long time, it grows again.
+        The estimate is NaN until a tenth of the work is done, and while runs of a method are
+        missing whose time is unknown. If no run finishes for a long time, the estimate grows again.
         """
         with self._lock:
             left_s = sum(
@@ -103,9 +105,9 @@ def _kind_of(cell: Cell) -> _Kind:
 
 
 def _shipped_s(kind: _Kind) -> float:
-    """Return the mean time of a shipped run of this kind, s, for its number of trials.
+    """Return the mean time (in s) of a shipped run of this kind, scaled to its number of trials.
 
-    If the method is not shipped, the time of a run with the default number of trials counts as 1 s.
+    If no runs of the method are shipped, 1 s stands for a run with the default number of trials.
     """
     method, task, trials = kind
     by_task = _shipped_means().get(method, {})
@@ -115,7 +117,7 @@ def _shipped_s(kind: _Kind) -> float:
 
 @cache
 def _shipped_means() -> Mapping[str, Mapping[str, float]]:
-    """Return the mean time of the shipped runs, s, by method and task."""
+    """Return the mean time (in s) of the shipped runs by method and task."""
     with open_shipped("comparison") as store:
         means = store.runs().groupby(["method", "task"]).wall_s.mean()
     return {str(method): dict(of[method]) for method, of in means.groupby("method")}

@@ -43,7 +43,7 @@ _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError
 
 
 def process_peak_mb() -> float:
-    """Return the largest resident memory of this process so far, MiB."""
+    """Return the largest resident memory of this process so far, in MiB."""
     unit = 2**20 if sys.platform == "darwin" else 2**10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
@@ -57,7 +57,7 @@ def fail(
 ) -> list[Outcome]:
     """Return an outcome for each run of a job whose worker did not give a usable answer.
 
-    The runs share the times of the job, ``wall_s`` and ``cpu_s``, equally.
+    ``wall_s`` and ``cpu_s`` are the times of the job, in s. Each run gets an equal share of them.
     """
     runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
@@ -181,7 +181,7 @@ def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times)
 def _place_of(error: BaseException, method: MethodInfo) -> str:
     """Return the last line of the method file in a traceback, as ``mine.py, line 12: ``.
 
-    It is empty if the traceback has no line of the file, and for built-in methods.
+    The result is empty if the traceback has no line of the file, and for built-in methods.
     """
     if method.is_ours:
         return ""

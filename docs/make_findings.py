@@ -1,9 +1,9 @@
-"""Writes the pages whose numbers come from stored results: ``python docs/make_findings.py``.
+"""Write the pages whose numbers come from stored results: ``python docs/make_findings.py``.
 
-``docs/stored`` keeps tables and figures of reports, a folder for each suite; ``studies`` has those
-of studies. ``*.md.jinja`` in this folder are filled in from them.
-``make findings`` runs the suites and their reports, copies the tables with ``--from results``, and
-fills in the pages.
+``docs/stored`` has tables and figures of reports, with a folder for each suite. ``studies`` has
+those of studies. The templates ``*.md.jinja`` in this folder are filled in from them. ``make
+findings`` runs the suites and their reports, copies the tables with ``--from results``, and fills
+in the pages.
 """
 
 from __future__ import annotations
@@ -35,34 +35,37 @@ KEPT = {
     ),
     "families": ("family-gaps", ""),
 }
-"""Tables and figures that are kept of each suite's report."""
+"""Tables and figures of each suite's report that are stored."""
 
 
 def table(suite: str, name: str) -> pd.DataFrame:
-    """A stored table of a suite or a study, with its rows by name."""
+    """Return a stored table of a suite or a study, with its rows by name."""
     folder = STUDIES / suite if (STUDIES / suite).is_dir() else STORED / suite
     return pd.read_csv(folder / f"{name}.csv", index_col=0)
 
 
 def row(suite: str, name: str, which: str) -> dict[Any, Any]:
-    """A row of a stored table. Raises KeyError for one that is not there."""
+    """Return a row of a stored table. Raises KeyError if the table has no such row."""
     return table(suite, name).loc[which].to_dict()
 
 
 def claim(name: str, study: str = "replication") -> dict[Any, Any]:
-    """A judged claim of a study by its id."""
+    """Return a judged claim of a study by its id."""
     return row(study, "claims", name)
 
 
 def cells_of_the_paper() -> pd.DataFrame:
-    """Rewards of the paper's cells, without the rows of single hand sequences."""
+    """Return the rewards of the paper's cells, without the rows of single hand sequences."""
     rewards = table("replication", "rewards")
     return rewards[rewards.hands.isna()]
 
 
 def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]:
-    """How many claims on the paper's tasks replicate, by verdict; ``others``: without the three
-    that carry the paper's point; ``published``: that rest on published goals alone."""
+    """Return the numbers of claims on the paper's tasks, by verdict.
+
+    With ``others``, the three claims that carry the paper's point are left out. With ``published``,
+    claims that use reconstructed goals are left out.
+    """
     judged = table("replication", "claims")
     judged = judged[judged.suite != "families"]
     if published:
@@ -75,9 +78,9 @@ def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]
 
 
 def seen(evidence: str, words: str, which: int = 0) -> str:
-    """A number, with its interval if there is one, that stands behind some words of evidence.
+    """Return the number that follows some words in the evidence, with its interval if it has one.
 
-    Raises IndexError if there is none.
+    Raises IndexError if there is no such number.
     """
     estimate = r":?\s*(−?\d+(?:\.\d+)?(?: \[[^]]*\])?)"
     number_behind = re.escape(words) + estimate
@@ -85,31 +88,38 @@ def seen(evidence: str, words: str, which: int = 0) -> str:
 
 
 def p_of_shares(values: dict[Any, Any], published_runs: int) -> float:
-    """p of Fisher's exact test that runs learn a hand sequence as often as published ones."""
+    """Return p of Fisher's exact test that ours and published runs learn a sequence as often."""
     counts = (values["published_runs"], published_runs), (values["runs"], values["of_runs"])
     return float(stats.fisher_exact([[n, of - n] for n, of in counts]).pvalue)
 
 
 def published_spreads() -> pd.DataFrame:
-    """Return the published spreads (±) with the tests of both readings; a spread that is published
-    of a hand sequence is compared with runs that have it."""
+    """Return the published spreads (±) with the tests of both readings.
+
+    The published spread of a hand sequence is compared with the runs that have this sequence.
+    """
     spreads = table("replication", "rewards").sort_values("hands", kind="stable")
     spreads = spreads.drop_duplicates(["task", "condition", "published_sd"]).dropna(subset="p_sd")
     return spreads.sort_index()
 
 
 def gain_of_best_hands() -> float:
-    """Return the gain of the corrective process alone with its best hands from the initial
-    solution, in per cent of the way to the best known reward: a mean over the random tasks of
-    families of up to eight goals."""
+    """Return the gain of the best hands of the corrective process over the initial hands.
+
+    The gain is in per cent of the distance from the initial solution to the best known reward. It
+    is a mean over the random tasks of families with up to eight goals.
+    """
     tasks = table("families", "by-task").query("method == 'corrective-alone/given'")
-    share = tasks.share[~tasks.index.str.startswith("many-goals")]  # from best hands, so below 0
+    share = tasks.share[~tasks.index.str.startswith("many-goals")]  # 0 is the best hands: negative
     return float((-100 * share / (1 - share)).mean())
 
 
 def early_less_late(family: str) -> dict[str, float]:
-    """Return by how much a hundred trials with drift gain more than ten thousand of the paper's
-    learner (``more``, points of the way to the best known reward), a mean over a family's tasks."""
+    """Return how much more 100 trials with drift gain than 10,000 trials of the paper's learner.
+
+    ``more`` is a mean over the tasks of a family, in percentage points of the distance to the best
+    known reward, with its interval.
+    """
     runs = pd.read_csv(STUDIES / "dial" / "runs.csv.xz").query(f"family == '{family}'")
     way = runs.best_known - runs.corrective_best
     gains = {n: 100 * (runs[f"reward_{n}"] - runs.corrective_best) / way for n in (100, 10_000)}
@@ -172,7 +182,7 @@ def shipped_gaps(method: str) -> dict[str, float]:
 
 
 def filled_pages() -> dict[str, str]:
-    """Every page that is made from a template, by its path below ``docs``."""
+    """Return every page that is made from a template, by its path below ``docs``."""
     replication = STUDIES / "replication"
     published = tomllib.loads((replication / "published.toml").read_text("utf-8"))
     values = {
@@ -208,9 +218,9 @@ def figures() -> dict[str, bytes]:
 
 
 def store(results: Path) -> None:
-    """Copy tables and figures from the reports below ``results``; lists of run ids stay there.
+    """Copy tables (without run ids) and figures from the reports below ``results``.
 
-    What is stored of a suite without a report there stays as it is.
+    Stored tables and figures of a suite without a report below ``results`` are not changed.
     """
     for suite, name in (("foreign", "runs"), ("tuning", "tuning")):
         if (results / suite).is_dir():
@@ -229,7 +239,7 @@ def store(results: Path) -> None:
         }
         for name in figures.split():
             shutil.copy(report / "figures" / f"{name}.svg", kept)
-        if suite == "families":  # what means over tasks are computed from
+        if suite == "families":  # pages compute means over tasks from this table
             frames["by-task"] = by_task(load(results / suite).runs).set_index("task")
         for name, frame in frames.items():
             frame = frame.drop(columns="run_ids", errors="ignore")
@@ -237,7 +247,7 @@ def store(results: Path) -> None:
 
 
 def main() -> None:
-    """Store what is new, then write the pages."""
+    """Store new results if the command line names them, then write the pages."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--from", dest="results", type=Path, help="Folder of the suites' results.")
     results = parser.parse_args().results

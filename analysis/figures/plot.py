@@ -66,8 +66,8 @@ class Plot:
 
 
 Parts = tuple[Figure, pd.DataFrame, str, str]
-"""Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and further sentences of
-the caption, about what this figure shows but others of its kind need not."""
+"""Parts of a :class:`Plot`: the figure, its numbers, its alternative text, and sentences for the
+end of the caption that depend on the study."""
 DrawsFigure = Callable[..., Plot | None]
 """Function of a study that draws a figure of the report, or returns None if the folder has no runs
 for it.
@@ -116,8 +116,8 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     """Return the looks of the lines and markers of methods, by label.
 
-    They are the same in all figures of a study. Methods from files have wider lines and larger
-    markers.
+    They are the same in all figures of a study. Methods from a user's method file have wider lines
+    and larger markers.
     """
     looks: dict[str, style.Look] = {}
     for label, row in study.methods.loc[[*labels]].iterrows():
@@ -155,9 +155,9 @@ def spoken(study: Study, rows: pd.DataFrame, template: str) -> str:
 def picture(drawing: Figure, ending: str) -> bytes:
     """Return a figure as the bytes of a file with this suffix, one of :data:`FORMATS`.
 
-    The same figure gives the same bytes, if the fonts and the version of Matplotlib, which SVG and
-    PDF name, are the same: ids in SVG are not random, and no date is written. Raises CoarticError
-    for another suffix.
+    With the same fonts and the same version of Matplotlib, the same figure gives the same bytes:
+    ids in SVG are not random, and no date is written. SVG and PDF files name the version. Raises
+    CoarticError for another suffix.
     """
     if ending not in FORMATS:
         raise CoarticError(

@@ -30,17 +30,17 @@ from coartic.analysis.methods import COLORS
 
 INCH = 25.4  # mm
 ONE = 89 / INCH
-"""Width of one journal column, inches."""
+"""Width of one journal column, in inches."""
 TWO = 183 / INCH
-"""Width of two journal columns, inches."""
+"""Width of two journal columns, in inches."""
 TALLEST = 225 / INCH
-"""Largest height of a figure that leaves room for a caption on the page, inches."""
+"""Largest height (in inches) of a figure that leaves room for a caption on the page."""
 _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Settings of Matplotlib for all figures."""
 LEAST_PANEL, LEAST_SMALL_PANEL = 2.2, 1.6
-"""Smallest widths of panels side by side in a figure of chosen width, inches: of a panel with names
-next to it, and of one without."""
+"""Smallest widths (in inches) of panels side by side, if the width of a figure is set: of panels
+with names next to them, and of panels without names."""
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
@@ -72,9 +72,9 @@ def grid(panels: int) -> tuple[int, int]:
 
 @contextmanager
 def drawn_at(width: float | None) -> Iterator[None]:
-    """Set the width of the figures that :func:`panels` makes in a ``with`` block, inches.
+    """Set the width (in inches) of the figures that :func:`panels` makes in a ``with`` block.
 
-    None stands for the width in argument ``size`` of :func:`panels`.
+    With None, figures have the width in argument ``size`` of :func:`panels`.
     """
     before = _width.set(width)
     try:
@@ -97,21 +97,21 @@ def panels(
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with panels.
 
-    If :func:`drawn_at` has set a width, the figure has this width. If its panels would be too
-    narrow, there are fewer side by side, and the height changes with the number of rows.
+    If :func:`drawn_at` has set a width, the figure has this width. If panels would then be narrower
+    than ``least``, there are fewer side by side, and the height grows with the number of rows.
 
     Parameters
     ----------
     shape : (int, int)
         Rows and columns of panels.
     size : (float, float)
-        Width and height, inches: ``ONE`` and ``TWO`` are the widths of one and two columns of a
+        Width and height, in inches. ``ONE`` and ``TWO`` are the widths of one and two columns of a
         journal.
     used : int, optional
         Number of panels that are used, by default all. The other panels stay empty. If a width is
         set, only the last row has empty panels.
     least : float
-        Smallest width of panels side by side if a width is set, inches.
+        Smallest width (in inches) of panels side by side, if a width is set.
     **subplots
         Arguments of Matplotlib's ``Figure.subplots``, such as ``sharey=True``.
 
@@ -142,8 +142,8 @@ def name_rows(axes: Axes, names: Sequence[str]) -> None:
 def legend(figure: Figure, handles: Sequence[Artist], columns: int, **more: Any) -> None:
     """Draw a legend below all panels.
 
-    It has ``columns`` columns, or fewer if the figure is too narrow for the entries. If it has more
-    than two lines, the figure becomes taller.
+    The legend has ``columns`` columns, or fewer if the figure is too narrow for the entries. If the
+    legend has more than two lines, the figure becomes taller.
     """
     widths = [0.45 + 0.06 * len(str(handle.get_label())) for handle in handles]  # inches
     while columns > 1:
@@ -170,7 +170,9 @@ def means(
     bars: float | None = 0.8,
     **line: Any,
 ) -> None:
-    """Draw means as points with their intervals, a line for each group, without a legend.
+    """Draw means as points with intervals, and a line for each group.
+
+    No legend is drawn (:func:`legend`).
 
     Parameters
     ----------
@@ -189,7 +191,7 @@ def means(
     shift : float
         Distance of each line to the right of the previous line, in units of ``x``.
     bars : float, optional
-        Line width of the intervals, points; None for Matplotlib's line width.
+        Line width of the intervals, in points; None for Matplotlib's line width.
     **line
         Look of the line and its markers: arguments of Matplotlib's ``plot``.
 
@@ -230,8 +232,8 @@ def dots(
     quantities : dict
         For each panel, the column of the quantity and the label of its axis.
     lines : dict
-        Values at which panels have dashed lines, by column: one or several. NaN and other names are
-        ignored.
+        Values at which a panel has dashed lines, by the column of the panel: one value, or several.
+        NaN, and names that are not columns of ``quantities``, are ignored.
     """
     height = 0.55 + (0.135 if is_narrow() else 0.165) * len(rows)
     size = TWO, height + 0.1 * sum(name.count("\n") for name in rows.name)

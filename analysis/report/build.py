@@ -50,7 +50,9 @@ def write_report(
     width: float | None = None,
     watch: Callable[[str], object] = str,
 ) -> tuple[list[str], dict[str, str]]:
-    """Write a report into a folder; it replaces an earlier report there.
+    """Write a report into a folder, and replace an earlier report of the same results.
+
+    The page ``report.html`` and tables as CSV are always written.
 
     Parameters
     ----------
@@ -59,7 +61,8 @@ def write_report(
     for_paper : bool
         True to also write tables as LaTeX, and figures as SVG and PDF.
     width : float, optional
-        Width of these figures, inches; by default as on the page.
+        Width of the SVG and PDF figures, in inches. By default each figure has the width that it
+        has in ``report.html``.
     watch : callable
         Function that is called with the title of each section before it is made, and with ``TITLE,
         for print`` before its figures are written to files.
@@ -73,10 +76,10 @@ def write_report(
     Raises
     ------
     CoarticError
-        - The folder contains the results themselves.
-        - It contains the report of other results. This is not checked for a folder below the
-          results.
-        - It contains something else at the path of a file of the report.
+        - ``folder`` contains the results themselves.
+        - ``folder`` already has a report of other results. (If ``folder`` is inside the results
+          folder, this is not checked.)
+        - ``folder`` has a file that coartic did not write, under the name of a file of the report.
     """
     if Path(os.path.realpath(study.folder)).is_relative_to(os.path.realpath(folder)):
         raise CoarticError(

@@ -10,14 +10,15 @@ with the fewest such cells. At a tie it uses the simpler candidate, which is the
 All candidates are two-sided and studentised, with a variance for each sample. If no sample varies,
 t is infinite or 0. The candidates are
 
-- ``exchange``: labels of the values are exchanged, in all ways if there are no more than resamples;
-- ``bootstrap``: each sample is shifted to mean 0 and resampled. If no sample varies, p is the least
-  p of an exchange of as many values;
+- ``exchange``: labels of the values are exchanged, in all ways if there are at most as many ways as
+  resamples;
+- ``bootstrap``: each sample is shifted to mean 0 and resampled. If no sample varies and the means
+  differ, p is the smallest p of an exchange of as many values;
 - ``exchange below N``: exchange if the smaller sample has fewer than N values, otherwise bootstrap.
 
-Columns that begin with ``greater`` and ``less`` have the exchange one-tailed, that the mean of the
-first sample is the higher or the lower one, for populations with skew and unequal spread; they
-describe, and do not count.
+Columns that begin with ``greater`` or ``less`` have the one-tailed exchange (the mean of the first
+sample is higher, or lower) for populations with skew and unequal spread. They describe the test,
+and do not count in the choice.
 
 Grid, seeds and numbers were committed before the first result. The populations that have both skew
 and unequal spread were added later, again before their results, and the rule is the same. As in
@@ -43,7 +44,8 @@ LIMITS = {
     "exchange": math.inf, "bootstrap": 0,
     **{f"exchange below {n}": n for n in (10, 20, 50)},
 }  # fmt: skip
-"""Candidates, the simpler first, with the size of the smaller sample below which they exchange."""
+"""Candidates, the simplest first, with the size of the smaller sample below which they use
+exchange."""
 
 
 def levels(values, shares):
@@ -85,13 +87,13 @@ POPULATIONS = {
 }  # fmt: skip
 """Populations of the two samples, with equal means."""
 ONE_TAILED = [*POPULATIONS][-4:]
-"""Populations with skew and unequal spread, of which one-tailed tests are described."""
+"""Populations with skew and unequal spread, for which one-tailed tests are described."""
 
 
 def studentised(sums, squares, sizes):
     """Return |t| of two samples from the sums of their values and squares.
 
-    It is 0 or infinite if no sample varies.
+    If no sample varies, |t| is 0 or infinite.
     """
     means = [total / n for total, n in zip(sums, sizes, strict=True)]
     parts = [
@@ -107,9 +109,10 @@ def studentised(sums, squares, sizes):
 
 
 def exchanges(sizes, rng):
-    """Return which values are in the first sample after each exchange, and if these are all ways.
+    """Return exchanges of the values of two samples.
 
-    The first result has entries 0 and 1, shape ``(values, ways)``.
+    The first result says which values are in the first sample after each exchange, as entries 0 and
+    1, shape ``(values, ways)``. The second result is True if these are all possible exchanges.
     """
     n, first = sum(sizes), sizes[0]
     if math.comb(n, first) <= RESAMPLES:
@@ -127,8 +130,11 @@ def draws(sizes, rng):
 
 
 def p_by_test(samples, members, exact, drawn):
-    """Return p of each pair of samples, shape ``(pairs, n)`` each, by test: exchange and bootstrap,
-    two-sided, and exchange one-tailed, ``greater`` and ``less``."""
+    """Return p of each pair of samples by test.
+
+    ``samples`` are two arrays of shape ``(pairs, n)``. The tests are ``exchange`` and ``bootstrap``
+    (two-sided), and ``greater`` and ``less`` (one-tailed exchange).
+    """
     sizes = [sample.shape[1] for sample in samples]
     both = np.concatenate(samples, axis=1)
     both = both - both.mean(axis=1, keepdims=True)
@@ -162,8 +168,10 @@ def p_by_test(samples, members, exact, drawn):
 
 
 def cell(name, sizes):
-    """Return the shares of rejected samples of a population and pair of sizes, by test and
-    level."""
+    """Return the shares of samples that are rejected, by test and level.
+
+    ``name`` is the population, and ``sizes`` are the sizes of the two samples.
+    """
     rng = np.random.default_rng([SEED, [*POPULATIONS].index(name), *sizes])
     members, exact = exchanges(sizes, rng)
     drawn, found = draws(sizes, rng), []

@@ -21,8 +21,7 @@ COLUMNS = ("gap", "noisy_gap", "share")
 
 
 def rows_of(text: str) -> dict[str, tuple[str, ...]]:
-    """Return gap, gap with motor noise and share as printed, in per cent, by the name of the
-    row."""
+    """Return the cells gap, gap with motor noise and share (in per cent), by name of the row."""
     row = r"^\| \**(.+?)\**(?: of the paper|:.*?)? \| .+? \| (.+?%.*?) \| (.+?%.*?) \| (.+?) \|$"
     rows = re.findall(row, text, re.MULTILINE)
     return {name: tuple(cell.replace("*", "") for cell in cells) for name, *cells in rows}
@@ -31,7 +30,7 @@ def rows_of(text: str) -> dict[str, tuple[str, ...]]:
 def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
     """Compare README's table with a ranking whose index has the titles of methods.
 
-    Return the number of rows of README's table, and a line for each row that differs.
+    Returns the number of rows of README's table, and a line for each row that differs.
     """
     lines, rows = [], rows_of(text)
     for name, printed in rows.items():

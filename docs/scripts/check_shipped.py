@@ -44,10 +44,10 @@ def shipped_runs() -> pd.DataFrame:
 
 
 def chosen(runs: pd.DataFrame, *, every: bool = False) -> pd.DataFrame:
-    """Select the runs to perform: the first of each cell of ``comparison``, and of cheap cells.
+    """Select the runs to perform.
 
-    The cheap cells are the cheapest of each method on each family; with ``every`` they are all
-    cells.
+    They are the first run of each cell of ``comparison``, and of the cheapest cell of each method
+    on each family of the other suites. With ``every``, they are the first run of all cells.
     """
     cells = runs.sort_values("run", kind="stable").groupby(CELL, sort=False).head(1)
     if every:
@@ -58,8 +58,10 @@ def chosen(runs: pd.DataFrame, *, every: bool = False) -> pd.DataFrame:
 
 
 def differences(rows: pd.DataFrame) -> Iterator[str]:
-    """Perform the current ones of some shipped runs again, and yield a sentence on each
-    difference."""
+    """Perform shipped runs again, and yield a sentence on each difference.
+
+    Runs by earlier versions of their method (``is_current`` is False) are left out.
+    """
     runs = list[Run]()
     for suite, of_suite in rows[rows.is_current].groupby("suite"):
         with open_shipped(str(suite)) as store:
@@ -82,7 +84,11 @@ def result_of(run: Run) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Check what the command line asks for; return 1 if a run differs."""
+    """Check the runs that the command line asks for, and print the result.
+
+    Returns 1 if a run differs, or, with ``--release``, if a run is by an earlier version of its
+    method; otherwise 0.
+    """
     parser = argparse.ArgumentParser(prog="python docs/scripts/check_shipped.py")
     parser.add_argument("--all", action="store_true", help="one run of each cell (an hour)")
     parser.add_argument("--release", action="store_true", help="fail if a run has an old version")

@@ -19,7 +19,7 @@ from coartic.robot import Array
 Q = np.array([0, 0, 2.5, -0.8, 0.6, 0.5, 0.5, 0.6, -0.8, 0.5])
 """Configuration: base, left arm, right arm."""
 ANGLE = 0.55
-"""Radius of the arcs of angles, length units."""
+"""Radius of the arcs of angles, in length units."""
 
 
 @styled
@@ -32,7 +32,7 @@ def robot() -> Figure:
         joints = task.robot.joint_positions(Q, hand)
         aligned = {"ha": "right" if side < 0 else "left", "va": "top"}
         for number, joint in enumerate(joints[:-1]):
-            # The angle is measured from the direction of the link before, or the x axis.
+            # The angle is measured from the direction of the previous link, or from the x axis.
             before, after = (
                 float(np.sum(Q[first:to])) for to in (first + number, first + number + 1)
             )
@@ -56,7 +56,7 @@ def robot() -> Figure:
 
 @styled
 def nullspace() -> Figure:
-    """Draw postures that hit goal 1; the one nearest to a posture of goal 2 is black."""
+    """Draw postures that hit goal 1. The one that is nearest to a posture of goal 2 is black."""
     task = load_task("ascending")
     arm, goals = task.robot.joints("right"), np.array([(3.2, 1.4), (3.6, -0.4)])
 

@@ -58,15 +58,17 @@ def changed_runs(folder: Path) -> Iterator[str]:
 
 
 def runs_with_noise(source: Store) -> Iterator[Run]:
-    """Yield the runs of a folder, whose solutions are executed with motor noise again."""
+    """Execute the solutions of a folder with motor noise again, and yield its runs."""
     ids = iter(source.runs().run_id)
     for job in source.plan():
         yield from with_noise([source.run(next(ids)) for _ in job.numbers])
 
 
 def pack(source: Store, runs: Iterable[Run], out: Path) -> None:
-    """Write runs, downsampled, and the plan of ``source``, and the hashes of all packed results,
-    into the folder ``out``."""
+    """Pack downsampled runs with the plan of ``source`` into the folder ``out``.
+
+    The hashes of all packed results in this folder are written, too.
+    """
     with tempfile.TemporaryDirectory() as made:
         plan = source.plan()
         with writing(Path(made)) as target:
@@ -80,7 +82,10 @@ def pack(source: Store, runs: Iterable[Run], out: Path) -> None:
 
 
 def main() -> int:
-    """Pack the folders of the command line, unless a shipped result would change."""
+    """Pack the folders of the command line, unless shipped results would change.
+
+    With ``--changed``, they are also packed if results change. Returns 1 if nothing was packed.
+    """
     parser = argparse.ArgumentParser(prog="python docs/scripts/pack_shipped.py")
     parser.add_argument("--changed", action="store_true", help="pack results that have changed")
     parser.add_argument("--noise", action="store_true", help="pack noisy ticks made again")

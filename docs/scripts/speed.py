@@ -106,8 +106,8 @@ def functions(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
 
 
 def _us(trials: int, make: Callable[[], object]) -> float:
-    """Return the CPU time of a trial, µs, where ``make`` makes ``trials`` trials."""
-    started = time.process_time()  # of all threads
+    """Return the CPU time of a trial, in µs, of a function that makes ``trials`` trials."""
+    started = time.process_time()  # CPU time of all threads
     make()
     return (time.process_time() - started) / trials * 1e6
 

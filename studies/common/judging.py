@@ -57,12 +57,13 @@ class Finding:
     def verdict(self, p: float, opposite_p: float) -> Verdict:
         """Return the verdict for p-values of the claim and of its opposite.
 
-        - *supported*: the claim holds, and ``p`` is below 5 % or NaN (counted exactly);
-        - *not supported*: the claim does not hold, and ``opposite_p`` is below 5 %, or the claim
-          has no test, or a test of five values or more has no p and no positive estimate (all
-          values are equal);
-        - *undecided*: any other claim, and a claim with a test of fewer than five values that has
-          no p.
+        - *supported*: the claim holds, and ``p`` is below 5 % or NaN. (It is NaN if the claim was
+          counted exactly.)
+        - *not supported*: the claim does not hold, and ``opposite_p`` is below 5 %. The verdict is
+          also *not supported* if the claim has no test, or if a test of five or more values has no
+          p and no positive estimate, because all values are equal.
+        - *undecided*: any other claim, and a claim that holds if one of its tests has fewer than
+          five values and no p.
         """
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):
@@ -108,7 +109,7 @@ def mean_beyond(
     values : array_like, shape (tasks,)
         One value for each task. NaN stands for a task without a value and does not count.
     bound : float
-        In the unit of the values.
+        The bound, in the unit of the values.
     side : {"greater", "less"}
         Side of the bound on which the mean is claimed to lie.
 
@@ -193,7 +194,7 @@ def all_of(*findings: Finding) -> Finding:
 
 
 def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
-    """Judge the claims of a study, with their tests corrected over each other (Holm).
+    """Judge the claims of a study, with tests corrected over all claims (Holm).
 
     Parameters
     ----------

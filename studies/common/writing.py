@@ -1,4 +1,4 @@
-"""Write the tables and the page of a study, and a suite of its missing control."""
+"""Write the tables and the page of a study, and a suite of the controls that it lacks."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def tabulate_runs(study: Study) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row for each run: task, method, seed, rewards (minus ticks), hands, and signatures of
-        the solution (``first``, ``arm``, ...). If runs have a replay, also signatures of the
-        noiseless trial after learning (``replay_first``, ...). Columns without a value are left
-        out.
+        One row for each run: task, method, seed, rewards (in negative ticks), hands, and signatures
+        of the solution (``first``, ``arm``, ...). If runs have a replay, a noiseless trial after
+        learning, the frame also has its signatures (``replay_first``, ...). Columns without a value
+        are left out.
     """
     runs = study.runs[_OF_RUN].assign(
         **{name.replace(" ", "_"): study.signature(name) for name in SIGNATURES}
@@ -149,13 +149,13 @@ def expect(holds: bool, what: str) -> str:
 
 
 def control_suite(study: Study, *, runs: int = 20) -> str:
-    """Return a suite of random search, the control of signatures, where the study lacks it.
+    """Return a suite with the runs of random search that a study lacks as controls of signatures.
 
-    The suite has random search for each method that may select its solution by rewards, on each
-    task, with as many trials as the method. The idle arm has noise if the method adds it. There is
-    a block for each hand sequence that at least a tenth of the method's solved runs have. What the
-    study has already is left out. Signature ``hand`` has another control, which is not in the
-    suite.
+    The suite has random search for each method that can select its solution by rewards, on each
+    task, with as many trials as the method. The idle arm has noise if the method adds noise to it.
+    There is a block for each hand sequence that at least a tenth of the method's solved runs have.
+    Controls that the study already has are left out. The control of signature ``hand`` (random
+    search that tries all hand sequences) is not in the suite.
 
     Parameters
     ----------

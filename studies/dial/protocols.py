@@ -35,17 +35,18 @@ COLUMNS = [
 NAMED_RUNS = 20
 NAMED_COLUMNS = ["task", "setting", "run", *(f"after_{trials}" for trials in AFTER[1:])]
 MISSED = -(10**9)
-"""Reward of a trial that misses a goal: less than any other."""
+"""Reward of a trial that misses a goal. It is lower than any other reward."""
 OTHERS = {
     "CMA-ES": (CMAES, RUNS),
     "posture planning": (TwoGoals, 1),
     "shortest path": (PathLength, 1),
 }
-"""Other methods than the learner, and their runs on a task; planners are the same in each."""
+"""Methods other than the learner, with their numbers of runs on a task. All runs of a planner are
+the same."""
 
 
 def run_task(name):
-    """Run every setting on a task; rows of :data:`COLUMNS`."""
+    """Run every setting on a task, and return rows of :data:`COLUMNS`."""
     task, rows = load_task(name), []
     for setting, fields in SETTINGS.items():
         if len(task.hands) == 1:
@@ -61,8 +62,10 @@ def run_task(name):
 def row_of(task, setting, number, rewards):
     """Return a row of :data:`COLUMNS`.
 
-    ``quarter`` and ``half``: trials until the best reward so far is this share of the way from the
-    corrective process alone to the best known reward; infinite if it never is in all trials.
+    ``quarter`` and ``half`` are the numbers of trials until the best reward so far has covered this
+    share of the distance from the reward of the corrective process alone to the best known reward.
+    If a run does not get there, they are infinite, or NaN if it has fewer than :data:`TRIALS`
+    trials.
     """
     start, best_known = span_of(task)
     best, trials = np.maximum.accumulate(rewards), len(rewards)
@@ -75,16 +78,19 @@ def row_of(task, setting, number, rewards):
 
 
 def span_of(task):
-    """Return the reward of the corrective process alone with its best hands, from which the gain
-    counts, and the best known reward."""
+    """Return the two rewards between which the gain on a task is measured.
+
+    They are the reward of the corrective process alone with its best hands, and the best known
+    reward.
+    """
     problem = objective(task)
     return -int(problem.best_cost), -problem.best_known
 
 
 def run_others(name):
-    """Run the other methods on a task; rows of :data:`COLUMNS`.
+    """Run the other methods on a task, and return rows of :data:`COLUMNS`.
 
-    A planner makes no trial: its plan is executed once. A method that fails gains nothing.
+    A planner makes no trial: its plan is executed once. A method that fails has no gain.
     """
     task, rows = load_task(name), []
     for setting, (method, runs) in OTHERS.items():
@@ -118,7 +124,7 @@ PARTS = {
     "shifts": (run_shifts, SHIFT_COLUMNS, SHIFT_TASKS),
     "named_runs": (run_named, NAMED_COLUMNS, TASKS),
 }
-"""Files, the function that makes the rows of a task, their columns, and the tasks."""
+"""For each file: the function that makes the rows of a task, the columns, and the tasks."""
 
 
 def main(folder):

@@ -1,4 +1,7 @@
-"""Settings of the learner along the dial, of leaning towards the next goal, and off it."""
+"""Define the settings of the learner, with exploration that leans towards the next goal or not.
+
+On the *dial*, exploration leans further and further towards the next goal.
+"""
 
 from coartic import CONDITIONS
 
@@ -6,7 +9,7 @@ FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 DRIFTS, NOISES = (0.03, 0.1, 0.3, 1.0), (0.01, 0.05)
 TRIALS, RUNS, AFTER = 10_000, 3, (30, 100, 1_000, 10_000)
 DIAL = ("0 0.05", *(f"{kappa:g} 0.05 next-goal" for kappa in DRIFTS))
-"""The dial itself: settings with the paper's noise and drift towards the next goal."""
+"""The dial: settings with the paper's noise and different drifts towards the next goal."""
 PAPER, INFORMED, PLANNER = "0 0.05", "0.3 0.05 next-goal", "1 0.01 next-goal"
 """Settings that claims compare."""
 SETTINGS = {
@@ -25,9 +28,9 @@ SETTINGS = {
 }  # fmt: skip
 """Fields that differ from the paper's condition (:func:`base_of`)."""
 FEW = 1_000
-"""Trials of settings that are not among the next."""
+"""Number of trials of settings that are not in :data:`LONG`."""
 LONG = (*DIAL, PLANNER, "1 0", "1 0.05 start", "hands", "drawn", "all")
-"""Settings with all trials: the dial itself, and what claims ask of the end."""
+"""Settings with :data:`TRIALS` trials: the dial, and settings whose final gain is compared."""
 
 LESS_NOISE = {"noise_sd": 0.01, "epsilon": 0.4}
 NAMED = {
@@ -36,9 +39,9 @@ NAMED = {
     "drift 1, noise 0.01, epsilon 0.4": {"drift": 1.0, **LESS_NOISE},
     "no drift, noise 0.01, epsilon 0.4": LESS_NOISE,
 }
-"""Named settings, which are measured on the paper's tasks: fields as in :data:`SETTINGS`."""
+"""Named settings, which are measured on the paper's tasks. Fields are as in :data:`SETTINGS`."""
 
 
 def base_of(task):
-    """Return the paper's condition that explores most of what the robot has: EC1 or EC4."""
+    """Return the paper's condition that explores most on a task: EC1 for one arm, EC4 for two."""
     return CONDITIONS["EC1" if len(task.hands) == 1 else "EC4"]

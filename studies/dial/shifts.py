@@ -1,4 +1,4 @@
-"""An announced change: how fast does the posture shift, along the dial?"""
+"""Measure how fast postures shift after an announced change, with settings along the dial."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,20 +12,26 @@ from coartic.analysis import means
 from common.judging import judge_means
 
 SHIFTED = (PAPER, *DIAL[2:], PLANNER)
-"""Settings that practise, hear of a goal that has moved, and practise again."""
+"""Settings of learners that practise a task, are told that a goal has moved, and practise again."""
 SHIFT_TASKS = [f"{family}/v1/i{number:03d}" for number in range(30) for family in FAMILIES[:2]]
 SHIFT_AFTER = (1, 2, 3, 10, 30, 100, 300, 1_000, 10_000)
-"""Trials after the change at which the solution is looked at; the last is all of practice."""
+"""Numbers of trials after the change at which the solution is measured. The last is the whole
+practice."""
 SHIFT_COLUMNS = ["task", "setting", "goal", "same", "square", *(f"dot_{n}" for n in SHIFT_AFTER)]
 
 
 def run_shifts(name):
-    """Let learners practise a task, move the goal after a goal by half a link, and follow the
-    posture at that goal while they practise on; rows of :data:`SHIFT_COLUMNS`.
+    """Measure how postures at a goal shift after the next goal has moved.
 
-    At the change the learner keeps its movements and drops the rewards.
-    ``dot_N`` is the shift of the posture after N trials times the shift after all of them,
-    ``square`` the latter squared, ``same`` such a product for practice without a change.
+    Learners practise a task. Then the goal after ``goal`` moves by half a link, and the learners
+    practise on: they keep their movements and forget the rewards. Returns rows of
+    :data:`SHIFT_COLUMNS`:
+
+    - ``dot_N``: scalar product of the shift of the posture at ``goal`` after N trials and the shift
+      after all trials;
+    - ``square``: scalar product of the shift after all trials with itself;
+    - ``same``: scalar product of the shift in as much practice without a change and the shift after
+      all trials.
     """
     task, seed, rows = load_task(name), SHIFT_TASKS.index(name), []
     cases = [(g, other) for g, distance, other in moves(task, seed) if distance == 0.5]
@@ -45,10 +51,11 @@ def run_shifts(name):
 
 
 def measure_shifts(raw):
-    """Measure shares of the shift after the change, a row for each task and setting.
+    """Measure shares of the shift after the change, with a row for each task and setting.
 
-    ``share_N`` and ``log_half`` (:func:`announced.with_shares`) are of sums over goals.
-    ``unchanged`` is the share that as much practice brings without a change.
+    ``share_N`` and ``log_half`` (:func:`announced.with_shares`) are computed from sums over goals.
+    ``unchanged`` is the share of the shift that the same amount of practice brings without a
+    change.
     """
     sums = raw.groupby(["setting", "task"], sort=False).sum(numeric_only=True).reset_index()
     sums["family"] = sums.task.str.partition("/")[0]
@@ -56,7 +63,7 @@ def measure_shifts(raw):
 
 
 def tabulate_shifts(shifts):
-    """Tabulate shares of the shift by family and setting, and medians of the trials to half."""
+    """Tabulate shares of the shift, and median trials to half of it, by family and setting."""
     numbers = [*(f"share_{n}" for n in SHIFT_AFTER), "unchanged"]
     table = means(shifts, ["family", "setting"], numbers).rename(columns={"rows": "tasks"})
     trials = (10**shifts.log_half).groupby([shifts.family, shifts.setting], sort=False)
@@ -77,7 +84,10 @@ def in_each(values, families=FAMILIES):
 
 
 def judge_shifts(shifts):
-    """The claims on an announced change, registered before any test instance was run."""
+    """Judge the claims on an announced change.
+
+    The claims were registered before any test instance was run.
+    """
     quicker = by_task(shifts, PAPER, "log_half") - by_task(shifts, PLANNER, "log_half")
     quicker, after_ten, unchanged = (in_each(values, FAMILIES[:2]) for values in (
         quicker, by_task(shifts, PLANNER, "share_10"), by_task(shifts, PLANNER, "unchanged")

@@ -1,10 +1,10 @@
-"""Measure how far exploration leans towards the next goal, on tasks on which it was not tuned.
+"""Measure what exploration that leans towards the next goal gains, on tasks not used for tuning.
 
     python studies/dial/protocols.py results/dial
     PYTHONPATH=studies python studies/dial/study.py results/dial
 
-The *gain* of a run is the share of the way from the corrective process alone, with its best hands,
-to the best known reward.
+The *gain* of a run is the share that it covers of the distance from the reward of the corrective
+process alone, with its best hands, to the best known reward.
 """
 
 import sys
@@ -23,11 +23,11 @@ HERE = Path(__file__).parent
 
 
 def measure_runs(raw):
-    """Add gains and logarithms of trials to the stored runs, a row for each run.
+    """Add gains and logarithms of numbers of trials to the stored runs.
 
-    ``gain_N`` after N trials, in per cent; NaN where nothing can be gained.
-    ``log_quarter`` and ``log_half``: trials to a quarter and to half of the gain, as a power of
-    ten; a run that does not come there counts as all trials.
+    ``gain_N`` is the gain after N trials, in per cent. It is NaN on tasks on which nothing can be
+    gained. ``log_quarter`` and ``log_half`` are logarithms (base 10) of the numbers of trials to a
+    quarter and to half of the gain. For a run that does not get there, all trials count.
     """
     zero = raw.corrective_best
     possible = (raw.best_known - zero).where(raw.best_known > zero)
@@ -38,8 +38,11 @@ def measure_runs(raw):
 
 
 def tabulate(runs):
-    """Tabulate gains: means over random tasks (tasks count alike), or over the runs on a task of
-    the paper; medians of trials."""
+    """Tabulate mean gains and median numbers of trials to a quarter and to half of the gain.
+
+    Means of gains are over random tasks, which all have the same weight, or over the runs on a task
+    of the paper.
+    """
     drawn = runs[runs.family.isin(FAMILIES)]
     every = pd.concat([drawn.assign(group="random"), runs.assign(group=runs.family)])
     unit = every.run.where(~every.family.isin(FAMILIES), 0)
@@ -48,10 +51,10 @@ def tabulate(runs):
     units = every.groupby(by, sort=False)[numbers].mean().reset_index()
     table = means(units, ["group", "setting"], numbers)
     table.index = (table.group + " " + table.setting).rename("row")
-    # Runs that did not come there, in all trials or in the thousand of a setting, are the slowest.
+    # Runs that did not get there count as the slowest, also those with only 1,000 trials.
     slow = every[every.gain_30.notna()].fillna({"quarter": np.inf, "half": np.inf})
     trials = slow.groupby(["group", "setting"], sort=False)[["quarter", "half"]]
-    # the order statistic, as half of the runs may not come there
+    # An order statistic, because the mean of two values could be infinite.
     medians = trials.quantile(0.5, interpolation="higher").add_suffix("_0.5")
     table = table.merge(medians, left_on=["group", "setting"], right_index=True)
     return table.rename(columns={"rows": "units"})
@@ -67,7 +70,7 @@ def tabulate_named(runs):
 
 
 def judge_claims(runs):
-    """The claims, as they were registered before any random test task was run."""
+    """Judge the claims, which were registered before any random test task was run."""
 
     def more(first, second, column="gain_100"):
         return by_task(runs, first, column) - by_task(runs, second, column)
@@ -95,13 +98,13 @@ OTHERS = {
     PLANNER: "1, σ 0.01", "CMA-ES": "CMA-ES", "posture planning": "posture plan",
     "shortest path": "shortest path",
 }  # fmt: skip
-"""Settings right of the dial in the figure, with their names."""
+"""Settings and methods to the right of the dial in the figure, with their names."""
 PLANNERS = tuple(OTHERS)[2:]
 
 
 @figures.styled
 def draw(table):
-    """Trials to a quarter and to half of the gain, and the gain after 100 trials, by drift."""
+    """Draw trials to a quarter and to half of the gain, and the gain after 100 trials, by drift."""
     figure, panels = figures.panels((1, 3), (figures.TWO, 2.6))
     names = {setting: setting.split()[0] for setting in DIAL} | OTHERS
     places = {setting: place for place, setting in enumerate(names)}
@@ -114,7 +117,7 @@ def draw(table):
             part = of_family[of_family.setting.isin(OTHERS) != dial]
             for axes, share in zip(panels, ("quarter", "half"), strict=False):
                 trials = part[f"{share}_0.5"].clip(upper=2 * TRIALS)
-                of_trials = part.setting.isin(PLANNERS)  # which make none
+                of_trials = part.setting.isin(PLANNERS)  # planners make no trials
                 axes.plot(part.x[~of_trials], trials[~of_trials], "o", markersize=3,
                           linestyle="-" if dial else "", **look)  # fmt: skip
             line = look if dial else look | {"linestyle": "", "label": None}

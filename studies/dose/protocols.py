@@ -1,9 +1,9 @@
-"""Run suite dose, then random search with the hands in which its learner ends.
+"""Run suite dose, then random search with the hands that the suite's learner uses at the end.
 
     python studies/dose/protocols.py results/dose
 
-Random search has as many trials as the learner and each hand sequence with which a noiseless trial
-of it ends on a random task. What is done is not done again.
+On each random task, random search has as many trials as the learner. It is run with each hand
+sequence of the learner's noiseless trials after learning. Stored runs are not made again.
 """
 
 import sys
@@ -16,8 +16,10 @@ SUITE = Path(__file__).with_name("suite.toml")
 
 
 def of_control(runs):
-    """Return blocks of random search on random tasks for two arms, with the hands of the learner's
-    noiseless trials."""
+    """Return blocks of a suite: random search on random tasks for two arms.
+
+    The hand sequences are those of the learner's noiseless trials after learning.
+    """
     learner = runs[(runs.method == "dual-process/EC4-subtask") & runs.family.notna()]
     hands = learner.groupby("task", sort=False).replay_hands.unique()
     return "".join(
@@ -30,7 +32,7 @@ def of_control(runs):
 def main(folder="results/dose"):
     """Run both parts, one after the other."""
     folder, text = Path(folder), SUITE.read_text("utf-8")
-    file = folder.with_suffix(".toml")  # the suite, as far as it is known
+    file = folder.with_suffix(".toml")  # the suite with the blocks that are known so far
     file.parent.mkdir(parents=True, exist_ok=True)
     for blocks in (lambda: "", lambda: of_control(load(folder).runs)):
         text += blocks()

@@ -23,18 +23,23 @@ MEASURES = {
     "first": "first movement slower (ticks)",
     "saved": "ticks saved (%)",
 }
-"""Measures of each run, with the label of its axis."""
+"""Measures of a run, with the labels of their axes."""
 SHARED = ("ascending", "descending")
-"""Tasks of the paper that have the first goal in common, and no others."""
+"""Tasks of the paper that share their first goal, and no other goal."""
 
 
 def measure_runs(study):
-    """Return the solved runs with what their noiseless replays show, or the solution that random
-    search selected.
+    """Return the solved runs with their measures.
 
-    ``beyond``: ``nearer`` less its mean in random search on this task with these hands.
-    ``group``: the family, or the task of the paper. ``counted``: the movements whose rewards count.
-    ``dose``: the factor γ. ``kind``: both in words.
+    A learner's run is measured by its noiseless trial after learning (the replay), a run of random
+    search by its solution. Columns:
+
+    - ``nearer``, ``first``, ``saved``: see :data:`MEASURES`;
+    - ``beyond``: ``nearer`` less its mean in random search on the same task with the same hands;
+    - ``group``: the family, or the task of the paper;
+    - ``counted``: the movements whose rewards count;
+    - ``dose``: the factor γ;
+    - ``kind``: ``counted`` and ``dose`` in words.
     """
     learns = study.runs.method != RANDOM_SEARCH
     nearer, first = (
@@ -62,7 +67,8 @@ def tabulate(study, runs):
     """Tabulate means by γ over random tasks, or over the runs on a task of the paper."""
     every = pd.concat([runs[runs.family.notna()].assign(group="random"), runs])
     every["row"] = every.group + " " + every.kind
-    unit = every.run.where(every.family.isna(), 0)  # random tasks count alike, whatever their runs
+    # All random tasks have the same weight, whatever their number of runs.
+    unit = every.run.where(every.family.isna(), 0)
     by = ["row", *KEYS, "task", unit]
     units = every.groupby(by, sort=False, dropna=False)[[*MEASURES]].mean().reset_index()
     table = means(units, ["row", *KEYS], [*MEASURES]).set_index("row").drop(columns="rows")
@@ -72,8 +78,11 @@ def tabulate(study, runs):
 
 
 def tabulate_posture_difference(study, runs):
-    """Tabulate the posture difference (length unit and rad mixed) at the goal that two tasks of the
-    paper share, by γ, with p of a test against the difference of random search (``beyond_p``)."""
+    """Tabulate the posture difference at the goal that two tasks of the paper share, by γ.
+
+    The posture difference mixes length units and rad. ``beyond_p`` is p of a test against the
+    posture difference of random search.
+    """
     rows = {}
     first = runs[runs.task == SHARED[0]].groupby("kind").first()
     labels = (first.method + " " + first.setting).str.strip()
@@ -90,7 +99,7 @@ def tabulate_posture_difference(study, runs):
 
 
 def judge_claims(runs):
-    """The claims, as they were registered before the random tasks were run."""
+    """Judge the claims, which were registered before the random tasks were run."""
     drawn = runs[runs.family.notna()]
     nearer, beyond, first, saved = (
         drawn.pivot_table(name, "task", "kind").loc[drawn.task.unique()] for name in MEASURES
@@ -120,7 +129,7 @@ LOOKS = {
 
 @figures.styled
 def draw(table):
-    """The measures by γ on random tasks, and the posture difference on the paper's."""
+    """Draw the measures by γ on random tasks, and the posture difference on the paper's tasks."""
     figure, panels = figures.panels((2, 2), (figures.TWO, 4.6))
     shown = [name for name in MEASURES if name != "nearer"]
     for axes, name in zip(panels, [*shown, "posture_difference"], strict=True):

@@ -27,22 +27,25 @@ OTHERS = [
 ARMS = ["one arm", "two arms"]
 MANY = ["fourteen-one/v1", "fourteen-two/v1"]
 HALF = ["seven-one/v1", "seven-two/v1"]
-"""Families with half as many goals, drawn alike."""
+"""Families with half as many goals, drawn in the same way."""
 FIRST = 28
 """Number of tasks with two arms that were planned first."""
 GAIN = 1.0
-"""Per cent. The question is at which horizon a further goal gains less than this; it is also what
-counts as equivalent to a published reward."""
+"""Gain of a goal, in per cent. The question is at which horizon a further goal gains less than
+this. Differences from published rewards up to this size also count as equivalent."""
 
 
 def measure_plans(study):
-    """Return plans, a row for each task, number of ``nodes`` and horizon, with what their goals
-    ahead gain.
+    """Return the plans with the gains of their goals ahead.
 
-    With h goals ahead the planner sees more than with h - 1 at n - h movements of n alone. ``gain``
-    is the difference of their ticks for each of those movements, as a share of a mean movement of
-    the best known solution; where no run has the horizon ``before``, of each goal since the last
-    that was run, alike. ``together``: the gains of all goals ahead up to this one.
+    There is a row for each task, number of ``nodes`` and horizon h. With h goals ahead instead of
+    h - 1, the planner sees more only at n - h of the n movements. Columns:
+
+    - ``gain``: ticks that the last goal ahead saves for each of these movements, as a share of the
+      mean movement of the best known solution;
+    - ``before_horizon`` and ``before_ticks``: the next smaller horizon that was run, and its ticks.
+      If it is below h - 1, ``gain`` is the mean gain of the goals ahead since then;
+    - ``together``: sum of the gains of all goals ahead up to h.
     """
     plans = study.runs[(study.runs.method == PLANNER) & study.runs.gap.notna()]
     numbers = plans[["horizon", "goals", "reward", "best_known", "nodes"]].astype(int)
@@ -61,15 +64,20 @@ def measure_plans(study):
 
 
 def first_plans(plans):
-    """Return the plans on the tasks, and with the nodes, of plans without a goal ahead; later ones
-    repeat them, or are of more tasks."""
+    """Return the plans that were made first, without repeats and tasks that were added later.
+
+    They have the tasks and the numbers of nodes of the plans without a goal ahead.
+    """
     first = plans[plans.horizon == 0]
     return plans[plans.task.isin(first.task) & plans.nodes.isin(first.nodes)]
 
 
 def repeats_of(plans):
-    """Return the ticks of plans with ``three`` and ``four`` goals ahead with two arms, a row for
-    each task and number of ``nodes``, and the ``gain`` of the fourth goal."""
+    """Return the ticks with three and with four goals ahead, for tasks with two arms.
+
+    There is a row for each task and number of ``nodes``, with the ticks in ``three`` and ``four``,
+    and the ``gain`` of the fourth goal.
+    """
     plans = plans[(plans.family == MANY[1]) & (plans.horizon == 4) & (plans.before_horizon == 3)]
     plans = plans.sort_values(["task", "nodes"]).rename(columns={"ticks": "four"})
     rows = (plans.task + " nodes=" + plans.nodes.astype(str)).rename("row")
@@ -78,7 +86,7 @@ def repeats_of(plans):
 
 
 def tabulate(study, plans):
-    """Gaps by goals ahead and what each goal gains, then the gaps of other methods, as shares."""
+    """Tabulate gaps and gains by goals ahead, then the gaps of other methods, all as shares."""
     plans = plans.sort_values(["family", "horizon"], kind="stable")
     planned = means(plans, ["family", "method", "horizon"], ["gap", "gain", "together"])
     planned = planned.rename(columns={"horizon": "h", "rows": "tasks"})
@@ -87,8 +95,10 @@ def tabulate(study, plans):
 
 
 def tabulate_others(study):
-    """Tabulate the gaps of :data:`OTHERS` on tasks with fourteen goals, by family and method:
-    means, as shares, with intervals about other tasks and runs."""
+    """Tabulate the mean gaps of :data:`OTHERS` on tasks with fourteen goals, by family and method.
+
+    Gaps are shares. Intervals are for other tasks and runs.
+    """
     runs = study.runs[study.runs.family.isin(MANY) & study.runs.gap.notna()]
     rows = {}
     for method in OTHERS:
@@ -100,21 +110,27 @@ def tabulate_others(study):
 
 
 def at(plans, families, h, column):
-    """A column of the plans with h goals ahead, in per cent, by task."""
+    """Return a column of the plans with h goals ahead, in per cent, by task."""
     rows = plans[plans.family.isin(families) & (plans.horizon == h)]
     return 100 * rows.set_index("task")[column]
 
 
 def signed_rank(gains, side="greater"):
-    """Return p of a one-tailed signed-rank test that gains, per cent by task, are more or less than
-    :data:`GAIN`."""
+    """Return p of a one-tailed signed-rank test of gains against :data:`GAIN`.
+
+    ``gains`` has a gain in per cent for each task. ``side`` says whether the test is that they are
+    greater or less.
+    """
     return stats.wilcoxon(gains - GAIN, alternative=side).pvalue
 
 
 def tabulate_fourth(repeats):
-    """Tabulate the gain of the fourth goal ahead with two arms, with p of the test that it exceeds
-    1 %, over all tasks, without the greatest gains, over the first tasks, over the tasks added
-    later, and by repeat."""
+    """Tabulate the gain of the fourth goal ahead with two arms.
+
+    Rows are for all tasks, for all tasks without the greatest gains, for the first tasks, for the
+    tasks that were added later, and for each repeat. p is that of the test that the mean gain
+    exceeds 1 %.
+    """
     repeats = repeats.assign(gain=100 * repeats.gain)
     gains = repeats.groupby("task").gain.mean()
     first = gains.index.str[-3:].astype(int) < FIRST
@@ -140,8 +156,11 @@ def tabulate_fourth(repeats):
 
 
 def judge_claims(study, plans, repeats):
-    """Judge the claims registered before the runs; those on the fourth goal ahead with two arms
-    need a signed-rank test as well."""
+    """Judge the claims, which were registered before the runs.
+
+    Claims on the fourth goal ahead with two arms are only supported if a signed-rank test supports
+    them, too.
+    """
     one, two = at(plans, MANY[:1], 4, "gain"), 100 * repeats.groupby("task").gain.mean()
     pairs = [at(plans, families, h, "together").rename(lambda name: name.partition("-")[2])
              for families, h in ((MANY, 2), (HALF, 1), (HALF, 2))]  # fmt: skip
@@ -169,7 +188,11 @@ def judge_claims(study, plans, repeats):
 
 @figures.styled
 def draw(table):
-    """Gaps (learner dotted, CMA-ES dash-dotted), gains, and gains together, seven goals open."""
+    """Draw gaps, gains of goals ahead, and their sums, by number of goals ahead.
+
+    The learner's gap is dotted, and that of CMA-ES dash-dotted. Tasks with seven goals have open
+    markers.
+    """
     figure, panels = figures.panels((1, 3), (figures.TWO, 2.8))
     for color, arms, many, half in zip(figures.PALETTE, ARMS, MANY, HALF, strict=False):
         rows, seven = table[table.family == many], table[table.family == half]

@@ -4,9 +4,9 @@
     PYTHONPATH=studies python studies/horizon/study.py results/horizon
 
 Each plan is made three times, with numbers of postures (``nodes``) that differ by 1 %. Claims,
-tables and figure are of the mean over the repeats of a task; repeats.csv judges each repeat alone.
-The rule was written before the repeats were run, with what we expect: no verdict changes, and the
-fourth goal's gain stays undecided.
+tables and figure use the mean over the repeats of a task. File repeats.csv has the verdicts of each
+repeat. This rule was written before the repeats were run, with our expectation: no verdict changes,
+and the gain of the fourth goal stays undecided.
 """
 
 import sys
@@ -22,11 +22,15 @@ from common.writing import tabulate_runs, write_study
 HERE = Path(__file__).parent
 PLANNER = "receding-horizon"
 STEPS = ["0", "1", "2", "3", "4", "5+", "all"]
-"""Goals ahead. ``5+`` are all beyond the fourth together; ``all`` is over all tasks."""
+"""Goals ahead. ``5+`` stands for five or more; ``all`` for all goals of the task, in all tasks."""
 
 
 def measure_plans(study):
-    """Plans on random tasks with signatures, a row for each task and number of goals ahead."""
+    """Return the plans on random tasks with their signatures.
+
+    ``ahead`` is the number of goals ahead at the first movement, and ``h`` the number of them that
+    the planner sees.
+    """
     plans = study.runs[(study.runs.method == PLANNER) & study.runs.family.notna()]
     return plans.assign(
         ahead=plans.goals - 1,
@@ -36,9 +40,10 @@ def measure_plans(study):
 
 
 def average(plans):
-    """Means over the repeats of a task, a row for each task and step, with gaps as shares.
+    """Return means over the repeats of a plan, with a row for each task and step.
 
-    ``gain``: of the last goal in view. ``ahead``: goals ahead at the first movement.
+    Gaps are shares. ``gain`` is the gain of the last goal in view. ``ahead`` is the number of goals
+    ahead at the first movement.
     """
     keys = ["task", "family", "goals", "ahead", "h"]
     plans = plans.groupby(keys, sort=False)[["gap", *SIGNATURES]].mean().reset_index()
@@ -51,7 +56,7 @@ def average(plans):
 
 
 def tabulate(plans):
-    """Gap by goals ahead and what the last of them gains, over all tasks and by number of goals."""
+    """Tabulate gaps and gains by goals ahead, over all tasks and by the number of goals."""
     count = plans.goals.map(lambda goals: str(goals) if goals <= 5 else "6 or more")
     by_goals = plans.assign(group="goals", value=count).sort_values("value", kind="stable")
     every = pd.concat([plans.assign(group="all", value="all"), by_goals])
@@ -61,8 +66,11 @@ def tabulate(plans):
 
 
 def tabulate_movements(gains):
-    """Tabulate the gain of the last goal in view, in per cent of a movement that has it ahead, over
-    all tasks that have it, by number of goals, and over tasks with five goals or more."""
+    """Tabulate the gain of the last goal in view, for each movement that has it ahead.
+
+    The gain is in per cent of a movement. Rows are for all tasks that have this goal, for each
+    number of goals, and for tasks with five goals or more.
+    """
     h = gains.h[(gains.h > 0) & (gains.h <= 4)].astype(int)
     gain = 100 * gains.gain * gains.goals / (gains.goals - h)
     gains = gains.loc[h.index].assign(h=h, gain=gain)
@@ -77,7 +85,11 @@ def tabulate_movements(gains):
 
 
 def tabulate_signatures(plans):
-    """Signatures of coarticulation by goals ahead where more follow, and what all goals add."""
+    """Tabulate signatures of coarticulation by goals ahead.
+
+    Plans that already see all goals count only in the rows ``all``. ``to_come`` is what seeing all
+    goals adds to the signature.
+    """
     plans, rows = plans[plans.step != "5+"], []
     for name, signature in SIGNATURES.items():
         plans = plans.assign(signature=name, words=signature.words, here=plans[name])
@@ -110,7 +122,7 @@ def judge_claims(study, plans):
 
 @figures.styled
 def draw(table):
-    """Gap by goals ahead, a line for each number of goals."""
+    """Draw the gap by goals ahead, with a line for each number of goals."""
     figure, (axes,) = figures.panels((1, 1), (figures.ONE, 2.6))
     rows = table[(table.group == "goals") & (table.h != "5+")]
     rows = rows[(rows.h != "all") | (rows.value == "6 or more")]

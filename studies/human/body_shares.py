@@ -1,12 +1,12 @@
-"""Finding body-shares: what of the body varies at the first goal if the second one does.
+"""Measure finding body-shares: which parts of the body vary at the first goal with the second goal.
 
     python studies/human/body_shares.py
 
-People's hip, shoulder and elbow vary in the reach to a first target with the place of a second one.
-Tasks ascending and descending of the shipped suite ``comparison`` have the first goal in common and
-no other. Compared are mean postures at this goal: the base for the hip, the first joint of the arm
-for the shoulder, the second for the elbow. The unit of inference is the run. Writes body.csv, which
-study.py joins with the other effects.
+When people reach to a first target, their hip, shoulder and elbow vary with the position of the
+second target. Tasks ascending and descending of the shipped suite ``comparison`` share their first
+goal, and no other goal. This script compares mean postures at the first goal: the base stands for
+the hip, the first joint of the arm for the shoulder, and the second joint for the elbow. The unit
+of inference is the run. The script writes body.csv, which study.py joins with the other effects.
 """
 
 from pathlib import Path
@@ -21,8 +21,10 @@ TASKS, NAME = ("ascending", "descending"), "body-shares"
 
 
 def postures(study, model):
-    """Return the configurations at goal 1 on both tasks, shape ``(runs, dof)`` each; empty for a
-    model that did not run there."""
+    """Return a model's configurations at goal 1 on both tasks, shape ``(runs, dof)`` each.
+
+    The list is empty if the model did not run on both tasks.
+    """
     method = MODELS[model]["method"] or "dual-process/EC1"
     if any((task, method) not in study.cells for task in TASKS):
         return []
@@ -30,14 +32,17 @@ def postures(study, model):
 
 
 def differences(groups, joints):
-    """Return the length of the difference of mean postures in these joints."""
+    """Return the distance between the mean postures of two groups, in some joints."""
     first, second = (group[:, joints].mean(axis=0) for group in groups)
     return float(np.linalg.norm(first - second))
 
 
 def with_interval(sides, joints, level):
-    """Return the difference of one model, or less that of another, with percentiles of resampled
-    runs; without an interval where a model has a single run."""
+    """Return the difference of a model, or its excess over that of a second model, with interval.
+
+    The ends of the interval are percentiles of a bootstrap of runs. If each group has a single run,
+    both ends are equal to the value.
+    """
 
     def statistic(drawn):
         first, *second = (differences(groups, joints) for groups in drawn)
@@ -54,7 +59,7 @@ def with_interval(sides, joints, level):
 
 
 def measure_body(study):
-    """Return rows of the effects for this finding, as :func:`study.measure_effects` does."""
+    """Return the effects of this finding, as :func:`study.tabulate_effects` does."""
     robot = study.tasks[TASKS[0]].robot
     arm = np.arange(robot.dof)[robot.joints("right")]
     groups = {"base": [0, 1], "shoulder": arm[:1], "elbow": arm[1:2]}

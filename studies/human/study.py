@@ -1,10 +1,10 @@
-"""Do the models behave like people?
+"""Compare the models with findings on people.
 
     coartic run studies/human/suite.toml
     PYTHONPATH=studies python studies/human/study.py results/human
 
-human.toml has the findings, in place of claims, the models and how verdicts are made; measures.py
-what is measured.
+File human.toml has the findings (in place of claims), the models, and the rules for verdicts. File
+measures.py has the measures.
 """
 
 import json
@@ -28,8 +28,9 @@ from common.writing import write_study
 HERE = Path(__file__).parent
 FINDINGS = tomllib.loads((HERE / "human.toml").read_text("utf-8"))
 GROUPS, MODELS, FURTHER = (FINDINGS.pop(key) for key in ("groups", "models", "further"))
-"""The findings by id, in the order of the table; groups of models by name; models that are compared
-with people, and further ones that measures need, by name: methods with their parameters."""
+"""Findings by id, in the order of the table; groups of models by name; and models by name, as
+methods with their parameters: those that are compared with people, and further ones that measures
+need."""
 SEARCH = "random search"
 OF_TWO_ARMS = {"first movement against isolated reach", "near-tie repeats"}
 """Measures on tasks for two arms, where random search can have other hands than a model."""
@@ -53,12 +54,16 @@ MARKS = {
 
 
 def tidy(study):
-    """The solved runs of all models, a row each, in the order of the suite.
+    """Return the solved runs of all models, in the order of the suite, with a row for each run.
 
-    ``model``; ``task`` with its ``arms`` and ``goals`` (their numbers) and its ``best`` reward of
-    any run; ``moved``, the number of the goal that was moved, to ``place`` (its y, length unit) in
-    the task ``origin``, or 0; the planner's ``horizon``; ``hands``; ``path``, the movement tick by
-    tick.
+    Columns:
+
+    - ``model``;
+    - ``task``, with the number of its ``arms`` and ``goals``, and the ``best`` reward of any run;
+    - ``origin``: the task without a moved goal; ``moved``: the number of the goal that was moved
+      (0 for none); ``place``: its new y (in length units);
+    - ``horizon`` of a planner;
+    - ``hands``; ``path``: the movement tick by tick.
     """
     solved = study.runs[study.runs.status == "ok"]
     best = solved.groupby("task").reward.max()
@@ -81,8 +86,10 @@ def tidy(study):
 
 
 def models_of(task, method, parameters):
-    """Return the names of the models whose runs of a task are those of a method with all its
-    ``parameters``, defaults included."""
+    """Return the names of the models for which a method with its parameters stands on a task.
+
+    ``parameters`` has all parameters of the method, including defaults.
+    """
     learner = f"dual-process/EC{4 if len(task.hands) > 1 else 1}"
     given = parameters | {"hands": parameters.get("hands") or ""}
     return [
@@ -94,8 +101,11 @@ def models_of(task, method, parameters):
 
 
 def of_control(runs, model, measure):
-    """Return a measure of two arms by task for the control of a model: random search with the hands
-    of each of its runs; of the choice of hands, random search with every hand sequence."""
+    """Return a measure on tasks for two arms for the control of a model, by task.
+
+    The control is random search with the hands of each of the model's runs. For the choice of
+    hands, it is random search with every hand sequence.
+    """
     if measure == "near-tie repeats":
         return MEASURES[measure][0](runs, "random search, every hand sequence")
     search = "random search by hands"
@@ -105,8 +115,10 @@ def of_control(runs, model, measure):
 
 
 def measure_effects(study):
-    """Return the effects (:func:`tabulate_effects`), and the values that they are statistics of, by
-    measure, model and task (``sample``: ``model`` or ``control``)."""
+    """Return the effects (:func:`tabulate_effects`), and the values from which they are computed.
+
+    The values are by measure, model and task. Column ``sample`` is ``model`` or ``control``.
+    """
     runs, used = tidy(study), {}
     of_model = cache(lambda measure, model: MEASURES[measure][0](runs, model))
 
@@ -126,13 +138,17 @@ def measure_effects(study):
 
 
 def tabulate_effects(findings, judge):
-    """Return the effects, a row for each finding, model and test, in their order. ``judge``:
-    function of model, test, level and why the model is silent that returns the columns of a test.
+    """Return the effects, with a row for each finding, model and test, in their order.
 
-    ``value`` with its interval, of ``tasks``; ``over_random_search``: by how much it exceeds that
-    of random search; ``of_test``, the verdict of the test,
-    and ``verdict``, that of the finding; ``built_in``: it follows from how the model is built;
-    ``because``: why a model is silent, or does not agree though its interval is beyond the bound.
+    ``judge`` is a function of model, test, level and a reason why the model is silent (or empty).
+    It returns the columns of a test. The columns of the effects are
+
+    - ``value`` with its interval, and the number of ``tasks``;
+    - ``over_random_search``: by how much the value exceeds that of random search;
+    - ``of_test``: the verdict of the test; ``verdict``: the verdict of the finding;
+    - ``built_in``: True if the verdict follows from how the model is built;
+    - ``because``: why a model is silent, or why it does not agree although its interval is beyond
+      the bound.
     """
     rows = []
     for name in findings:
@@ -152,14 +168,19 @@ def tabulate_effects(findings, judge):
 
 
 def by_model(words):
-    """Return words by model; ``words`` has them by model or by group of models (:data:`GROUPS`)."""
+    """Return words by model.
+
+    ``words`` has them by model, or by group of models (:data:`GROUPS`).
+    """
     return {model: text for name, text in words.items() for model in GROUPS.get(name, [name])}
 
 
 def judge_test(measured, model, test, level, silent):
-    """Apply one test of a finding to a model; return its columns (:func:`columns_of`).
-    ``measured``: function of measure and model that returns values of the model and its control;
-    ``level``: of the interval, two-sided; ``silent``: why nothing follows for the model, or empty.
+    """Apply one test of a finding to a model, and return the columns of the test.
+
+    ``measured`` is a function of a measure and a model that returns the values of the model and of
+    its control. ``level`` is 1 less the coverage of the interval. ``silent`` says why nothing
+    follows for the model, or is empty.
     """
     statistic = MEASURES[test["measure"]][1]
     values, control = (pd.Series(), pd.Series()) if silent else measured(test["measure"], model)
@@ -181,10 +202,12 @@ def columns_of(test, seen, over, tasks, verdict, because):
 
 
 def decide(test, seen, over, tasks, silent):
-    """Return the verdict of a test, and why a model is silent or does not agree. One rule for all
-    models: agreement has to lie beyond the bound, and to exceed random search where it can be
-    measured (``over``: by how much).
-    ``silent``: why nothing follows, or empty."""
+    """Return the verdict of a test, and why a model is silent or does not agree.
+
+    The rule is the same for all models. A model agrees if its interval lies beyond the bound, and
+    if its value exceeds that of random search where this is measured. ``over`` is this excess with
+    its interval. ``silent`` says why nothing follows for the model, or is empty.
+    """
     side, word = (1, "above") if "above" in test else (-1, "below")
     near, far = sorted([side * seen.low, side * seen.high])
     agrees, disagrees = near > side * test[word], far < side * test.get("disagree", test[word])
@@ -198,12 +221,14 @@ def decide(test, seen, over, tasks, silent):
 
 
 def bootstrap(sides, statistic, level):
-    """Return a statistic of all tasks with its interval over tasks, and their number.
+    """Return a statistic of all tasks with its interval for other tasks, and the number of tasks.
 
-    ``sides``: values by task; of two, the statistic of the first less that of the second, on the
-    tasks that both have. ``level``: error of the interval, two-sided. Percentiles, wider by √(k /
-    (k − 1)) for k tasks, by which resamples fall short of the spread. NaN without tasks, and
-    without an interval of one.
+    ``sides`` has values by task. With two sides, the result is the statistic of the first less that
+    of the second, on the tasks that both have. ``level`` is 1 less the coverage of the interval.
+
+    The ends of the interval are percentiles of resamples of tasks. The interval is widened by
+    √(k / (k − 1)) for k tasks, because resamples underestimate the spread by this factor. The value
+    is NaN without tasks. There is no interval with a single task.
     """
     value, count, values = resampled(sides, statistic)
     if count < 2:
@@ -212,8 +237,11 @@ def bootstrap(sides, statistic, level):
 
 
 def resampled(sides, statistic):
-    """Return a statistic of all tasks, their number, and the statistic of resamples of tasks, moved
-    away from the former by √(k / (k − 1)); none with fewer than two tasks (:func:`bootstrap`)."""
+    """Return a statistic of all tasks, the number k of tasks, and the statistic of resamples.
+
+    The distances of resampled statistics from the first are multiplied by √(k / (k − 1)). There are
+    no resamples with fewer than two tasks (:func:`bootstrap`).
+    """
     tasks = [task for task in sides[0].index.unique() if all(task in side.index for side in sides)]
     rows = [[pd.DataFrame(side).loc[[task]].to_numpy() for task in tasks] for side in sides]
     count = len(tasks)
@@ -232,25 +260,32 @@ def resampled(sides, statistic):
 
 
 def verdict_of(tests):
-    """Return the verdict of a finding from the verdicts of its tests: the common one if all are
-    alike, else ``disagrees`` or ``no cases`` if a test has it, else ``undecided``."""
+    """Return the verdict of a finding from the verdicts of its tests.
+
+    It is the verdict of the tests if all are the same; otherwise ``disagrees`` if a test has this
+    verdict; otherwise ``no cases`` if a test has this verdict; otherwise ``undecided``.
+    """
     if len(set(tests)) == 1:
         return tests[0]
     return next((kind for kind in ("disagrees", "no cases") if kind in tests), "undecided")
 
 
 def p_of_side(values, bound, side):
-    """Return p, two-sided, that a statistic lies beyond a bound: above for ``side`` 1, below for
-    -1. ``values``: those of resamples."""
+    """Return the two-sided p of the test that a statistic lies beyond a bound.
+
+    ``side`` is 1 for above and -1 for below. ``values`` has the statistic of resamples.
+    """
     return min(1.0, 2 * (1 + (side * (values - bound) <= 0).sum()) / (1 + len(values)))
 
 
 def p_of_test(row, test, values):
-    """Return p of a test's verdict: of agreement the larger one of both that it needs, beyond the
-    bound and beyond random search. ``row``: its effect; ``values``: a frame by task for ``model``
-    and ``control``."""
+    """Return p of the verdict of a test.
+
+    Agreement needs two tests: beyond the bound, and beyond random search. Its p is the larger one.
+    ``row`` is the effect, and ``values`` has a frame by task for ``model`` and for ``control``.
+    """
     side, word = (1, "above") if "above" in test else (-1, "below")
-    if row.finding == "body-shares":  # of which only intervals ship
+    if row.finding == "body-shares":  # only its intervals are stored
         z = stats.norm.ppf(1 - LEVEL / len(FINDINGS["body-shares"]["tests"]) / 2)
         p = 0.0
         for name, bound in (("value", test[word]), ("over_random_search", 0)):
@@ -268,11 +303,12 @@ def p_of_test(row, test, values):
 
 
 def correct(effects, values):
-    """Return the verdicts of models on findings, corrected over all of them (Holm): a row for each
-    pair, with ``tasks``, ``uncorrected`` verdict, ``p`` of it, ``p_holm`` and ``verdict``.
+    """Return the verdicts of models on findings, corrected over all verdicts (Holm).
 
-    Tests of one finding are corrected by Bonferroni, as their intervals are. Verdicts that follow
-    from how a model is built stay. ``values``: table ``runs``.
+    There is a row for each pair of finding and model, with ``tasks``, the ``uncorrected`` verdict
+    and its ``p``, ``p_holm`` and the corrected ``verdict``. Tests of one finding are corrected by
+    Bonferroni, as their intervals are. Verdicts that follow from how a model is built are not
+    changed. ``values`` is table ``runs``.
     """
     rows = {}
     for (finding, model), tests in effects.groupby(["finding", "model"], sort=False):
@@ -302,7 +338,10 @@ def correct(effects, values):
 
 
 def tabulate(verdicts):
-    """Verdicts of models on findings; a star: it follows from how the model is built."""
+    """Tabulate the verdicts of models on findings.
+
+    A star marks verdicts that follow from how the model is built.
+    """
     cells = verdicts.set_index(["finding", "model"])
     words = cells.verdict + cells.built_in.map({True: " *", False: ""})
     table = pd.DataFrame({name: words[:, name] for name in MODELS}).add_prefix("of ")
@@ -313,7 +352,10 @@ def tabulate(verdicts):
 
 @figures.styled
 def draw(table):
-    """A grid with a mark for each verdict, circled where it follows from how the model is built."""
+    """Draw a grid with a mark for each verdict.
+
+    Marks of verdicts that follow from how the model is built have a circle.
+    """
     figure, (axes,) = figures.panels((1, 1), (figures.TWO, 4.6))
     models = table.drop(columns="finding").rename(columns=lambda name: name.removeprefix("of "))
     for (y, x), verdict in np.ndenumerate(models):
@@ -334,15 +376,17 @@ def draw(table):
 
 
 def measure(study):
-    """Return the tables by name; each becomes a CSV file. ``runs`` has values by task; verdicts are
-    also on finding body-shares."""
+    """Return the tables by name; each becomes a CSV file.
+
+    Table ``runs`` has values by task. The verdicts include those on finding body-shares.
+    """
     effects, values = measure_effects(study)
     values = values.set_index("measure")
     return {**judge_all(effects, values), "effects": effects, "runs": values}
 
 
 def judge_all(effects, values):
-    """Return the tables of verdicts by name, those on finding body-shares among them."""
+    """Return the tables of verdicts by name, including verdicts on finding body-shares."""
     body = pd.read_csv(HERE / "body.csv", index_col=0)
     verdicts = correct(pd.concat([effects, body]), values)
     same = on_the_same_tasks(values, "slope norm at distance 2", "all goals ahead")
@@ -375,7 +419,10 @@ def tabulate_power(effects, judged):
 
 
 def on_the_same_tasks(values, measure, model):
-    """Return a measure of each model that has it on all tasks of ``model``, on these tasks."""
+    """Return a measure of each model on the tasks on which ``model`` has it.
+
+    Models without the measure on one of these tasks are left out.
+    """
     of = values[(values.index == measure) & (values["sample"] == "model")]
     tasks = of.task[of.model == model].unique()
     rows = {}

@@ -1,4 +1,4 @@
-"""Gain and signatures of each task, method, number of trials and dose of memory, over runs."""
+"""Compute mean gains and signatures for each task, method, number of trials and dose of memory."""
 
 import pandas as pd
 
@@ -40,11 +40,12 @@ def measure_runs(study):
 
 
 def measure_cells(runs):
-    """Return means over runs, a row for each task, method, number of trials, and for random search
-    number of stages and what is kept.
+    """Return means over runs, with a row for each task, method and number of trials.
 
-    Random search has a mean for each hand sequence of the learner, weighted by the learner's runs;
-    rows of the learner with 10,000 trials have the runs with these hands alone (``compared``).
+    Random search has a row for each number of stages and each content of memory (``postures`` or
+    ``targets``). Its mean is a mean over the hand sequences of the learner, weighted by the numbers
+    of the learner's runs. Row ``compared`` is the learner with 10,000 trials, only with its runs
+    that have these hands.
     """
     rows, measures = [], [*MEASURES]
     for (group, task), of_task in runs.groupby(["group", "task"], sort=False):
@@ -72,7 +73,7 @@ def measure_cells(runs):
 
 
 def groups_of(cells, measure):
-    """Return the families that have a measure, by group: all of them, and each alone."""
+    """Return lists of the families that have a measure: all of them, and each by itself."""
     there = cells[cells.task.str.contains("/") & cells[measure].notna()]
     there = there[there[measure].groupby(there.group).transform("any")]  # 0 with one arm
     families = [*dict.fromkeys(there.group)]

@@ -1,4 +1,4 @@
-"""Signatures of each method where the learner gains as much, and what is left out."""
+"""Compare the signatures of each method with the learner's at the same gain."""
 
 import numpy as np
 import pandas as pd
@@ -9,11 +9,13 @@ from coartic.estimates import Estimate
 
 
 def at_equal_gain(cells):
-    """Return each cell's signatures next to the learner's where the learner gains as much,
-    interpolated over its numbers of trials, with 0 at gain 0.
+    """Return the signatures of each cell, and those of the learner at the same gain.
 
-    A row for each cell of another method: signatures, those of the learner in columns that begin
-    with ``learner``, and ``status``: ``compared``, ``gain below 0`` or ``beyond the learner``."""
+    The learner's signatures are interpolated between its numbers of trials, and are 0 at gain 0.
+    There is a row for each cell of another method. The learner's signatures are in columns that
+    begin with ``learner``. Column ``status`` is ``compared``, ``gain below 0`` or ``beyond the
+    learner``.
+    """
     signatures = [name for name in MEASURES if name != "gain"]
     rows = []
     for _, of_task in cells.groupby("task", sort=False):
@@ -32,9 +34,11 @@ def at_equal_gain(cells):
 
 
 def tabulate_equal(cells):
-    """Tabulate what is left of each method's signatures at the learner's gain: the difference, and
-    the ratio of means, with tasks resampled within families, which weigh the same; and what is left
-    out."""
+    """Tabulate how each method's signatures differ from the learner's at the same gain.
+
+    The table has the difference and the ratio of means, and the numbers of cells that could not be
+    compared. Intervals resample tasks within families. All families have the same weight.
+    """
     equal, rows = at_equal_gain(cells[cells.task.str.contains("/")]), {}
     keys = ["name", "stages"]
     for group, of_group in (("all", equal), *equal.groupby("group", sort=False)):

@@ -2,9 +2,9 @@
 
     python studies/memory/hands.py results/memory-hands
 
-runs suite hands.toml, then random search with the hands in which each run of the learner ends, and
-writes hands.csv.xz, a row for each run, and hands.csv, a row for each family. What is done is not
-done again. It takes about half an hour of one core.
+runs suite hands.toml, and then random search with the final hands of each run of the learner. It
+writes hands.csv.xz, with a row for each run, and hands.csv, with a row for each family. Stored runs
+are not made again. All takes about half an hour on one core.
 """
 
 import sys
@@ -28,11 +28,11 @@ CELLS = {
     "hill-climbing begin=best": "centres",
     "hill-climbing": "as shipped",
 }
-"""Cells of the suite by label; a fourth, ``given``, has the hands of cell ``table``."""
+"""Names of the suite's cells by label. A fourth cell, ``given``, has the hands of ``table``."""
 
 
 def run_given(task, hands, seed):
-    """Return the reward of random search with given hands and as many stages as trials."""
+    """Return the best reward of random search with fixed hands and as many stages as trials."""
     method = RandomSearch(RandomSearch.Parameters(trials=TRIALS, stages=TRIALS, hands=hands))
     session = Session(load_task(task), seed, RandomSearch.information)
     method.solve(session)
@@ -40,7 +40,10 @@ def run_given(task, hands, seed):
 
 
 def given(learner, folder):
-    """Return the runs with the learner's hands, of each task from its file, or made now."""
+    """Return the runs of cell ``given``, with the learner's hands.
+
+    The runs on a task are read from its file in ``folder``. If there is none, they are made.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     tables = []
     for task, of_task in learner.groupby("task", sort=False):
@@ -53,7 +56,7 @@ def given(learner, folder):
 
 
 def measure_runs(folder):
-    """Return the runs of all four cells, a row each."""
+    """Return the runs of all four cells, with a row for each run."""
     runs = load(folder).runs
     runs = runs.assign(cell=runs.label.map(CELLS), family=runs.task.str.partition("/")[0])
     columns = ["family", "task", "cell", "run", "seed", "hands", "reward", "corrective_best"]
@@ -63,8 +66,10 @@ def measure_runs(folder):
 
 
 def two_tests(values):
-    """Return p of the two-sided test of values of tasks, and p without the task that favours their
-    mean most."""
+    """Return p of the two-sided test that the mean over tasks is not 0, with and without a task.
+
+    The second p is without the task that favours the sign of the mean most.
+    """
     test = bootstrap_test(values, 0.0, "two-sided", resamples=RESAMPLES)
     most = (values if test.value > 0 else -values).argmax()
     fewer = bootstrap_test(np.delete(values, most), 0.0, "two-sided", resamples=RESAMPLES)
@@ -72,8 +77,11 @@ def two_tests(values):
 
 
 def tabulate(runs):
-    """Return a row for each family: mean gains (ticks) of each cell, and by how much the table
-    gains more than centres, and than given hands, with tests of the former."""
+    """Tabulate the mean gains (in ticks) of each cell, with a row for each family.
+
+    ``more`` is by how much the table gains more than the centres, with tests. ``over_shipped`` and
+    ``over_given`` compare the table with the other two cells.
+    """
     runs = runs.assign(gain=runs.reward - runs.corrective_best)
     gains = runs.pivot_table("gain", ["family", "task"], "cell")
     rows, tests = {}, []

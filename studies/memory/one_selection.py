@@ -51,8 +51,10 @@ def tabulate(study):
 
 
 def as_much(learner, search):
-    """Return the number of trials at which the learner's mean gain is nearest to random search's,
-    with means of tasks that weigh the same."""
+    """Return the number of trials at which the learner's gain is nearest to random search's.
+
+    Gains are means over tasks, which all have the same weight.
+    """
     gains = learner.groupby(["trials", "task"]).gain.mean().groupby("trials").mean()
     return int((gains - search.groupby("task").gain.mean().mean()).abs().idxmin())
 
@@ -76,8 +78,10 @@ def distance(groups):
 
 
 def excess(ours, theirs):
-    """Return by how much a posture difference exceeds another, with percentiles of resampled
-    runs."""
+    """Return by how much a posture difference exceeds another, with an interval.
+
+    The ends of the interval are percentiles of a bootstrap of runs.
+    """
     rng, groups = np.random.default_rng(0), [*ours, *theirs]
     drawn = [distance(resampled[:2]) - distance(resampled[2:]) for resampled in (
         [group[rng.integers(len(group), size=len(group))] for group in groups]

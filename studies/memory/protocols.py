@@ -1,12 +1,12 @@
-"""Run suite methods.toml, then random search that keeps its best trial ever more often.
+"""Run suite methods.toml, then random search that keeps its best trial more and more often.
 
     python studies/memory/protocols.py results/memory
     python studies/memory/protocols.py results/memory-development d000..d005
 
-runs on the paper's tasks and on instances of five families, i080 to i119 or those that are named.
-Both scales, with postures and with targets kept, have the hand sequences with which a tenth or more
-of the learner's runs end, so that they come after the learner. What is done is not done again.
-It takes some ten CPU hours.
+The tasks are those of the paper and instances of five families: i080 to i119, or those that the
+command names. Random search keeps either postures or targets. It is run with the hand sequences in
+which at least a tenth of the learner's runs end, so it is run after the learner. Stored runs are
+not made again. All takes about ten CPU hours.
 """
 
 import sys
@@ -21,8 +21,11 @@ SUITE, INSTANCES = Path(__file__).with_name("methods.toml"), "i080..i119"
 
 
 def scales(runs):
-    """Return blocks of random search in one part, and in more with postures or targets kept, with
-    the hands of the learner, as often as the learner ran."""
+    """Return blocks of a suite: random search in one stage, and in several stages.
+
+    With several stages, postures or targets are kept. Random search has the hands of the learner,
+    and as many runs.
+    """
     text = ""
     learner = runs[
         runs.method.isin(["dual-process/EC1", "dual-process/EC4"]) & (runs.setting == "")
@@ -40,7 +43,7 @@ def scales(runs):
 def main(folder="results/memory", instances=INSTANCES):
     """Run both parts, one after the other."""
     folder, text = Path(folder), SUITE.read_text("utf-8").replace(INSTANCES, instances)
-    file = folder.with_suffix(".toml")  # the suite, as far as it is known
+    file = folder.with_suffix(".toml")  # the suite with the blocks that are known so far
     file.parent.mkdir(parents=True, exist_ok=True)
     for blocks in (lambda: "", lambda: scales(load(folder).runs)):
         text += blocks()

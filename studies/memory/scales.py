@@ -1,6 +1,6 @@
-"""Scales of memory: random search by the number of its parts, and where the learner is on them.
+"""Compute scales of memory: random search by its number of stages, and the learner's place on them.
 
-Intervals resample tasks within families, which weigh the same.
+Intervals resample tasks within families. All families have the same weight.
 """
 
 import numpy as np
@@ -10,21 +10,26 @@ from cells import KEEPS, MEASURES, groups_of
 from coartic.estimates import Estimate
 
 BOUNDS = {"gain": 5.0, "first": 2.0, "arm": 2.0, "other arm": 0.1}
-"""Differences that count as none, set on development instances before any test instance ran."""
+"""Differences below which means count as equal. They were set on development instances, before any
+test instance was run."""
 STAGES = [1, 2, 4, 10, 30, 100, 1_000]
 MOST = STAGES[-1]
 RESAMPLES = 9_999
 
 
 def weights_of(groups):
-    """Return the weight of each task, by which families weigh the same whatever the number of their
-    tasks. ``groups``: the family of each task."""
+    """Return the weight of each task in a mean in which all families have the same weight.
+
+    ``groups`` has the family of each task.
+    """
     return 1 / groups.groupby(groups).transform("size") / groups.nunique()
 
 
 def drawn(groups):
-    """Return places of tasks in :data:`RESAMPLES` resamples within families, shape ``(resamples,
-    tasks)``. ``groups``: the family of each task, families one after the other."""
+    """Return resamples of tasks within families, as indices of shape ``(RESAMPLES, tasks)``.
+
+    ``groups`` has the family of each task. Tasks of a family must be one after the other.
+    """
     rng, places, start = np.random.default_rng(0), [], 0
     for size in groups.groupby(groups, sort=False).size():
         places.append(start + rng.integers(size, size=(RESAMPLES, size)))
@@ -33,10 +38,12 @@ def drawn(groups):
 
 
 class Scale:
-    """Means of a measure over the stages of random search, for what is kept, and of the learner.
+    """Means of a measure of random search by its number of stages, and of the learner.
 
-    ``table`` has a row for each task that has all of them, a column for each number of stages and
-    ``learner``; ``means`` are their means over tasks, ``resampled`` those of resamples."""
+    Random search keeps postures or targets (``keep``). ``table`` has a column for each number of
+    stages and a column ``learner``, and a row for each task that has all of these values. ``means``
+    are the means over tasks, and ``resampled`` the means over resampled tasks.
+    """
 
     def __init__(self, cells, measure, keep, groups=None):
         of = cells[cells.name.isin([keep, "compared"]) & cells.task.str.contains("/")]
@@ -61,8 +68,11 @@ class Scale:
         return Estimate(self.means[first] - self.means[second], *ends)
 
     def level(self, bound):
-        """Return the least number of stages from which on the 90 % interval of the difference to
-        the largest number stays within ± bound; the largest if it does from nowhere."""
+        """Return the smallest number of stages from which on the measure stays level.
+
+        It stays level if the 90 % interval of the difference from the largest number of stages is
+        within ± bound. If this is the case for no other number, the largest number is returned.
+        """
         least = self.stages[-1]
         for stages in self.stages[-2::-1]:
             of = self.difference(stages, self.stages[-1], 0.9)
@@ -72,8 +82,11 @@ class Scale:
         return least
 
     def place(self):
-        """Return the number of stages at which the mean is the learner's, interpolated over log r,
-        infinite beyond the scale and 1 below it, with its 95 % interval."""
+        """Return the number r of stages at which the mean is the learner's, with a 95 % interval.
+
+        r is interpolated over log r. It is infinite if the learner's mean is above the scale, and 1
+        if it is below the scale.
+        """
         mean, *found = (
             first_crossing(self.stages, values, learner)
             for *values, learner in np.vstack([self.means, self.resampled])
@@ -81,13 +94,13 @@ class Scale:
         return Estimate(mean, *np.quantile(found, [0.025, 0.975], method="inverted_cdf"))
 
     def slopes(self):
-        """Return the slope of each task by log10 of the stages, family as a factor."""
+        """Return the slope of each task on log10 of the number of stages (:meth:`by_task`)."""
         x = np.log10(self.stages)
         x = x - x.mean()
         return self.by_task(self.table[self.stages] @ (x / (x @ x)))
 
     def more(self, first, second):
-        """Return a column less another, a value for each task, family as a factor."""
+        """Return the difference of two columns for each task (:meth:`by_task`)."""
         return self.by_task(self.table[first] - self.table[second])
 
     def median(self, first, second):
@@ -95,18 +108,20 @@ class Scale:
         return float((self.table[first] - self.table[second]).median())
 
     def by_task(self, values):
-        """Return values of tasks whose mean and standard error are those of the mean of families
-        (:func:`by_task`)."""
+        """Return values whose mean and standard error are those of the mean over families.
+
+        See :func:`by_task`.
+        """
         return by_task(values, self.families)
 
 
 def by_task(values, families):
-    """Return values of tasks, shape ``(N,)``, whose mean is the mean over families of their means,
-    and whose standard error is that of this mean.
+    """Return values of tasks whose mean and standard error are those of the mean over families.
 
-    In a mean of F families a task of a family of n tasks has the weight 1 / (F n), and in a mean of
-    N tasks 1 / N. So deviations within a family are multiplied by N / (F n). ``families``: the
-    family of each task.
+    The result has shape ``(N,)`` for N tasks. In a mean over F families, a task has the weight
+    1 / (F n) if its family has n tasks. In a mean over tasks, it has the weight 1 / N. Therefore
+    deviations within a family are multiplied by N / (F n), and by √(n / (n − 1)). ``families`` has
+    the family of each task.
     """
     of_family = values.groupby(families)
     size, means = of_family.transform("size"), of_family.transform("mean")
@@ -115,8 +130,11 @@ def by_task(values, families):
 
 
 def first_crossing(stages, scale, value):
-    """Return the number of stages at which a scale first reaches a value, between stages linear in
-    their logarithm; infinite if it never does."""
+    """Return the number of stages at which a scale first reaches a value.
+
+    It is interpolated linearly over the logarithm of the number of stages. It is infinite if the
+    scale never reaches the value.
+    """
     above = np.flatnonzero(np.asarray(scale) >= value)
     if not len(above):
         return np.inf
@@ -128,8 +146,11 @@ def first_crossing(stages, scale, value):
 
 
 def where(scale, bound):
-    """Return where the learner is: ``level``, ``above`` or ``below`` the largest number of stages
-    by more than the bound, or ``open``."""
+    """Compare the learner with the largest number of stages, by the 90 % interval.
+
+    The result is ``level`` if their difference is within ± bound, ``above`` or ``below`` if it
+    exceeds the bound, and otherwise ``open``.
+    """
     of = scale.difference("learner", scale.stages[-1], 0.9)
     if -bound < of.low <= of.high < bound:
         return "level"
@@ -137,7 +158,7 @@ def where(scale, bound):
 
 
 def every_scale(cells):
-    """Return the scales by measure, group of families and content of memory."""
+    """Return the scales by measure, group of families, and content of memory."""
     return {
         (measure, group, keep): Scale(cells, measure, keep, families)
         for measure in MEASURES
@@ -147,8 +168,11 @@ def every_scale(cells):
 
 
 def tabulate_scales(scales):
-    """Tabulate for each family, content of memory and measure: the trend, the least number of
-    stages at the level, and the learner's place."""
+    """Tabulate facts about each scale.
+
+    They are its trend, the smallest number of stages from which on it is level, and the learner's
+    place.
+    """
     rows = {}
     for (measure, group, keep), scale in scales.items():
         row = {"group": group, "keep": keep, "measure": measure, "tasks": len(scale.table)}
@@ -170,8 +194,10 @@ def tabulate_scales(scales):
 
 
 def tabulate(scales):
-    """Tabulate both scales and the learner: means over tasks, and by how much they exceed random
-    search in one part, by family and over all."""
+    """Tabulate the means of both scales and of the learner, by family and over all families.
+
+    ``*_more`` is by how much a mean exceeds that of random search in one stage.
+    """
     rows = {}
     for (measure, group, keep), scale in scales.items():
         for column, mean in scale.means.items():
@@ -185,8 +211,10 @@ def tabulate(scales):
 
 
 def tabulate_keeping(cells):
-    """Tabulate how much more random search in 1,000 parts gains and shows if it keeps targets in
-    place of postures, by family."""
+    """Tabulate how much measures rise if random search keeps targets instead of postures.
+
+    Random search has 1,000 stages. Rows are by family.
+    """
     rows = {}
     for measure in MEASURES:
         for group, families in groups_of(cells, measure).items():

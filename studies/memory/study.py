@@ -31,7 +31,7 @@ HERE = Path(__file__).parent
 
 
 def judge_claims(cells, scales):
-    """The predictions, as they were registered before any test instance was run."""
+    """Judge the predictions, which were registered before any test instance was run."""
     postures, targets = ({measure: scales[measure, "all", keep] for measure in MEASURES}
                          for keep in KEEPS)  # fmt: skip
     signatures = [measure for measure in MEASURES if measure != "gain"]
@@ -64,8 +64,11 @@ def judge_claims(cells, scales):
 
 @figures.styled
 def draw(results):
-    """Gain and signatures beyond one selection against the number of parts: thick over all
-    families, thin by family; grey: the learner, with its interval."""
+    """Draw gain and signatures, less those of one selection, against the number of stages.
+
+    Thick lines are over all families, thin lines for each family. The learner is grey, with its
+    interval.
+    """
     figure, every = figures.panels((2, 2), (figures.ONE, 3.6))
     looks = dict(zip(KEEPS, (figures.PALETTE[0], figures.PALETTE[1]), strict=True))
     for axes, (measure, label) in zip(every, MEASURES.items(), strict=True):

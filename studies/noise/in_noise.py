@@ -1,7 +1,8 @@
 """Methods that practise with motor noise: CMA-ES, and CMA-ES that measures its uncertainty.
 
-A method file, used by protocols.py. A trial in practice moves to noisy targets, and corrections are
-exact. What a method would do next, without exploration, is stored as its replay.
+This is a method file, which protocols.py uses. The movements of a trial in practice have noisy
+targets; corrections have no noise. The next action of a method, which is what it would do without
+exploration, is stored as its replay.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class NoiseParameters(BanditParameters):
     """Parameters of CMA-ES that practises with motor noise."""
 
     motor_noise: Annotated[float, Field(ge=0, le=1)] = 0.01
-    """Standard deviation of the motor noise of each trial, length unit (base) and rad (joints)."""
+    """Standard deviation of the motor noise, in length units (base) and rad (joints)."""
 
 
 class HandlerParameters(NoiseParameters):
@@ -44,18 +45,19 @@ class NoisyAttempts(Attempts):
         self._misses = np.random.default_rng([session.seed, 1])
 
     def around(self, hands, values):
-        """Make trials whose targets are ``values`` with noise."""
+        """Make trials whose targets are ``values`` plus noise."""
         misses = self._misses.standard_normal(np.shape(values))
         return super().around(hands, values + self._motor_noise * misses)
 
 
 class Watched(Strategy):
-    """CMA-ES with one hand sequence, and where each of its runs, between restarts, has ended."""
+    """CMA-ES with one hand sequence, which notes where each run between restarts has ended."""
 
     def __init__(self, session, attempts, hands, sigma):
         super().__init__(session, attempts, hands, sigma)
         self.ends = []
-        """For each run of CMA-ES the mean cost of its last complete generation, and its mean."""
+        """For each run of CMA-ES, the mean cost and the mean point of its last complete
+        generation."""
         self._before = None
 
     def generation(self):
@@ -70,8 +72,11 @@ class Watched(Strategy):
 
 
 def with_next_action(session, attempts, ends, result):
-    """Return ``result`` with the next action as its replay: movements to the mean, of the means and
-    hands in ``ends``, whose last complete generation has the least mean cost."""
+    """Return ``result`` with the next action as its replay.
+
+    ``ends`` has mean costs, mean points and hands of last generations. The next action moves to the
+    mean point whose generation has the lowest mean cost.
+    """
     _, mean, hands = min(ends, key=lambda end: end[0])
     targets = np.tile(session.q0, (session.goals_count, 1))
     targets[attempts.explored] = mean
@@ -79,14 +84,14 @@ def with_next_action(session, attempts, ends, result):
 
 
 class CMAESInNoise(CMAES):
-    """CMA-ES that is told the cost of noisy trials."""
+    """CMA-ES whose trials have motor noise."""
 
     name = "cma-es/in-noise"
     title = "CMA-ES that practises with motor noise"
     Parameters = NoiseParameters
 
     def solve(self, session: Session) -> Result:
-        """Do as CMA-ES with a bandit over hand sequences, but with noisy trials."""
+        """Solve the task as CMA-ES with a bandit over hand sequences, but with noisy trials."""
         parameters = self.parameters
         attempts = NoisyAttempts(session, parameters.trials, parameters.motor_noise)
         with session.solving():
@@ -102,9 +107,9 @@ class CMAESInNoise(CMAES):
 class CMAESWithHandler(Method):
     """CMA-ES of the package ``cma`` with its noise handler, for one hand sequence.
 
-    The handler evaluates some points again, and raises the number of evaluations of each point, of
-    which the median counts, or the step size, where ranks depend on the noise. Where CMA-ES stops
-    it starts again with twice the population. No generation is begun that may not fit.
+    The handler evaluates some points again. If their ranks depend on the noise, it raises the
+    number of evaluations of each point, whose median counts, or the step size. If CMA-ES stops, it
+    starts again with twice the population. A generation is only begun if enough trials are left.
     """
 
     name = "cma-es/noise-handler"
@@ -118,7 +123,7 @@ class CMAESWithHandler(Method):
     Parameters = HandlerParameters
 
     def solve(self, session: Session) -> Result:
-        """Make generations of trials while one is sure to fit."""
+        """Make generations of trials as long as enough trials are left."""
         parameters = self.parameters
         attempts = NoisyAttempts(session, parameters.trials, parameters.motor_noise)
         first = attempts.run_corrective(parameters.hands)

@@ -1,4 +1,4 @@
-"""Questions 3 and 4: memory with noise, and learning in noise."""
+"""Answer questions 3 and 4: memory with noise, and learning in noise."""
 
 from itertools import combinations
 
@@ -27,7 +27,7 @@ JUDGED = (
 
 
 def _rows(folder):
-    """Return the executions of a folder, with the setting as text."""
+    """Return the executions of a folder, with columns for family and group of tasks."""
     rows = pd.concat([pd.read_csv(path) for path in sorted(folder.glob("*.csv"))])
     family = rows.task.str.partition("/")[0].where(rows.task.str.contains("/"))
     group = np.where(family.isna(), "paper", "families")
@@ -35,17 +35,19 @@ def _rows(folder):
 
 
 def _worst_for_failures(rows, column, keys):
-    """Return a column in which runs with failed executions have the largest value of their
-    ``keys``."""
+    """Return a column in which runs with failed executions have the worst value.
+
+    It is the largest value among the runs with the same values of ``keys``.
+    """
     values = rows[column].where(rows.failures == 0)
     return values.fillna(values.groupby([rows[key] for key in keys]).transform("max"))
 
 
 def read_memory(folder, learner):
-    """Return the ticks of each task, number of stages, what is kept (``keep``) and s (question 3).
+    """Return ticks by task, number of stages, content of memory (``keep``) and noise (question 3).
 
-    Random search has a value for each hand sequence with which the learner ended, and a task's
-    value weighs them as the learner's runs do. ``learner`` are these runs.
+    Random search has a value for each hand sequence in which the learner's runs end. The value of a
+    task is their mean, weighted by the numbers of these runs. ``learner`` has the learner's runs.
     """
     rows = _rows(folder)
     rows["ticks"] = _worst_for_failures(rows, "ticks", ["task", "motor_noise"])
@@ -63,8 +65,11 @@ def read_memory(folder, learner):
 
 
 def tabulate_memory(values, resamples=RESAMPLES):
-    """Return ticks with targets less ticks with postures by group, number of stages and s, and the
-    verdicts at 1,000 stages on the random tasks."""
+    """Return ticks with targets less ticks with postures, and verdicts on this difference.
+
+    Differences are by group, number of stages and noise. Verdicts are for 1,000 stages on the
+    random tasks.
+    """
     wide = values.pivot_table(
         "ticks", ["group", "family", "task", "stages", "motor_noise"], "keep", dropna=False
     ).dropna()
@@ -90,8 +95,9 @@ def tabulate_memory(values, resamples=RESAMPLES):
 def read_learning(folder):
     """Return the executions of question 4 with the gap of each run, in per cent.
 
-    The best reward is that of any run of the study at s = 0 on random tasks, and the best known on
-    the paper's tasks. A run with failed executions has the largest gap of its group.
+    Gaps are to the best reward of any run of the study without noise on random tasks, and to the
+    best known reward on the paper's tasks. A run with failed executions has the largest gap of its
+    group.
     """
     rows = pd.concat([_rows(folder / part) for part in ("learning-executed", "handler-executed")])
     stages = rows.setting.str.extract(r"stages=(\d+)")[0].fillna("")
@@ -108,8 +114,10 @@ def read_learning(folder):
 
 
 def _over_tasks(rows, column):
-    """Return the mean of a column over tasks with its interval: for other tasks if they are random,
-    else for other runs."""
+    """Return the mean of a column over tasks with its interval.
+
+    The interval is for other tasks if the tasks are random, and otherwise for other runs.
+    """
     if rows.group.iloc[0] == "paper":
         return task_mean([of_task.to_numpy() for _, of_task in rows.groupby("task")[column]])
     return other_tasks(
@@ -121,7 +129,7 @@ def _over_tasks(rows, column):
 
 
 def tabulate_learning(rows):
-    """Return mean gaps by group of tasks, method, practice, action and s, and the failures."""
+    """Return mean gaps and failures by group of tasks, method, practice, action and noise."""
     keys, table = ["group", "name", "action", "practice", "motor_noise"], []
     for key, of in rows.groupby(keys, sort=False):
         row = dict(zip(keys, key, strict=True)) | _over_tasks(of, "gap").columns("gap")
@@ -130,8 +138,11 @@ def tabulate_learning(rows):
 
 
 def tabulate_practice(rows, resamples=RESAMPLES):
-    """Return what practice in noise does to each method: its gap, executed at 0.01, less the gap
-    after practice without noise. The p-value is of the mean over random tasks."""
+    """Return how practice in noise changes the gap of each method.
+
+    The change is the gap after practice with noise less the gap after practice without noise, both
+    executed with noise 0.01. The p-value is for the mean over random tasks.
+    """
     rows, table = rows[rows.motor_noise == AFTER], []
     for (group, action, name), of in rows.groupby(["group", "action", "name"], sort=False):
         wide = of.pivot_table("gap", ["family", "task", "run"], "practice", dropna=False)
@@ -147,8 +158,10 @@ def tabulate_practice(rows, resamples=RESAMPLES):
 
 
 def tabulate_learning_pairs(rows, resamples=RESAMPLES):
-    """Return the verdict on each pair of :data:`JUDGED` methods on the random tasks, for each
-    action: practice and execution at 0 before, both at 0.01 after."""
+    """Return the verdict on each pair of :data:`JUDGED` methods on the random tasks, by action.
+
+    *Before* is practice and execution without noise; *after* is both with noise 0.01.
+    """
     tables = []
     for action, of_action in rows[rows.group == "families"].groupby("action"):
         ends = [

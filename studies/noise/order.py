@@ -1,4 +1,4 @@
-"""Question 1: does the order of methods survive motor noise?"""
+"""Answer question 1: does the order of methods survive motor noise?"""
 
 from itertools import combinations
 
@@ -9,7 +9,7 @@ from rules import RESAMPLES, Pair, common, judge
 from coartic.analysis.statistics import other_tasks, task_mean
 
 AFTER = 0.01
-"""Motor noise of the verdicts, rad and length units."""
+"""Motor noise of the verdicts, in rad and length units."""
 NAMES = {
     "dual-process/EC1": "learner",
     "dual-process/EC4": "learner",
@@ -22,24 +22,26 @@ NAMES = {
     "posture-based/two-goals": "posture planning",
     "posture-qp/goals-ahead": "posture QP",
 }
-"""The methods that ship on all 200 random tasks, EC1 on one-armed tasks and EC4 on the others."""
+"""Methods with shipped runs on all 200 random tasks (EC1 on one-armed tasks, EC4 on the others)."""
 OPEN_LOOP = "posture QP"
 HEADLINE = ("CMA-ES", "learner")
 
 
 def is_paper_condition(rows):
-    """Return for each row True unless the learner has the condition of the other number of arms:
-    EC1 is for one-armed tasks, EC4 for the others."""
+    """Return False for rows of the learner whose condition is for another number of arms.
+
+    EC1 is for one-armed tasks, EC4 for the others. The result is True for all other rows.
+    """
     one_arm = rows.task.isin(["ascending", "descending"]) | rows.task.str.startswith("one-armed/")
     return ~(rows.method.str.contains("EC4") & one_arm | rows.method.str.contains("EC1") & ~one_arm)
 
 
 def read(folder):
-    """Return the executions of the methods in :data:`NAMES`, with the gap of each run in per cent
-    of the best known ticks without noise.
+    """Return the executions of the methods in :data:`NAMES`, with the gap of each run.
 
-    A run with failed executions has no mean. Its gap is that of the worst run of any method on any
-    task of the same group under the same noise, so that a method does not win by failing.
+    Gaps are in per cent of the best known ticks without noise. A run with failed executions has no
+    mean. Its gap is that of the worst run of any method on any task of the same group with the same
+    noise, so that a method does not win by failing.
     """
     rows = pd.concat([pd.read_csv(path) for path in sorted(folder.glob("*.csv"))])
     rows = rows[rows.setting.isna() & rows.method.isin(NAMES)].copy()
@@ -55,10 +57,10 @@ def read(folder):
 
 
 def tabulate_gaps(rows):
-    """Return mean gaps with intervals, by group of tasks, method and noise, and the failures.
+    """Return mean gaps with intervals, and failures, by group of tasks, method and noise.
 
-    For random tasks the interval is for other tasks, for the paper's tasks for other runs; methods
-    with one run have none there.
+    Intervals are for other tasks on random tasks, and for other runs on the paper's tasks. On the
+    paper's tasks, methods with one run have no interval.
     """
     keys, table = ["group", "name", "signal_dependent", "motor_noise"], []
     for key, of_level in rows.groupby(keys, sort=False):
@@ -79,8 +81,9 @@ def tabulate_gaps(rows):
 def tabulate_pairs(rows, resamples=RESAMPLES):
     """Return a row for each pair of methods on the random tasks, with its verdict.
 
-    CMA-ES against the learner is judged first and alone; the tests of all other pairs are corrected
-    together. A pair's last verdict is what constant and signal-dependent noise have in common.
+    CMA-ES against the learner is judged first and by itself. The tests of all other pairs are
+    corrected together. The final verdict on a pair is what the verdicts for constant and for
+    signal-dependent noise have in common.
     """
     rows = rows[rows.group == "families"]
     tables = {}
@@ -110,9 +113,12 @@ def tabulate_pairs(rows, resamples=RESAMPLES):
 
 
 def tabulate_families(rows):
-    """Return by how much CMA-ES is ahead of the learner in each family at each level of constant
-    noise: percentage points of gap with an interval for other tasks, the median task, and on how
-    many tasks it is ahead. This is a description: the rules judge all families together."""
+    """Return by how much CMA-ES is ahead of the learner, by family and level of constant noise.
+
+    The table has the lead in percentage points of gap with an interval for other tasks, its median
+    over tasks, and the number of tasks on which CMA-ES is ahead. This is a description: the rules
+    judge all families together.
+    """
     rows, table = rows[(rows.group == "families") & ~rows.signal_dependent], []
     for level, of_level in rows.groupby("motor_noise"):
         gaps = of_level.pivot_table("gap", ["family", "task"], "name")

@@ -2,17 +2,19 @@
 
     python studies/noise/protocols.py results/noise
 
-1. ``order``: the shipped solutions of the suites ``comparison`` and ``families``, executed with
-   motor noise.
-2. ``why``: those of them that move straight, as they aim, to the postures in which they hit, and to
-   these postures moved to the goal's centre.
-3. ``memory``: random search in stages, and the learner whose hands it has; best trials executed.
-4. ``learning``: methods that practise without noise and with it; best trials and next actions
-   executed.
+The script has four parts, one for each question:
 
-Each solution is executed 100 times. The rows of a task are one file. What has its file, or its run
-in a results folder, is not done again, so a run that was interrupted goes on. All of it takes about
-an hour of CPU time.
+1. ``order``: the shipped solutions of the suites ``comparison`` and ``families`` are executed with
+   motor noise.
+2. ``why``: shipped solutions with straight movements are executed with three kinds of targets:
+   their own, the postures in which they hit, and these postures moved to the goal's centre.
+3. ``memory``: the learner is run, then random search in stages with the learner's hands. The best
+   trials of random search are executed.
+4. ``learning``: methods practise without noise and with noise. Their best trials and next actions
+   are executed.
+
+Each solution is executed 100 times. Each task has a file of rows. Existing files and stored runs
+are not made again, so an interrupted command can be repeated. All takes about an hour of CPU time.
 """
 
 import lzma
@@ -28,7 +30,7 @@ from coartic.benchmarks.runner import run_suite
 
 HERE = Path(__file__).parent
 LEVELS = (0.0, 0.002, 0.005, 0.01, 0.02)
-"""Standard deviations of the motor noise, rad and length units."""
+"""Standard deviations of the motor noise, in rad and length units."""
 AFTER = 0.01
 """Motor noise of questions 2 and 4."""
 REPEATS = 100
@@ -40,10 +42,10 @@ STRAIGHT = (
     *("dual-process/EC4-informed", "hill-climbing", "random-search", "cma-es/bandit"),
     "posture-based/two-goals",
 )
-"""Methods of question 2, which aim at configurations and move straight."""
+"""Methods of question 2. They aim at configurations and move straight."""
 STAGES = (1, 2, 4, 10, 30, 100, 1_000)
 COLUMNS = ["task", "method", "setting", "run", "reward", "best_known"]
-"""Columns of runs that their executions have, too."""
+"""Columns of runs that the rows of executions also have."""
 
 
 def shipped(suite, folder):
@@ -58,14 +60,16 @@ def shipped(suite, folder):
 
 
 def seed_of(run_id):
-    """Return the seed with which the solution of a run is executed: the number of its id."""
+    """Return the seed with which the solution of a run is executed: the hash in the run's id."""
     return int(run_id.partition("-")[0], 16)
 
 
 def executions(task, solutions, levels, repeats=REPEATS, kinds=(False, True), **more):
-    """Return a row for each of the solutions, by run id, at each level and kind of noise: mean and
-    standard deviation of the ticks over executions that did not fail, and the number of failures.
-    ``more`` are further columns."""
+    """Execute solutions, and return a row for each solution, level and kind of noise.
+
+    ``solutions`` are by run id. A row has the mean and the standard deviation of the ticks over
+    executions that did not fail, and the number of failures. ``more`` are further columns.
+    """
     seeds, rows = [*map(seed_of, solutions)], []
     for level in levels:
         for dependent in kinds if level else (False,):
@@ -91,8 +95,9 @@ def executions(task, solutions, levels, repeats=REPEATS, kinds=(False, True), **
 def to_postures(task, solution, *, at_centre):
     """Return movements straight to the postures in which a solution hits the goals.
 
-    ``at_centre``: to these postures moved by the corrective process until the hand is at the goal's
-    centre, to its tolerance of 0.01; a posture from which it does not converge stays as it is.
+    With ``at_centre``, the corrective process first moves these postures until the hand is at the
+    centre of the goal, within its tolerance of 0.01. A posture from which it does not converge is
+    not changed.
     """
     made = execute(task, solution)
     movements = []
@@ -108,8 +113,7 @@ def to_postures(task, solution, *, at_centre):
 
 
 def off_centre(task, solution):
-    """Return the median distance from the goal's centre at which a solution's movements aim, in
-    radii."""
+    """Return the median distance of a solution's aims from the centres of the goals, in radii."""
     aims = [
         np.hypot(*task.robot.forward_kinematics(each.target, each.hand) - task.goals[each.goal - 1])
         for each in solution
@@ -119,8 +123,11 @@ def off_centre(task, solution):
 
 
 def by_task(study, folder, methods, rows_of):
-    """Write the rows that ``rows_of(task, solutions)`` makes of the solutions of ``methods``, by
-    run id, a file for each task that has none."""
+    """Write a file of rows for each task that has no file yet.
+
+    ``rows_of(task, solutions)`` makes the rows. ``solutions`` has the solutions of the methods for
+    which ``methods`` is True, by run id.
+    """
     runs, movements = study.runs[study.runs.method.map(methods)], study.movements()
     folder.mkdir(parents=True, exist_ok=True)
     for name, task in study.tasks.items():
@@ -149,8 +156,12 @@ def execute_order(study, folder, levels=LEVELS, repeats=REPEATS):
 
 
 def execute_why(study, folder, repeats=REPEATS):
-    """Execute straight solutions as they aim (T), to the postures in which they hit (P), and to
-    these postures moved to the goal's centre (C) (question 2)."""
+    """Execute straight solutions with three kinds of targets (question 2).
+
+    - ``T``: the targets of the solution;
+    - ``P``: the postures in which the solution hits the goals;
+    - ``C``: these postures, moved to the centres of the goals.
+    """
 
     def rows_of(task, solutions):
         targets = {
@@ -169,7 +180,7 @@ def execute_why(study, folder, repeats=REPEATS):
 
 
 def run_blocks(name, description, folder, text, method_files=()):
-    """Run the missing runs of a suite with these blocks, and return its study."""
+    """Make the missing runs of a suite with the blocks in ``text``, and return its study."""
     head = f'name = "{name}"\ntitle = "{description}"\ndescription = "{description}"\n'
     file = folder.with_suffix(".toml")
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -186,8 +197,10 @@ def block(tasks, method, **how):
 
 
 def run_memory(folder, instances="i160..i179"):
-    """Run the learner, then random search in stages with the learner's hands, as often, and execute
-    the best trials (question 3)."""
+    """Run the learner and random search in stages, and execute the best trials (question 3).
+
+    Random search has the hands of the learner.
+    """
     tasks = {
         "EC1": ["ascending", "descending", f"one-armed/v1/{instances}"],
         "EC4": [f"two-armed/v1/{instances}"],
@@ -213,8 +226,10 @@ def run_memory(folder, instances="i160..i179"):
 
 
 def run_learning(folder, instances="i160..i169"):
-    """Run methods that practise at both levels of noise, and execute their best trials and next
-    actions (question 4)."""
+    """Run methods that practise without noise and with noise, and execute them (question 4).
+
+    Their best trials and their next actions are executed.
+    """
     noisy = float(np.hypot(0.05, AFTER))
     one_arm = [["ascending", "descending"], [f"one-armed/v1/{instances}"]]
     two_arms = [["two-armed-1", "two-armed-2"]]

@@ -1,4 +1,4 @@
-"""The rules by which study noise judges. They are committed before the runs that they judge.
+"""Define the rules by which study noise judges. They were committed before the judged runs.
 
 Question 1 compares methods in pairs. A pair has a value for each task before (without noise) and
 after (with noise): the gap of the first method less the gap of the second. Three tests say whether
@@ -28,12 +28,12 @@ class Pair(NamedTuple):
 
     @property
     def samples(self):
-        """The values of the three tests: before, after, and after less before."""
+        """Values of the three tests: before, after, and after less before."""
         return self.before, self.after, self.after - self.before
 
 
 def test_mean(values, resamples):
-    """Test, two-sided, whether the mean over tasks is 0."""
+    """Make a two-sided test that the mean over tasks is 0."""
     return bootstrap_test(values, 0.0, "two-sided", resamples=resamples)
 
 
@@ -44,16 +44,17 @@ def without_favourite(values):
 
 
 def verdict(before, after, significant):
-    """Return the verdict on a pair from its two mean differences and which of the three tests are
-    significant.
+    """Return the verdict on a pair of methods.
 
-    - *kept*: both ends are significant and have the same sign; *kept, smaller* or *kept, larger* if
-      the change is significant, too;
-    - *reversed*: both ends are significant and have different signs;
-    - *smaller*: only the end without noise and the change are significant, and the change is
-      against the lead;
-    - *new*: only the end with noise and the change are significant;
-    - *open*: anything else.
+    ``before`` and ``after`` are the mean differences without and with noise. ``significant`` says
+    for before, after and change whether their tests are significant. The verdict is
+
+    - *kept* if before and after are significant and have the same sign (*kept, smaller* or *kept,
+      larger* if the change is significant, too);
+    - *reversed* if before and after are significant and have different signs;
+    - *smaller* if only before and the change are significant, and the lead gets smaller;
+    - *new* if only after and the change are significant;
+    - *open* otherwise.
     """
     at_start, at_end, change = significant
     if at_start and at_end:
@@ -69,8 +70,11 @@ def verdict(before, after, significant):
 
 
 def common(*verdicts):
-    """Return what verdicts on a pair have in common: the verdict if they are equal, *kept* if all
-    of them are kinds of it, else *open*."""
+    """Return what verdicts on a pair have in common.
+
+    It is the verdict itself if all are equal, *kept* if all are kinds of *kept*, and otherwise
+    *open*.
+    """
     if len({*verdicts}) == 1:
         return verdicts[0]
     kinds = {each.partition(",")[0] for each in verdicts}
@@ -78,11 +82,14 @@ def common(*verdicts):
 
 
 def judge(pairs, resamples=RESAMPLES):
-    """Judge pairs of methods, with all their tests corrected over each other (Holm).
+    """Judge pairs of methods, with tests corrected over all pairs (Holm).
 
-    Returns a row for each of ``pairs``, by name: mean differences, the ratio of the leads, three
-    corrected p-values, and three verdicts: ``all_tasks``; ``without``, in which each test lacks the
-    task that favours its mean most; and ``verdict``, what both have in common.
+    Returns a row for each of ``pairs``, by name, with mean differences, the ratio of the leads,
+    three corrected p-values, and three verdicts:
+
+    - ``all_tasks``: the verdict over all tasks;
+    - ``without``: the verdict if each test lacks the task that favours its mean most;
+    - ``verdict``: what both have in common.
     """
     rows = {name: {} for name in pairs}
     for column, reduce in (("all_tasks", np.asarray), ("without", without_favourite)):
@@ -105,12 +112,15 @@ def judge(pairs, resamples=RESAMPLES):
 
 
 def fragile(share, cost):
-    """Return what is fragile, *aim* or *posture*, from two estimates with intervals (question 2):
-    the share of the cost of noise that aiming at the centre saves, and this cost in ticks a task.
+    """Return whether *aim* or *posture* is fragile (question 2).
 
-    The aim is fragile if the whole interval of the share lies above one half, the posture if it
-    lies below, else it is *undecided*. It is *not judged* where the interval of the cost reaches
-    one tick.
+    ``cost`` is the cost of noise in ticks per task. ``share`` is the share of this cost that is
+    saved by aiming at the centres of goals. Both are estimates with intervals. The result is
+
+    - *not judged* if the interval of the cost is not wholly above one tick;
+    - *aim* if the whole interval of the share is above one half;
+    - *posture* if the whole interval of the share is below one half;
+    - *undecided* otherwise.
     """
     if not cost.low > 1.0:
         return "not judged"
@@ -120,11 +130,11 @@ def fragile(share, cost):
 
 
 def judge_levels(values, resamples=RESAMPLES):
-    """Test mean differences at several levels of noise, corrected over each other (question 3).
+    """Test mean differences at several levels of noise, corrected over all levels (question 3).
 
     ``values`` has one value for each task, by level. A row has the mean, corrected p-values with
-    all tasks and without the task that favours the mean most, and the verdict: *more* or *less* if
-    both are significant, else *open*.
+    all tasks and without the task that favours the mean most, and the verdict. The verdict is
+    *more* or *less* if both p-values are significant, and otherwise *open*.
     """
     means = [float(np.mean(each)) for each in values.values()]
     adjusted = [

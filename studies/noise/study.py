@@ -1,11 +1,11 @@
-"""Does the order of methods survive motor noise, and what if they learn in noise?
+"""Measure whether the order of methods survives motor noise, and how methods learn in noise.
 
     python studies/noise/protocols.py results/noise
     PYTHONPATH=studies python studies/noise/study.py results/noise
 
-Against the expected answer to the first question, that CMA-ES keeps a smaller lead over the paper's
-learner: a lead that is as large as without noise, or larger, or reversed, or that cannot be seen.
-README.md has all hypotheses and rules.
+The expected answer to the first question was that CMA-ES keeps a lead over the paper's learner, but
+a smaller one. Against it would be a lead that is as large as without noise, larger, reversed, or
+not significant. README.md has all hypotheses and rules.
 """
 
 import sys
@@ -25,12 +25,14 @@ _KEPT = [
     *("run_id", "task", "method", "setting", "run", "best_known", "motor_noise"),
     *("signal_dependent", "target", "action", "ticks", "failures"),
 ]
-"""Columns of the executions that ship."""
+"""Columns of the stored executions."""
 
 
 def executions_of(folder):
-    """Return all executions of the study, a row for each run, level of noise and kind of target,
-    with the ``question`` that asks for it."""
+    """Return all executions of the study, with a row for each run, level of noise and target.
+
+    Column ``question`` has the question to which the row belongs.
+    """
     parts = {"order": "order", "why": "why"}
     parts |= {"memory-executed": "memory", "learning-executed": "learning"}
     parts |= {"handler-executed": "learning"}
@@ -45,8 +47,11 @@ def executions_of(folder):
 
 
 def with_references(rows):
-    """Return executions whose ``best_known`` is the reference of their gaps: on random tasks of
-    question 4 the best reward without noise of any run of the study."""
+    """Return executions with the reference of their gaps as ``best_known``.
+
+    On random tasks of question 4, the reference is the best reward without noise of any run of the
+    study.
+    """
     learning = (rows.question == "learning") & rows.task.str.contains("/")
     exact = rows[learning & (rows.motor_noise == 0) & (rows.failures == 0)]
     best = -exact.groupby("task").ticks.min()
@@ -81,7 +86,7 @@ def measure(folder):
 
 @figures.styled
 def draw(results):
-    """Draw the gap by motor noise, a panel for each group of tasks."""
+    """Draw the gap by motor noise, with a panel for each group of tasks."""
     figure, panels = figures.panels((1, 2), (figures.TWO, 3.2))
     results = results.reset_index()
     for axes, (group, title) in zip(panels, GROUPS.items(), strict=True):

@@ -1,4 +1,4 @@
-"""Question 2: does noise cost because methods aim at the rim, or because of their postures?"""
+"""Answer question 2: does noise cost ticks because of the aim (at the rim) or of the postures?"""
 
 import numpy as np
 import pandas as pd
@@ -9,12 +9,15 @@ from coartic.estimates import Estimate
 
 RESAMPLES = 9_999
 TENTH = 0.1
-"""Distance from the goal's centre, in radii, up to which a method aims at the centre."""
+"""Largest distance of an aim from the goal's centre (in radii) that counts as at the centre."""
 
 
 def read(folder):
-    """Return the executions of question 2, a row for each run: ticks of each target (T, P, C) at
-    s = 0 and 0.01 (columns ``T0``, ``T1``, ...), NaN where an execution failed."""
+    """Return the executions of question 2, with a row for each run.
+
+    Columns ``T0``, ``T1``, ``P0``, ... have the ticks for each kind of target (T, P, C) without
+    noise (0) and with noise 0.01 (1). They are NaN if an execution failed.
+    """
     rows = pd.concat([pd.read_csv(path) for path in sorted(folder.glob("*.csv"))])
     rows = rows[rows.setting.isna() & is_paper_condition(rows)]
     ticks = rows.ticks.where(rows.failures == 0)
@@ -28,10 +31,11 @@ def read(folder):
 
 
 def interval_of(families, number):
-    """Return the number that ``number`` makes of means of columns, with its 95 % interval.
+    """Return a function of the means of columns over tasks, with its 95 % interval.
 
-    ``families`` has, by family, an array with a row of columns for each task. Tasks are resampled
-    within families, which weigh the same.
+    ``families`` has an array for each family, with a row for each task. ``number`` is a function of
+    the means of the columns. For the interval, tasks are resampled within families. All families
+    have the same weight.
     """
     rng, parts = np.random.default_rng(0), []
     for of_family in families:
@@ -43,8 +47,15 @@ def interval_of(families, number):
 
 
 def tabulate_why(rows):
-    """Return a row for each method: the cost of noise in ticks a task, the share of it that aiming
-    at the centre saves, what aiming elsewhere costs without noise, and the verdict."""
+    """Return a table of the cost of noise by method.
+
+    - ``cost``: cost of noise, in ticks per task;
+    - ``share``: share of this cost that is saved by aiming at the centre; ``share_posture``: share
+      that is saved by aiming at the posture of the hit;
+    - ``centre`` and ``posture``: what these aims cost without noise;
+    - ``cost_centre``: cost of noise if all movements aim at the centre;
+    - ``verdict``: see :func:`rules.fragile`.
+    """
     columns, table = ["T0", "T1", "P0", "P1", "C0", "C1"], {}
     for name, of_method in rows.groupby("name", sort=False):
         made = of_method.dropna(subset=columns)

@@ -1,23 +1,23 @@
-"""Proof that no solution takes fewer ticks: spatial branch and bound over relaxations.
+"""Prove that no solution takes fewer ticks, by spatial branch and bound over relaxations.
 
-Whatever a method does, a solution in which every goal is hit passes through one configuration for
-each goal, moves at most m per tick and pays one further tick for each movement, so that its ticks
-are at least
+Whatever a method does, a solution that hits every goal passes through one configuration for each
+goal. It moves at most m per tick, and takes one further tick for each movement. So the number of
+its ticks is at least
 
-    (shortest path through such configurations) / m + (goals that are moved for).
+    (shortest path through such configurations) / m + (number of goals with a movement).
 
-The path is bounded from below within boxes of link angles by :mod:`relaxation`. Split are, until
-every subproblem is bounded above the ticks that are to be beaten:
+:mod:`relaxation` bounds the path from below within boxes of link angles. Subproblems are split
+until all of them are bounded above the ticks that are to be beaten. A split divides
 
-- an interval of a link angle, in two;
-- a goal whose hand is undecided, into one subproblem for each hand, where that matters more than
-  the angles do, first where it is most wrong;
-- goals that may be hit without a movement, if only their ticks are still missing: into one
-  subproblem for each, in which it is the first such goal.
+- an interval of a link angle in two;
+- a goal whose hand is undecided, into one subproblem for each hand. This is done if the hand
+  matters more than the angles, first at the goal that is most wrong;
+- the goals that may be hit without a movement, if only their ticks are still missing, into one
+  subproblem for each of them, in which it is the first such goal.
 
-The subproblem with the least bound is next, so that the search can end at any time. The proven
-bound is then the least bound of the open subproblems or :func:`speed.least_ticks`, whichever is
-more.
+The subproblem with the smallest bound is split next, so the search can end at any time. The proven
+bound is then the larger one of :func:`speed.least_ticks` and the smallest bound of the open
+subproblems.
 """
 
 import heapq
@@ -34,16 +34,18 @@ from speed import TOLERANCE, least_ticks
 
 from coartic import PAPER, Hand
 
-_FEW_SEQUENCES = 16  # hand sequences that are bounded one by one: few are proven sooner so
-_NEAR = 0.97  # share of the path to be proven from which programmes are solved exactly
-_HAND_FIRST = 0.2  # of a hand's distance from its goal: angles that are less wrong can wait
+_FEW_SEQUENCES = 16  # up to this number, hand sequences are bounded one by one, which is faster
+_NEAR = 0.97  # share of the path to be proven above which programmes are solved exactly
+_HAND_FIRST = (
+    0.2  # a hand is decided first if angles are less wrong than this share of its distance
+)
 
 
 def mergeable(task, hands):
     """Return the goals (0-based) that may be hit without a movement.
 
-    The hand of such a goal may be there already: at the start, or because another hand hits the
-    goal before, or because the two discs overlap.
+    The hand may be in such a goal already: at the start, because another hand hits the previous
+    goal, or because the goal overlaps the previous one.
     """
     first = [hand for hand in task.hands if hands[0] in (hand, None)]
     starts = [task.robot.forward_kinematics(task.q0, hand) for hand in first]
@@ -55,42 +57,43 @@ def mergeable(task, hands):
 
 
 class Subproblem(NamedTuple):
-    """Solutions with these hands, these goals hit without a movement, angles in a box."""
+    """The solutions with some hands, goals that are hit without a movement, and a box of angles."""
 
     hands: tuple[Hand | None, ...]
     """A hand for each goal, None if it is undecided."""
     merged: tuple[int, ...]
     """Goals (0-based) that are hit without a movement."""
     open: tuple[int, ...]
-    """Further goals that may be; all others are not."""
+    """Further goals that may be hit without a movement. All others need a movement."""
     box: np.ndarray
-    """Intervals of the absolute link angles, shape ``(links, 2)``, rad."""
+    """Intervals of the absolute link angles, shape ``(links, 2)``, in rad."""
 
     @property
     def moves(self):
-        """Least number of movements."""
+        """Smallest number of movements."""
         return len(self.hands) - len(self.merged) - len(self.open)
 
 
 class Node(NamedTuple):
-    """A subproblem with its bound, in the order of bounds, then of numbers."""
+    """A subproblem with its bound. Nodes are ordered by their bounds, then by their numbers."""
 
     ticks: float
-    """Bound, before it is rounded up."""
+    """Bound on the ticks, before it is rounded up."""
     number: int
-    """No other node has it."""
+    """Number of the node, which no other node has."""
     length: float
-    """Bound on the path."""
+    """Bound on the length of the path."""
     problem: Subproblem
     relaxed: Relaxed
     lagrangian: Lagrangian
 
 
 def certify(task, ticks, most_nodes=math.inf, most_seconds=math.inf, *, still=False):
-    """Prove that no solution takes fewer than ``ticks``, or as much as can be proven with so many
-    cone programmes or seconds of CPU time; return the :class:`ProofSearch`.
+    """Try to prove that no solution takes fewer than ``ticks``.
 
-    ``still`` holds the arm that is not chosen.
+    The search ends with the proof, or after ``most_nodes`` cone programmes or ``most_seconds`` of
+    CPU time. The function returns the :class:`ProofSearch`, whose ``ticks`` are proven. If
+    ``still``, the idle arm must not move.
     """
     begin, search = time.process_time(), ProofSearch(task, ticks, still)
     while search.ticks < ticks and search.nodes < most_nodes and search.seconds < most_seconds:
@@ -123,28 +126,34 @@ class ProofSearch:
 
     @property
     def ticks(self):
-        """Proven ticks, at most the claimed ones: no solution takes fewer."""
+        """Proven ticks, at most the claimed ones. No solution takes fewer ticks."""
         proven = math.ceil(self.heap[0].ticks - 1e-9) if self.heap else self._claim
         return min(max(self._least, proven), self._claim)
 
     def chains(self, most):
-        """Return hands and configurations of the subproblems of least bound whose hands are
-        decided: starts for solutions."""
+        """Return hands and configurations from which solutions can be searched.
+
+        They are those of the ``most`` subproblems with the smallest bounds whose hands are all
+        decided.
+        """
         decided = (node for node in self.heap if None not in node.problem.hands)
         return [(node.problem.hands, node.relaxed.q) for node in heapq.nsmallest(most, decided)]
 
     def longest(self, moves):
-        """Return the longest path of solutions that take fewer ticks with so many movements."""
+        """Return the longest path of a solution that beats the claim with this many movements."""
         return max(0, self._claim - 1 - moves) * PAPER.step
 
     def branch(self, node):
-        """Split the subproblem of a node that is no longer in the heap into others that together
-        hold every solution in it, and add these."""
+        """Split the subproblem of a node, and add the parts to the heap.
+
+        The parts together contain every solution of the subproblem. The node must not be in the
+        heap any more.
+        """
         problem, q = node.problem, node.relaxed.q
         moves = len(problem.hands) - len(problem.merged)
-        # Bounded but for goals that are hit without a movement.
+        # True if only solutions with goals that are hit without a movement can beat the claim.
         bounded = node.length > self.longest(moves) or moves >= self._claim
-        far = {  # of the nearer hand from the centre of each goal whose hand is undecided
+        far = {  # distance of the nearer hand from each goal whose hand is undecided
             g: min(math.dist(self._task.robot.forward_kinematics(q[g], each), self._task.goals[g])
                    for each in self._hands)
             for g, hand in enumerate(problem.hands) if hand is None
@@ -154,7 +163,7 @@ class ProofSearch:
         if goal is not None and (
             bounded or wrong <= max(_HAND_FIRST * (far[goal] - self._task.radius), 1e-3)
         ):
-            for hand in self._hands:  # the new angles are anywhere on a path of interest
+            for hand in self._hands:  # the new angles can be anywhere on a path of interest
                 hands = (*problem.hands[:goal], hand, *problem.hands[goal + 1 :])
                 root = self.relaxation(hands, problem.merged)
                 of_goal = root.goal_of == goal
@@ -170,17 +179,19 @@ class ProofSearch:
                 self.add(problem._replace(merged=merged, open=problem.open[i + 1 :]), node.length)
         else:
             for box in split(problem.box, node.relaxed):
-                # The parent's Lagrangian may rule a half out, without a programme.
+                # The Lagrangian of the parent may exclude a half without solving a programme.
                 if self.shortfall(node.lagrangian, box, problem.moves) >= 0.0:
                     self.add(problem._replace(box=box), node.length)
 
     def add(self, problem, parent):
-        """Bound a subproblem; add it to the open ones unless no solution in it beats the claimed
-        ticks. ``parent``: bound on the path of the subproblem that it is a part of, or 0."""
+        """Bound a subproblem, and add it to the heap if a solution in it may beat the claim.
+
+        ``parent`` is the bound on the path of the subproblem of which this is a part, or 0.
+        """
         if problem.moves >= self._claim:
             return
         root = self.relaxation(problem.hands, problem.merged)
-        # A gap of a hundredth saves iterations, but may hide the last tick that a proof needs.
+        # A duality gap of 1 % saves iterations, but may hide the last tick that a proof needs.
         is_near = parent > _NEAR * self.longest(problem.moves)
         relaxed = root.solve(problem.box, 1e-5 if is_near else 1e-2)
         self.nodes += 1
@@ -198,5 +209,5 @@ class ProofSearch:
         heapq.heappush(self.heap, node)
 
     def shortfall(self, lagrangian, box, moves):
-        """Return by how much a bound on the path is short of the longest path of interest."""
+        """Return the longest path of interest less the bound on the path in a box."""
         return self.longest(moves) - (lagrangian.bound(box) - TOLERANCE)

@@ -1,13 +1,14 @@
-"""Lower bound on a path from multipliers, whatever their source.
+"""Bound the length of a path from below, with any multipliers.
 
 With any multipliers p_g of the movements, ‖p_g‖ <= 1, and λ_g of the hands at their goals, every
 path obeys
 
-    ‖Δq_g‖ >= p_g · Δq_g   and   0 >= λ_g · (hand_g − goal_g) − radius ‖λ_g‖,
+    ‖Δq_g‖ >= p_g · Δq_g   and   0 >= λ_g · (hand_g − goal_g) − radius ‖λ_g‖.
 
-so that it is at least as long as the least value of the sum of the right sides: a linear term of
-each joint, and for each link ``slope φ + l λ · (cos φ, sin φ)``, whose least value over an interval
-has a closed form. Joints that no link angle stands for change by no more than the path is long.
+So a path is at least as long as the smallest value of the sum of the right sides. The sum has a
+linear term for each joint, and a term ``slope φ + l λ · (cos φ, sin φ)`` for each link, whose
+smallest value over an interval has a closed form. Joints that do not belong to a link angle change
+by at most the length of the path.
 """
 
 import math
@@ -21,9 +22,9 @@ _PARABOLAS = 4  # steps by which an interval's end moves inwards
 
 
 class Lagrangian(NamedTuple):
-    """Lower bound on every path of interest: ``constant`` plus a term of each link angle.
+    """Lower bound on every path of interest: ``constant`` plus a term for each link angle φ.
 
-    The terms are ``slope φ + size cos(φ - towards)``, over the links of a box.
+    The term of a link of a box is ``slope φ + size cos(φ - towards)``.
     """
 
     constant: float
@@ -32,15 +33,16 @@ class Lagrangian(NamedTuple):
     towards: np.ndarray
 
     def bound(self, box):
-        """Return the bound on paths whose link angles are in a box, shape ``(links, 2)``, rad."""
+        """Return the bound on paths with link angles in a box, shape ``(links, 2)``, in rad."""
         return self.constant + float(least(*self[1:], *box.T).sum())
 
     def within(self, box, slack):
-        """Return the part of a box in which no term exceeds its least value by more than ``slack``:
-        other angles are on no path of interest, if the bound is short of the longest by that.
+        """Return the part of a box in which no term exceeds its minimum by more than ``slack``.
 
-        An end moves inwards while a parabola below the term is above that; a term bends by no more
-        than its size. A low end above the high one says that nothing is left.
+        If the bound plus ``slack`` is the longest path of interest, no path of interest has other
+        angles. An end of an interval moves inwards as long as a parabola below the term is above
+        this limit. (The second derivative of a term is at most its size.) If a low end is above the
+        high end, nothing of the box is left.
         """
         limit = least(*self[1:], *box.T) + slack
         inwards = np.array([[1.0], [-1.0]])
@@ -49,8 +51,10 @@ class Lagrangian(NamedTuple):
 
 @numba.vectorize
 def moved_inwards(slope, size, towards, limit, inwards, end):
-    """Return an end of an interval, moved in the direction ``inwards``, 1 or -1, while a parabola
-    below the term is above ``limit``."""
+    """Return an end of an interval, moved as long as a parabola below the term is above ``limit``.
+
+    ``inwards`` is the direction of the movement, 1 or -1.
+    """
     bend = max(size, 1e-12)
     for _ in range(_PARABOLAS):
         excess = slope * end + size * math.cos(end - towards) - limit
@@ -62,10 +66,10 @@ def moved_inwards(slope, size, towards, limit, inwards, end):
 
 @numba.vectorize
 def least(slope, size, towards, low, high):
-    """Return the least value of ``slope φ + size cos(φ - towards)`` from low to high, exactly.
+    """Return the minimum of ``slope φ + size cos(φ - towards)`` over φ from low to high, exactly.
 
-    The term is least at an end or in a valley. Valleys are one turn apart: the first one is the
-    lowest if the slope is upwards, else the last one.
+    The minimum is at an end or in a valley. Valleys are one turn apart. The first valley is the
+    lowest if the slope is positive, otherwise the last one.
     """
     valley = towards + (math.pi - math.asin(min(1.0, max(-1.0, slope / max(size, 1e-300)))))
     if slope >= 0.0:

@@ -1,4 +1,4 @@
-"""A cone programme that CVXPY states once and Clarabel solves, with numbers changed in place."""
+"""Solve a cone programme again and again: CVXPY states it once, and Clarabel solves it."""
 
 import math
 
@@ -8,9 +8,9 @@ import numpy as np
 from scipy import sparse
 
 LARGEST = 1e4
-"""Largest multiplier that is used: rounding is then far below the tolerance of a bound."""
-_PLANTED = 1e6  # more than any number of the programme
-# Any multipliers give a bound: those of the solver need not be exact.
+"""Largest multiplier that is used. Rounding is then far below the tolerance of a bound."""
+_PLANTED = 1e6  # larger than any number of the programme
+# Any multipliers give a bound, so those of the solver need not be exact.
 _SETTINGS = {
     "verbose": False, "max_threads": 1, "presolve_enable": False, "input_sparse_dropzeros": False,
     "tol_feas": 1e-5,
@@ -18,17 +18,17 @@ _SETTINGS = {
 
 
 class Programme:
-    """Canonical data of a problem of CVXPY with one parameter, whose first values are ``values``,
-    in a solver.
+    """Canonical data of a problem of CVXPY with one parameter, in a solver.
 
-    Constraints have the order of the canonical data: equations, inequalities, second-order cones.
-    Each number of the parameter is planted as a number of its own, which shows its places.
+    ``values`` are the first values of the parameter. Constraints must be in the order of the
+    canonical data: equations, inequalities, second-order cones. To find the positions of the
+    parameter's numbers in the data, the data are made once with a unique number for each of them.
     """
 
     def __init__(self, problem, parameter, variables, values):
         parameter.value = _PLANTED + np.arange(values.size, dtype=float).reshape(values.shape)
         data, _, _ = problem.get_problem_data(cp.CLARABEL, canon_backend=cp.SCIPY_CANON_BACKEND)
-        self._places = []  # numbers, places in them, numbers of the parameter there
+        self._places = []  # data, positions in them, and indices of the parameter's numbers there
         for numbers in (data["A"].data, data["b"]):
             places = np.flatnonzero(numbers >= _PLANTED)
             self._places.append((numbers, places, (numbers[places] - _PLANTED).astype(np.intp)))
@@ -52,10 +52,12 @@ class Programme:
         return [numbers for numbers, _, _ in self._places]
 
     def solve(self, values, gap):
-        """Return the values of the variables, and the multipliers of the constraints, two lists,
-        for values of the parameter, up to a duality gap of ``gap``, absolute or relative. If there
-        is no solution, the multipliers are far out on a ray, along which the dual objective grows.
-        If the solver fails, they may be any numbers."""
+        """Return the variables and the multipliers of the constraints, as two lists.
+
+        ``values`` are the values of the parameter, and ``gap`` is the absolute or relative duality
+        gap. If there is no solution, the multipliers are far out on a ray along which the dual
+        objective grows. If the solver fails, the multipliers can be any finite numbers.
+        """
         matrix, right = self._fill(values)
         self._settings.tol_gap_abs = self._settings.tol_gap_rel = gap
         self._solver.update(A=matrix, b=right, settings=self._settings)

@@ -4,8 +4,9 @@
     python studies/optima/prove.py shelf.toml --seconds 20
 
 Tasks are the names of shipped tasks, ranges of instances, or files. Each proof is appended to the
-log as it ends, with a solution if a better one was found on the way. The same command goes on where
-it was stopped: it leaves out what is proven, and what the log has with as many seconds.
+log when it ends, with a solution if a better one was found. A command that was stopped can be
+repeated. It leaves out tasks whose optimum is proven, and tasks that the log has with at least as
+many seconds.
 """
 
 import argparse
@@ -28,14 +29,17 @@ from coartic.tasks.families import named_by
 from coartic.tasks.optima import task_hash
 
 SECONDS = 100
-"""CPU time for each task, some 500 cone programmes a second with five goals."""
+"""CPU time for each task, in s. With five goals, about 500 cone programmes take a second."""
 CHAINS = 20
-"""Open subproblems that better solutions are sought from."""
+"""Number of open subproblems from which better solutions are searched."""
 
 
 def entries_of(name, known, pool):
-    """Return the entries of a task that have a reward, one for each restriction; of a task that
-    does not ship, the entry of the best solution that a search finds, in a process of ``pool``."""
+    """Return the entries of a task that have a reward, one for each restriction.
+
+    If no reward is shipped, a search for the optimum is run in a process of ``pool``, and the entry
+    of its best solution is returned.
+    """
     same = task_hash(load_task(name))
     entries = [entry for entry in known.values() if entry["essence"] == same and "reward" in entry]
     if entries:
@@ -53,14 +57,17 @@ def best_found(name):
 
 
 def distance(entry):
-    """Return the distance of a bound from the reward, a share; infinite without a bound."""
+    """Return the distance of a bound from the reward, as a share; infinite without a bound."""
     bound = entry.get("bound")
     return math.inf if bound is None else (bound - entry["reward"]) / max(-entry["reward"], 1)
 
 
 def prove(entry, seconds):
-    """Return the row of the log on a proof within ``seconds`` of CPU time: bound, nodes, seconds,
-    and a solution if it is better."""
+    """Make a proof within ``seconds`` of CPU time, and return its row of the log.
+
+    The row has the bound, the number of nodes and the seconds, and a solution if a better one was
+    found.
+    """
     task, still = load_task(entry["task"]), entry["other_arm"] == "still"
     restricted = with_locks(task, entry["base"])
     proof = certify(restricted, -entry["reward"], most_seconds=seconds, still=still)
@@ -76,8 +83,11 @@ def prove(entry, seconds):
 
 
 def polished(task, chains, still):
-    """Return the solution of fewest ticks (PlanInTicks) that plans from the starts ``chains`` lead
-    to; None if none does. ``still`` holds the arm that is not chosen."""
+    """Return the solution with the fewest ticks that is found from the starts ``chains``.
+
+    The result is a PlanInTicks, or None if no solution is found. If ``still``, the idle arm must
+    not move.
+    """
     session = Session(task, 0, REWARD_INFORMATION, model=PAPER, trusted=True)
     problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
     try:
@@ -96,8 +106,10 @@ def in_words(row):
 
 
 def prove_all(names, seconds, folder, processes):
-    """Prove bounds for tasks, those nearest to a proof first, log them, and print a sentence for
-    each."""
+    """Prove bounds for tasks, log them, and print a sentence for each.
+
+    Tasks whose bound is nearest to the reward come first.
+    """
     known, done = shipped.read(), set()
     for row in shipped.read_log(folder):
         shipped.take_proof(known, row)

@@ -1,4 +1,4 @@
-"""Shortest path within a box of link angles, relaxed to a programme that is convex.
+"""Relax the shortest path within a box of link angles to a convex programme.
 
 The relaxation is a second-order cone programme over the configurations q_g and, for the chosen arm
 at each goal, the direction u_gk = (c, s) of every link::
@@ -8,11 +8,11 @@ at each goal, the direction u_gk = (c, s) of every link::
           (u_gk, φ_gk) in the half-spaces of its interval,    φ_gk = Σ_(j<=k) q_gj
           Σ_(g in span) d_g >= the path on which a hand covers its distance in this span
 
-The only part that is not convex, u = (cos φ, sin φ), is replaced by half-spaces that hold all
-points (cos φ, sin φ, φ) with φ in its interval; their offsets are exact maxima. The solver's
-multipliers give the bound of :mod:`lagrangian`, which holds for any multipliers; in a box without a
-path they are a ray along which the bound grows. Where the hand of a goal is undecided, either hand
-is within a disc around the middle of the shoulders, and both arms may move.
+The only part that is not convex, u = (cos φ, sin φ), is replaced by half-spaces that contain all
+points (cos φ, sin φ, φ) with φ in its interval. The offsets of the half-spaces are exact maxima.
+The solver's multipliers give the bound of :mod:`lagrangian`, which holds for any multipliers. In a
+box without a path, they are a ray along which the bound grows. If the hand of a goal is undecided,
+either hand is within a disc around the middle of the shoulders, and both arms may move.
 """
 
 import math
@@ -27,37 +27,41 @@ from speed import spans_of
 from coartic.baselines.trajectory_problem import held_joints
 
 HALF_SPACES = 9
-"""Half-spaces of each link."""
+"""Number of half-spaces of each link."""
 _BASE_DOF = 2
-_TOWARDS_POINT = 0.25  # of the way from an interval's middle to the relaxation's angle
+_TOWARDS_POINT = 0.25  # share of the distance from an interval's middle to the relaxation's angle
 
 
 def directions_of(angles):
-    """Return unit vectors of links at absolute angles, rad, shape ``(..., 2)``."""
+    """Return unit vectors of links at absolute angles (in rad), shape ``(..., 2)``."""
     return np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
 class Relaxed(NamedTuple):
-    """Shortest path of the relaxation in a box, and its multipliers; of any values if the box has
-    no path or the solver fails."""
+    """Shortest path of the relaxation in a box, and its multipliers.
+
+    If the box has no path, or if the solver fails, the values can be any numbers.
+    """
 
     q: np.ndarray
     """Configurations, shape ``(G, dof)``."""
     angles: np.ndarray
-    """Absolute angles of the links, shape ``(links,)``, rad."""
+    """Absolute angles of the links, shape ``(links,)``, in rad."""
     wrong: np.ndarray
-    """Error of each link's end against its angle, shape ``(links,)``, length unit."""
+    """Distance between each link's relaxed end and the end at its angle, shape ``(links,)``, in
+    length units."""
     multipliers: tuple
-    """p of the movements, ``(G, dof)``; λ of the hands at their goals, ``(G, 2)``; μ of the spans,
-    ``(spans,)``."""
+    """Multipliers p of the movements, shape ``(G, dof)``, λ of the hands at their goals, shape
+    ``(G, 2)``, and μ of the spans, shape ``(spans,)``."""
 
 
 class Relaxation:
-    """Cone programme of one hand sequence; its parameters are the half-spaces of a box.
+    """Cone programme of one hand sequence. Its parameters are the half-spaces of a box.
 
-    ``merged`` are the goals (from 0) that are hit without a movement; their hands are all decided.
-    ``still`` holds the arm that is not chosen. A box has the absolute link angles of the chosen
-    arms at the goals whose hand is decided, goal by goal, shape ``(links, 2)``, rad.
+    ``merged`` are the goals (from 0) that are hit without a movement; the hands of all goals must
+    then be decided. If ``still``, the idle arm must not move. A box has intervals (in rad) of the
+    absolute link angles of the chosen arms at the goals whose hand is decided, goal by goal, shape
+    ``(links, 2)``.
     """
 
     def __init__(self, task, hands, merged, still):
@@ -81,12 +85,12 @@ class Relaxation:
         for summed, (g, arm, k) in zip(sums, links, strict=True):
             summed[g, arm.first_joint : arm.first_joint + k + 1] = 1.0
         self._sums = sums.reshape(len(links), goals * dof)
-        self._slopes = np.linalg.pinv(self._sums.T).round()  # of joints, as those of angles
+        self._slopes = np.linalg.pinv(self._sums.T).round()  # slopes of joints to slopes of angles
         self._start_angles = self._sums @ np.tile(q0, goals)
         self._programme = None
 
     def first_box(self, longest):
-        """Return intervals that hold every link angle on a path no longer than ``longest``.
+        """Return intervals that contain every link angle on a path no longer than ``longest``.
 
         An absolute angle is a sum of k relative ones, so it changes by at most √k times the
         joint-space distance.
@@ -114,8 +118,10 @@ class Relaxation:
         return cp.Problem(cp.Minimize(cp.sum(distances)), constraints), half_spaces, [q, u]
 
     def solve(self, box, gap=1e-3):
-        """Return the relaxation's shortest path in a box, and multipliers for the box, up to a
-        duality gap of ``gap``, length unit and share."""
+        """Return the relaxation's shortest path in a box, and its multipliers.
+
+        ``gap`` is the duality gap, in length units or as a share.
+        """
         values = half_spaces(box)
         self._programme = self._programme or Programme(*self.state(), values)
         (q, u), (held, speeds, _, pulls, forces, _) = self._programme.solve(values, gap)
@@ -131,12 +137,13 @@ class Relaxation:
         size = min(1.0, LARGEST / max(np.abs(m).max(initial=1.0) for m in (pulls, forces, speeds)))
         pulls, forces, speeds = size * pulls, size * forces, size * np.maximum(speeds, 0.0)
         speeds = speeds / max(1.0, (speeds @ self._spans).max(initial=0.0))
-        # Joints that may move: within the ball that the spans leave. Others: without limit.
+        # Multipliers of joints that may move are within the ball that the spans leave. Those of
+        # other joints have no limit.
         norms = np.linalg.norm(np.where(self.held, 0.0, pulls), axis=1)
         left = np.maximum(1.0 - speeds @ self._spans, 0.0)
         shares = np.minimum(1.0, left / np.maximum(norms, 1e-300))[:, None]
         pulls = np.where(self.held, pulls, shares * pulls)
-        weights = pulls.copy()  # of the joints' changes from the start
+        weights = pulls.copy()  # weights of the joints' changes from the start
         weights[:-1] -= pulls[1:]
         weights[:, :_BASE_DOF] += forces
         slopes = self._slopes @ weights.ravel()
@@ -156,8 +163,8 @@ class Relaxation:
 def disc_of(task, hand):
     """Return the position of the shoulder from the base, and the radius of a goal for a hand.
 
-    For an undecided hand: the middle of the shoulders, and how far it may be from the goal while
-    either hand is within the goal.
+    For an undecided hand, they are the middle of the shoulders, and the largest distance of this
+    middle from the goal at which either hand can be within the goal.
     """
     arms = [task.robot.arm(each) for each in task.hands if hand in (each, None)]
     shoulders = np.array([[arm.shoulder_x, arm.shoulder_y] for arm in arms])
@@ -170,8 +177,11 @@ def disc_of(task, hand):
 
 
 def split(box, relaxed):
-    """Return two halves, across the angle whose direction the relaxation has most wrong; if it has
-    all of them right, across the widest interval."""
+    """Return two halves of a box.
+
+    The box is split at the link whose direction is most wrong in the relaxation. If all directions
+    are right, it is split at the widest interval.
+    """
     wrong, width = relaxed.wrong, box[:, 1] - box[:, 0]
     link = int(np.argmax(wrong if wrong.max() > 1e-7 else width))
     low, high = box[link]
@@ -182,13 +192,15 @@ def split(box, relaxed):
 
 
 def half_spaces(box):
-    """Return coefficients of c, s and φ, and the most of their sum, ``(4, HALF_SPACES, links)``.
+    """Return half-spaces that contain (c, s, φ) of every link with φ in its interval.
 
-    They hold (c, s, φ) of every link in its interval: its ends; the chord; tangents to cosine and
-    sine; the chord of the sine. Any normal is valid: the offsets make it so.
+    The result has the coefficients of c, s and φ, and the maximum of the weighted sum, shape
+    ``(4, HALF_SPACES, links)``. The half-spaces are the ends of the interval, the chord, tangents
+    to cosine and sine, and the chord of the sine. Any normal is valid, because the offsets are
+    exact.
     """
     middle, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
-    # In the interval's own frame, where its middle is the angle zero, and from there.
+    # The rows are in the frame in which the middle of the interval is angle 0.
     zero, one = np.zeros_like(half), np.ones_like(half)
     cosine, sine = directions_of(np.minimum(0.5 * half, math.pi / 2)).T
     slope = np.sin(np.minimum(half, math.pi)) / np.maximum(half, 1e-12)

@@ -1,10 +1,10 @@
-"""Take over better rewards and sharper bounds from results folders into the shipped data.
+"""Copy better rewards and sharper bounds from results folders into the shipped data.
 
     python studies/optima/renew.py results/families results/optima
 
-A folder of ``prove.py`` has proofs, any other one runs. Rewards ship of the paper's tasks, under
-each restriction of the search (``base``, ``other_arm``), and of the first 40 test instances of each
-shipped family.
+A folder of ``prove.py`` has proofs; any other folder has runs. Rewards are shipped for the paper's
+tasks, under each restriction of the search (``base``, ``other_arm``), and for the first 40 test
+instances of each shipped family.
 """
 
 import sys
@@ -19,13 +19,13 @@ from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import task_hash
 
 MOST = 40
-"""Instances of each family."""
+"""Number of instances of each family."""
 MADE_BY = "coartic", "commit", "model_code", "python", "date"
-"""Facts of a folder that entries have."""
+"""Facts about a results folder that entries have."""
 
 
 def ships(task, restriction):
-    """Return whether rewards of a task under a restriction (base, other arm) ship."""
+    """Return True if rewards of a task under a restriction (base, other arm) are shipped."""
     if task.family not in shipped_families():
         return task.name in builtin_tasks()
     is_early = task.split == "test" and int(task.name.rpartition("/i")[2]) < MOST
@@ -33,10 +33,10 @@ def ships(task, restriction):
 
 
 def take_over(study, known):
-    """Take over into ``known`` what the runs of a folder improve; return the number of new entries.
+    """Copy rewards that the runs of a folder improve into ``known``, and return their number.
 
-    The first 500 runs of a method with its parameters on a task count. Raises CoarticError for a
-    solution that does not give its reward on the shipped task of this name.
+    Only the first 500 runs of a method with its parameters on a task count. Raises CoarticError for
+    a solution that does not give its reward on the shipped task of this name.
     """
     solutions, changed = study.movements(), 0
     runs = study.stored[study.stored.run_id.isin(solutions)]
@@ -67,7 +67,7 @@ def take_over(study, known):
 
 
 def main(folders):
-    """Take over what the folders improve."""
+    """Copy improvements of all folders into the shipped data."""
     known = shipped.read()
     try:
         for folder in folders:

@@ -1,7 +1,7 @@
 """Read and write the shipped best known rewards, with their bounds and solutions.
 
-``coartic/tasks/optima.json`` has entries of the paper's tasks, ``best_known.csv`` rows of instances
-of families, whose solutions are in ``solutions.json.xz`` here.
+``coartic/tasks/optima.json`` has entries for the paper's tasks. ``best_known.csv`` has rows for
+instances of families, whose solutions are in ``solutions.json.xz`` in this folder.
 """
 
 import contextlib
@@ -17,16 +17,16 @@ from coartic.tasks.optima import BASE, BEST_KNOWN, DATA, entries
 
 SOLUTIONS = Path(__file__).with_name("solutions.json.xz")
 FREE = (BASE, "free")
-"""Restriction of entries without restriction: base and other arm."""
+"""Base and other arm of entries without a restriction."""
 OUT, LOG = Path("results", "optima"), "proofs.jsonl"
-"""Folder of the log of proofs unless stated otherwise; name of the log."""
+"""Default folder of the log of proofs, and name of the log."""
 _NUMBERS = ("reward", "bound", "nodes")
 _COLUMNS = ("instance", *_NUMBERS, "hands", "essence")
-_DIGITS = 5  # of joints, where this does not change the reward
+_DIGITS = 5  # decimals of joints in a solution, if rounding does not change the reward
 
 
 def read():
-    """Return all entries by task, lock of the base and other arm; rows of instances as well."""
+    """Return all entries, including rows of instances, by task, lock of the base and other arm."""
     known = entries()
     solutions = json.loads(lzma.decompress(SOLUTIONS.read_bytes()))
     with BEST_KNOWN.open(encoding="ascii", newline="") as lines:
@@ -44,7 +44,10 @@ def key_of(entry):
 
 
 def read_log(folder):
-    """Return the rows of a log of proofs; none without a log, nor of a line that was cut off."""
+    """Return the rows of a log of proofs. Lines that were cut off are left out.
+
+    The list is empty if there is no log.
+    """
     rows, log = [], folder / LOG
     for line in log.read_text(encoding="ascii").splitlines() if log.exists() else ():
         with contextlib.suppress(json.JSONDecodeError):
@@ -53,11 +56,10 @@ def read_log(folder):
 
 
 def take_proof(known, row):
-    """Take over a better solution of a logged proof, and its bound if it is sharper; return whether
-    a shipped entry changed.
+    """Copy a better solution and a sharper bound of a logged proof into ``known``.
 
-    Raises CoarticError for a solution that does not give its reward, and for a bound below a
-    reward: one of both must be wrong.
+    Returns True if an entry changed. Raises CoarticError for a solution that does not give its
+    reward, and for a bound below a reward, because one of the two must be wrong.
     """
     entry = known.get(key_of(row), {})
     before = entry.get("reward"), entry.get("bound")
@@ -78,7 +80,7 @@ def take_proof(known, row):
 
 
 def write(known):
-    """Write all entries into the files that they are from."""
+    """Write all entries into their files."""
     ranked = [known[key] for key in sorted(known)]
     rows = [entry | {"instance": entry["task"]} for entry in ranked if "/" in entry["task"]]
     with BEST_KNOWN.open("w", encoding="ascii", newline="") as file:

@@ -1,9 +1,9 @@
-"""Lower bounds on paths and ticks from the speed of the hands, for any number of goals.
+"""Bound paths and ticks from below by the speed of the hands, for any number of goals.
 
-A hand that is in one disc and then in another goes at least the distance of their centres less both
-radii, from the start that of the first goal less one. Its path is no longer than the joint-space
-path times :func:`fastest_hand`, by Cauchy and Schwarz. The sequence of hands that needs least is
-found by dynamic programming over the goal that each hand hit last.
+A hand that hits one goal and then another moves at least by the distance of the goals' centres less
+both radii (from the start: the distance of the first goal less one radius). By the Cauchy-Schwarz
+inequality, its path is no longer than the joint-space path times :func:`fastest_hand`. Dynamic
+programming over the last goal of each hand finds the hand sequence with the smallest bound.
 """
 
 import math
@@ -14,25 +14,25 @@ import numpy as np
 from coartic import PAPER
 
 TOLERANCE = 1e-6
-"""Length by which bounds are lowered, length unit: far more than rounding changes."""
+"""Length (in length units) by which bounds are lowered. It is far larger than rounding errors."""
 
 
 def fastest_hand(task, hand):
-    """Return the largest norm of the hand's Jacobian: its path per joint-space path, length unit.
+    """Return the largest norm of a hand's Jacobian J: the length of its path per joint-space path.
 
     The column of a joint is at right angles to its lever, which is no longer than the links beyond
-    it (Craig 2004); a base that moves has unit vectors as its columns. The square of the norm is
-    the largest eigenvalue of J Jᵀ, and so at most 1, where the base moves at all, plus the sum of
-    the squared levers, which a straight arm at right angles to a free axis has.
+    it (Craig 2004). A base that moves has unit vectors as its columns. The square of the norm is
+    the largest eigenvalue of J Jᵀ. It is at most the sum of the squared levers, plus 1 if the base
+    can move. A straight arm at right angles to a free axis reaches this value.
     """
     levers = np.cumsum(task.robot.arm(hand).links[::-1])
     return math.sqrt((len(task.locked_base) < 2) + float(levers @ levers))
 
 
 def path_between(task, hand, last, goal):
-    """Return the least joint-space path from the goal ``last`` of a hand to another; 0 if None.
+    """Return a lower bound on the joint-space path of a hand from goal ``last`` to ``goal``.
 
-    Goals are counted from 0; -1 is the start.
+    Goals are counted from 0; -1 is the start. The bound is 0 if ``last`` is None.
     """
     if last is None:
         return 0.0
@@ -43,14 +43,14 @@ def path_between(task, hand, last, goal):
 
 
 def soonest(task, hands, last, cost):
-    """Return when the last of these goals is hit at the soonest.
+    """Return the earliest time at which the last of some goals can be hit.
 
-    A goal is hit no earlier than the goal before it, nor than ``cost(hand, last, goal)`` after the
-    goal that the same hand hit last. ``hands``: goals with their hand, None if it is undecided;
-    ``last``: the goal that each hand of the task hit last, -1 at the start, None if it may be
-    anywhere.
+    A goal is hit no earlier than the previous goal, and no earlier than ``cost(hand, last, goal)``
+    after the last goal of the same hand. ``hands`` has pairs of a goal and its hand, or None if the
+    hand is undecided. ``last`` has the last goal of each hand of the task: -1 at the start, and
+    None if the hand may be anywhere.
     """
-    # When each hand hit its last goal, of all that may be the soonest in the end.
+    # Times at which each hand hit its last goal, without those that cannot be the earliest.
     times = {tuple(last.values()): {(0.0,) * len(last)}}
     for goal, decided in hands:
         later = defaultdict(set)
@@ -67,8 +67,10 @@ def soonest(task, hands, last, cost):
 
 
 def efficient(points):
-    """Return the points, tuples of one or two times, that no other point equals or precedes in
-    every time."""
+    """Return the points (tuples of one or two times) that no other point dominates.
+
+    A point dominates another if none of its times is later.
+    """
     kept = []
     for point in sorted(points):
         if not kept or point[-1] < kept[-1][-1]:
@@ -77,9 +79,9 @@ def efficient(points):
 
 
 def least_ticks(task, hands=None):
-    """Return ticks that every solution takes, with the hands that are decided.
+    """Return a lower bound on the ticks of every solution with the hands that are decided.
 
-    A hand that must go takes the ticks of its path, and one for the arrival of a movement.
+    A hand that must move takes the ticks of its path, and one tick for the arrival.
     """
 
     def ticks(hand, last, goal):
@@ -91,11 +93,12 @@ def least_ticks(task, hands=None):
 
 
 def spans_of(task, hands):
-    """Return spans of goals, shape ``(spans, G)``, 1 within and else 0, and the least path within
-    each, length unit.
+    """Return spans of goals, and a lower bound on the path within each span.
 
-    A span ends at a decided goal and begins after the goal that its hand hit before. Spans of the
-    undecided goals at the end begin after the last decided goal, where the other hand is anywhere.
+    Spans have shape ``(spans, G)``: 1 for goals within the span, 0 for others. Bounds are in length
+    units. A span ends at a decided goal, and begins after the last goal that the same hand hit.
+    Spans of undecided goals at the end begin after the last decided goal, at which the other hand
+    may be anywhere.
     """
     goals, last = len(hands), dict.fromkeys(task.hands, -1)
     spans = []  # first and last goal, least path

@@ -2,7 +2,7 @@
 
     PYTHONPATH=studies python studies/optima/study.py results/optima
 
-Tables are of the shipped data and of the effort that the log of ``prove.py`` in the folder has.
+Tables are made from the shipped data, and from the log of ``prove.py`` in the folder (the effort).
 """
 
 import sys
@@ -18,12 +18,14 @@ BOUNDS = {
     "proven": "proven optimal", "within_1": "bound within 1 %", "within_5": "within 5 %",
     "within_20": "within 20 %", "instances": "farther",
 }  # fmt: skip
-"""Columns of the table that the figure shows, each with its label."""
+"""Columns of the table that the figure shows, with their labels."""
 
 
 def distances(folder):
-    """Return the distance of each bound from the best known reward, per cent of it, by task, with
-    the seconds that a folder has on it."""
+    """Return the distance of each bound from the best known reward, by task.
+
+    Distances are in per cent of the reward. ``seconds`` is the CPU time in the log of ``folder``.
+    """
     entries = [entry for key, entry in shipped.read().items() if key[1:] == shipped.FREE]
     bounds = pd.DataFrame(entries).set_index("task")[["hands", "reward", "bound"]]
     bounds["distance"] = 100 * (bounds.bound - bounds.reward) / -bounds.reward
@@ -36,8 +38,10 @@ def distances(folder):
 
 
 def count(bounds):
-    """Return how many bounds are at each distance, and the effort on them: of the paper's tasks, of
-    each family and number of goals, and of all families."""
+    """Return the numbers of bounds within each distance, and the CPU time spent on them.
+
+    Rows are for the paper's tasks, for each family and number of goals, and for all families.
+    """
     drawn = bounds[bounds.family.notna()]
     groups = {"the paper's tasks": bounds[bounds.family.isna()]}
     for (family, goals), group in drawn.groupby(["family", "goals"]):
@@ -63,7 +67,7 @@ def tabulate(folder):
 
 @figures.styled
 def draw(table):
-    """Share of instances by the distance of their bounds, a bar for each family."""
+    """Draw the shares of instances by the distance of their bounds, with a bar for each family."""
     figure, (axes,) = figures.panels((1, 1), (figures.TWO, 4.2))
     shares = 100 * table[[*BOUNDS]].div(table.instances, axis=0).iloc[::-1]
     shades = "0.9", "0.8", "0.7", "0.5", "0.2"

@@ -28,16 +28,16 @@ REACHES = {
     (11, "9"): (3, 4),
     (11, REST): (4, 7),
 }
-"""By target and by what comes next: the task, and the motion in it, in which the target is reached
-from rest. Both are counted from 1, as in the data set's description."""
+"""By target and context (the next target, or rest): the task, and its motion, in which the target
+is reached from rest. Both are counted from 1, as in the description of the data set."""
 POSTURES = [f"{posture}_{joint}" for posture in ("start", "end", "next") for joint in range(1, 5)]
 
 
 def postures_of(tasks, person):
-    """Return a row for each repeat of each of the reaches of a person.
+    """Return a row for each repeat of each reach of a person.
 
-    ``tasks`` has shape (repeats, tasks): for each a list of motions, arrays of shape (4, samples).
-    Repeats without a task are left out.
+    ``tasks`` has shape (repeats, tasks). An entry is a list of motions, which are arrays of shape
+    (4, samples). Empty entries are left out.
     """
     rows = []
     for (target, context), (task, motion) in REACHES.items():

@@ -1,9 +1,9 @@
-"""Run methods on tasks of the form that the people had.
+"""Run methods on tasks of the same form as the people's tasks.
 
     python studies/people/protocols.py results/people
 
-For each of the tasks i180 to i199 of one-armed there are two tasks, which differ after goal 1: then
-goal 2, or then the place where the hand started.
+Each of the tasks i180 to i199 of one-armed gives two tasks with the same first goal. In one of
+them, goal 2 follows; in the other, the position at which the hand started.
 """
 
 import sys
@@ -22,18 +22,21 @@ METHODS = {
     "posture-qp/current-goal": "posture QP, one goal in view",
     "posture-qp/goals-ahead": "posture QP, all goals in view",
 }
-"""Methods by id. On tasks with two goals, two goals in view are all."""
+"""Methods by id. On tasks with two goals, a method with two goals in view sees all goals."""
 RUNS = 5
 
 
 def names(instance):
-    """Return the names of the two tasks made from an instance: another goal next, and back."""
+    """Return the names of the two tasks that are made from an instance (:func:`pair`)."""
     short = instance.rpartition("/")[2]
     return f"{short}-goal", f"{short}-back"
 
 
 def pair(instance):
-    """Return the two tasks made from an instance of one-armed."""
+    """Return the two tasks that are made from an instance of one-armed.
+
+    After goal 1, the hand must hit goal 2 in the first task, and its start position in the second.
+    """
     task = load_task(instance)
     first, second = task.goals[:2]
     at_start = task.robot.forward_kinematics(task.q0, "right").tolist()

@@ -1,4 +1,4 @@
-"""The rules of study people: which repeats count, the lean of each person, the test, its power."""
+"""Define the rules of study people: repeats that count, leans, the test, and its power."""
 
 from itertools import product
 from pathlib import Path
@@ -13,14 +13,14 @@ REST = "R"
 KINDS = ("start", "end", "next")
 KEYS = ["person", "target", "context"]
 LEVEL = 6 / 128
-"""Level of the test: at most 6 of the 128 sign flips of seven people."""
+"""Level of the test: at most 6 of the 128 sign flips of seven people may be as extreme."""
 POWER = 0.9
 
 
 def read(path):
-    """Return a table of postures with angles in rad, a row for each repeat.
+    """Return a table of postures with angles in rad and a row for each repeat.
 
-    Raises ValueError if a column is missing, or a number is.
+    Raises ValueError if a column or a value is missing.
     """
     table = pd.read_csv(path, dtype={"context": str})
     angles = [name for name in table if name.partition("_")[0] in KINDS]
@@ -45,11 +45,12 @@ def postures(table):
 
 
 def left_out(table):
-    """Return why repeats are left out, by the index of the table; empty for those that count.
+    """Return why repeats are left out, by the index of the table; empty for repeats that count.
 
     - ``copy``: all angles equal those of an earlier repeat of the same person, target and context.
     - ``other movement``: the start or the next posture is nearer to the median end posture of the
-      repeats than to its own median, or the end posture is nearer to the median start.
+      repeats than to its own median, or the end posture is nearer to the median start than to its
+      own median.
     """
     why = pd.Series("", table.index)
     for _, of_cell in table.groupby(KEYS):
@@ -66,10 +67,11 @@ def left_out(table):
 
 
 def contexts_of(table):
-    """Return, by target and person, the postures of the repeats in the two contexts, another
-    target and rest, for people with two repeats or more in each.
+    """Return the postures of the repeats in two contexts, by target and person.
 
-    Raises ValueError if a target has more than one other target, or nobody has two contexts.
+    The contexts are another target and rest. Only people with at least two repeats in each context
+    are included. Raises ValueError if more than one other target follows a target, or if nobody has
+    two contexts.
     """
     contexts = {}
     for target, of_target in table.groupby("target"):
@@ -89,11 +91,15 @@ def contexts_of(table):
 
 
 def leans(contexts, own=False, average=np.mean):
-    """Return a row for each person and target: the lean at the end less at the start (``more``),
-        both, how far apart the next postures are, and the posture difference at the end, in rad.
+    """Return the leans of people, with a row for each person and target.
 
-    n_A − n_B are the means of the other people, or, if ``own``, of the person's odd and even
-    repeats. ``average`` gives the postures of a person that are compared.
+    Columns: ``at_end``, ``at_start`` and their difference ``more`` with its interval; ``apart``,
+    the distance between the next postures, and ``difference``, the posture difference at the end
+    (both in rad).
+
+    n_A − n_B (:func:`coartic.analysis.lean`) is the mean over the other people. If ``own``, it is
+    that of the person's own odd and even repeats. ``average`` is the function, mean or median, that
+    gives the postures of a person that are compared.
     """
     rows = []
     for target, people in contexts.items():
@@ -125,7 +131,7 @@ def leans(contexts, own=False, average=np.mean):
 def people(rows):
     """Return the mean over the targets of each person, and the number of targets.
 
-    Raises ValueError if no lean applies.
+    Raises ValueError if the lean is not applicable to any person and target.
     """
     applies = rows.dropna(subset="more")
     if applies.empty:
@@ -139,7 +145,7 @@ def people(rows):
 
 
 def sign_flips(values):
-    """Return p of the one-sided test by all sign flips: their share with a mean as large."""
+    """Return p of the one-sided test by sign flips: the share of flips with as large a mean."""
     values = np.asarray(values, float)
     signs = np.array([*product((1, -1), repeat=len(values))])
     return float((signs @ values >= values.sum() - 1e-12).mean())
@@ -161,7 +167,10 @@ def needed(values):
 
 
 def power(shift, n, studies=20_000):
-    """Return the share of studies in which the test rejects, for n normal values of SD 1."""
+    """Return the share of simulated studies in which the test rejects, for n values with SD 1.
+
+    Values are normal with mean ``shift``.
+    """
     values = np.random.default_rng(1).normal(shift, size=(studies, n))
     signs = np.array([*product((1, -1), repeat=n)], float)
     sums = values @ signs.T
@@ -179,7 +188,7 @@ def smallest_shift(n):
 
 
 def spreads(contexts):
-    """Return the SDs between people of a lean that is not there, without looking at the lean.
+    """Return SDs that the leans of people would have without a lean, not using the leans.
 
     ``repeats``: what the variance of the repeats within contexts explains. ``at right angles``:
     the spread between people of the same difference, end less start, on the three directions at
@@ -199,7 +208,7 @@ def spreads(contexts):
             variances.setdefault(person, []).append(
                 sum((each @ way / length).var(ddof=1) / len(each) for each in moved)
             )
-            # The first column is the way; the others follow the joints in their order.
+            # The first column is the direction of n_A − n_B; the others are orthogonal to it.
             basis, triangle = np.linalg.qr(np.column_stack([way, np.eye(len(way))[:, :-1]]))
             basis *= np.sign(np.diag(triangle))
             difference = moved[0].mean(axis=0) - moved[1].mean(axis=0)
@@ -219,7 +228,7 @@ def spreads(contexts):
 
 
 def tabulate_power(contexts):
-    """Return the smallest lean with 90 % power, by where the spread comes from."""
+    """Return the smallest lean that is found with 90 % power, for each SD of :func:`spreads`."""
     n = len({person for of_target in contexts.values() for person in of_target})
     shift = smallest_shift(n)
     rows = [
@@ -232,8 +241,9 @@ def tabulate_power(contexts):
 def repeats_needed(n, lean_of_people, between, sd, repeats):
     """Return how many repeats of each context give 90 % power for a lean, if contexts alternate.
 
-    The variance of a person's value is ``between``² plus what ``sd``, the standard deviation from
-    ``repeats`` repeats, contributes. NaN if no number of repeats is enough. One-sided t test, 5 %.
+    The test is a one-sided t test at 5 % over n people. ``between`` is the SD of the lean between
+    people. ``sd`` is the SD of a person's value with ``repeats`` repeats. The result is NaN if 200
+    repeats are not enough.
     """
     for count in range(2, 201):
         spread = (between**2 + sd**2 * repeats / count) ** 0.5
@@ -244,10 +254,10 @@ def repeats_needed(n, lean_of_people, between, sd, repeats):
 
 
 def tabulate_plan(spread):
-    """Return the repeats that a lab needs, by the number of people and the lean to be found.
+    """Return the number of repeats that a lab needs, by the number of people and the lean.
 
-    ``alike``: all people lean as much; ``apart``: they differ with a standard deviation of half
-    the lean. ``spread`` is the spread from ten repeats.
+    Column ``alike`` is for people with the same lean, and ``apart`` for people whose leans have a
+    standard deviation of half the lean. ``spread`` is the SD of a person's value with ten repeats.
     """
     rows = [
         {"people": n, "lean": share, "alike": repeats_needed(n, share, 0.0, spread, 10),

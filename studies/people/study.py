@@ -1,11 +1,12 @@
-"""Do people lean towards the posture that comes next?
+"""Measure whether people lean towards the posture that comes next.
 
     python studies/people/make_table.py FOLDER          makes postures.csv from the public files
     python studies/people/protocols.py results/people   runs methods on tasks of the same form
     PYTHONPATH=studies python studies/people/study.py results/people
 
-Against the expected answer, that people lean: a mean over people that sign flips do not distinguish
-from 0. README.md has the rule, which was committed before any lean of a person was computed.
+The expected answer is that people lean. Against it would be a mean over people that sign flips do
+not distinguish from 0. README.md has the rule, which was committed before any lean of a person was
+computed.
 """
 
 import sys
@@ -38,11 +39,11 @@ PANELS = {
     "lean": "lean\n(share of the way)",
 }
 QUANTITIES = {"lean": "more", "difference": "difference", "apart": "apart"}
-"""Columns of the results by those of the tables that they come from."""
+"""Columns of the leans from which the columns of the results are made, by the latter's names."""
 
 
 def over_people(values):
-    """Return the mean over people with its 95 % interval by t, spread, and p by sign flips."""
+    """Return the mean over people with its 95 % t interval, the SD, and p by sign flips."""
     n, sd = len(values), values.more.std()
     half = stats.t.ppf(0.975, n - 1) * sd / n**0.5
     center = values.more.mean()
@@ -78,7 +79,7 @@ def measure_people(table):
 
 
 def measure_pairs(study):
-    """Return a row for each method and task of the people's form, and the runs behind them."""
+    """Return the lean of each method on each pair of tasks, and the runs from which it is made."""
     rows, runs = [], []
     for instance in INSTANCES:
         for label in METHODS:
@@ -116,14 +117,17 @@ def of_methods(rows):
 
 
 def of_comparison():
-    """Return the leans of the methods on ascending against descending, of shipped runs."""
+    """Return the leans of the methods' shipped runs on tasks ascending and descending."""
     rows = TABLES["contexts"](load("shipped")).set_index("method").loc[[*METHODS]]
     columns = ["lean", "lean_low", "lean_high", "distance", "next_apart", "lean_runs"]
     return rows[columns].rename(index=METHODS)
 
 
 def measure(folder=""):
-    """Return the tables by name; those of methods are made again with a folder of their runs."""
+    """Return the tables by name.
+
+    The tables of methods are made from the runs in ``folder``, or left out if it is empty.
+    """
     tables, shown = measure_people(read(HERE / "postures.csv"))
     if folder:
         rows, runs = measure_pairs(load(folder))

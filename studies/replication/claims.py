@@ -1,8 +1,9 @@
-"""The paper's claims with two verdicts, by their tests corrected together.
+"""Judge the paper's claims by two verdicts each, with tests that are corrected together.
 
-``docs/statistics.md`` explains the verdicts; *depends on the goals* rests on ``sets.csv``. Exact
-counts, and values without spread over runs, need no test. A claim that a folder cannot test counts
-in its group all the same, so that verdicts do not change with the other runs of a folder.
+``docs/statistics.md`` explains the verdicts. The verdict *depends on the goals* uses ``sets.csv``.
+Exact counts, and values without spread over runs, need no test. A claim that a folder cannot test
+still counts in the correction of its group, so that verdicts do not depend on the other runs of a
+folder.
 """
 
 import tomllib
@@ -36,17 +37,19 @@ COLUMNS = [
 
 
 def judge_claims(study, names):
-    """Judge claims by a folder: whether each *replicates*, and is *more than one selection* among
-    as many trials (empty for claims that need no comparison with random search).
+    """Judge claims by the runs of a folder.
 
-    P-values are corrected over the claims of a group among ``names``. ``suite``: empty for a claim
-    for which the folder lacks runs or tasks; ``run_ids`` of the runs that both verdicts read.
+    The first verdict is whether a claim *replicates*. The second is whether its effect is *more
+    than one selection* among as many trials; it is empty for claims that need no comparison with
+    random search. P-values are corrected over the claims of a group among ``names``. ``suite`` is
+    empty for claims for which the folder lacks runs or tasks. ``run_ids`` has the runs that both
+    verdicts use.
     """
     names, claims = [*names], CLAIMS.loc[[*names]]
     judged, read = judge_rules(study, names, RULES, claims.test)
     compared = [name for name in names if name in BEYOND]
     beyond, read_beyond = judge_rules(study, compared, BEYOND, claims.test_beyond)
-    few = SETS.claim[2 * SETS.supported <= SETS.members]  # support it, on some task
+    few = SETS.claim[2 * SETS.supported <= SETS.members]  # at most half of the sets support it
     goals = judged.index.isin(few) & (judged.verdict == "supported")
     renamed = {"verdict": "more_than_one_selection", "evidence": "evidence_beyond",
                "test": "test_beyond", "p_holm": "p_beyond",
@@ -64,8 +67,11 @@ def judge_claims(study, names):
 
 
 def judge_rules(study, names, rules, tests):
-    """Judge claims by rules, corrected within groups; also return by claim the ids of the runs that
-    its rule read, without the claims for which the folder lacks runs or tasks."""
+    """Judge claims by rules, with tests corrected within groups.
+
+    Also returns the ids of the runs that each rule used, by claim. Claims for which the folder
+    lacks runs or tasks are left out of them.
+    """
     findings, run_ids = {}, {}
     for name in names:
         read = Reader(study)

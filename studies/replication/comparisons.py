@@ -1,4 +1,4 @@
-"""Comparisons of means, on which most claims rest, and their words."""
+"""Compare means, as most claims do, and put the comparisons into words."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -20,14 +20,14 @@ def written(value, digits):
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """Values of runs, or a single number, with the words by which evidence names them."""
+    """Values of runs, or a single number, with the words that name them in the evidence."""
 
     task: str
     """Title of the task."""
     who: str
     """Method, as in ``EC2``, ``replay of EC1``, ``initial``, ``random search``."""
     numbers: np.ndarray
-    """Values, shape ``(runs,)``; shape ``()`` of a single number, which is exact."""
+    """Values, shape ``(runs,)``. A single number has shape ``()`` and is exact."""
     quantity: str = ""
     """Measured quantity in words; empty for rewards."""
     published: Summary | None = None
@@ -44,14 +44,14 @@ class Measurement:
         return not self.quantity or "ticks by which" in self.quantity
 
     def __str__(self):
-        """Write the number, or the mean with its BCa interval."""
+        """Return the number, or the mean with its BCa interval, as a string."""
         if not self.numbers.ndim:
             return number(float(self.numbers))
         return written(mean(self.numbers), 1 if self.in_ticks else 3)
 
 
 class Higher(NamedTuple):
-    """A claimed order of means: the first mean exceeds the second mean, or 0, by a margin."""
+    """Claimed order of means: the first mean exceeds the second mean (or 0) by a margin."""
 
     first: Measurement
     second: Measurement | None = None
@@ -60,7 +60,7 @@ class Higher(NamedTuple):
 
 
 def all_higher(comparisons, shown=()):
-    """Test that all ``comparisons``, claimed orders of means, hold, by one-tailed tests.
+    """Test by one-tailed tests that all ``comparisons`` hold. Each is a :class:`Higher`.
 
     The evidence also has the values of ``shown``, and the rewards that the paper publishes.
     """
@@ -88,17 +88,17 @@ def said(published):
 
 
 def difference_test(first, other, alternative):
-    """Test the difference of the mean of ``first`` and of ``other``, values or a number."""
+    """Test the difference between the mean of ``first`` and that of ``other``, or a number."""
     if np.ndim(other):
         return exchange_test(first, other, alternative)
     return bootstrap_test(first, float(other), alternative)
 
 
 def all_positive(pairs, parts):
-    """Return the finding that in all pairs the mean of the first values exceeds the second's mean,
-    or number.
+    """Return the finding that the first mean exceeds the second one in all pairs.
 
-    ``parts`` of the evidence are pairs of a measured quantity and words, grouped by quantity.
+    A pair has the values of two samples, or the values of one sample and a number. ``parts`` of the
+    evidence are pairs of a measured quantity and words.
     """
     pairs = list(pairs)
     tests = tuple(difference_test(*pair, "greater") for pair in pairs)
@@ -109,7 +109,7 @@ def all_positive(pairs, parts):
 
 
 def in_words(parts):
-    """Return parts of the evidence, pairs of a measured quantity and words, by quantity."""
+    """Join parts of the evidence (pairs of a measured quantity and words), grouped by quantity."""
     seen = pd.DataFrame(parts, columns=["quantity", "words"]).groupby("quantity", sort=False)
     return ". ".join(
         (f"{quantity[:1].upper()}{quantity[1:]}: " if quantity else "") + "; ".join(words)

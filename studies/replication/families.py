@@ -1,4 +1,4 @@
-"""Claims on families of random tasks, each in the mean over the instances of every family."""
+"""Define the rules of claims on families of random tasks, which compare means over instances."""
 
 from contextlib import suppress
 from dataclasses import replace
@@ -20,11 +20,12 @@ JERK = "trajectory-optimisation/jerk"
 
 
 def in_families(families, *comparisons):
-    """Return the rule that tests comparisons in the mean over the instances of each family.
+    """Return a rule that tests comparisons of means over the instances of each family.
 
-    Differences of rewards are in per cent of the best known reward. Where a comparison has too few
-    instances in a family, the claim is not judged, and the evidence has the other comparisons.
-    ``comparisons``: words that follow the name of a family, and a function that compares on a task.
+    ``comparisons`` are pairs of words that follow the name of a family, and a function that
+    compares on a task. Differences of rewards are in per cent of the best known reward. If a
+    comparison has too few instances in a family, the claim is not judged, and the evidence has the
+    other comparisons.
     """
 
     def rule(read):
@@ -67,8 +68,10 @@ def listed(words):
 
 
 def reported_instances(read, family):
-    """Return the best known rewards of a family's instances by name, without development instances.
-    Raises MissingError if the folder has none."""
+    """Return the best known rewards of a family's instances by name.
+
+    Development instances are left out. Raises MissingError if the folder has no instances.
+    """
     tasks = read.study.tasks
     reported = {
         name: best
@@ -86,8 +89,7 @@ def most_exploring(read, task):
 
 
 def earns(first, second):
-    """Return words and a function that compares the rewards of two methods on a task, for
-    :func:`in_families`."""
+    """Return a comparison of the rewards of two methods for :func:`in_families`."""
     words = " > ".join(label.removeprefix(LEARNER) for label in (first, second))
     return f" {words}", lambda read, task: Higher(
         read.reward(task, first), read.reward(task, second)
@@ -95,14 +97,14 @@ def earns(first, second):
 
 
 def shows(signature, *, by=0.0):
-    """Return words and a function that compares a signature of the learner with 0, by a margin."""
+    """Return a comparison of a signature of the learner with the margin ``by``."""
     return "", lambda read, task: Higher(
         read.signature(signature, task, most_exploring(read, task)), None, by
     )
 
 
 def shows_beyond_random_search(signature):
-    """Return words and a function that compares a signature of the learner with random search."""
+    """Return a comparison of a signature of the learner with that of random search."""
 
     def compare(read, task):
         label = most_exploring(read, task)

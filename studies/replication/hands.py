@@ -1,4 +1,4 @@
-"""Claims on the choice of hand: which hand sequences runs learn, and how often."""
+"""Define the rules of claims on hands: which hand sequences runs learn, and how often."""
 
 from collections import Counter
 from dataclasses import replace
@@ -21,11 +21,12 @@ RANDOM_HANDS = "random-search/hands"
 
 
 def hands_change(read, *, beyond=False):
-    """Test that under one of the conditions more than a quarter of the runs, or more than
-    ``beyond`` in random search with every hand sequence, hit a goal that others follow with another
-    hand than the initial solution.
+    """Test that many runs change hands, under at least one of two conditions.
 
-    The test has the smallest p times the number of conditions; for the opposite all must fail.
+    A run changes hands if it hits a goal before the last with another hand than the initial
+    solution. Many are more than a quarter of the runs or, with ``beyond``, a larger share than in
+    random search with every hand sequence. p is the smallest p times the number of conditions. The
+    opposite is that no condition has many such runs.
     """
     control = changed_hands(read, RANDOM_HANDS) if beyond else []
     tests, against, parts = [], [], []
@@ -54,23 +55,31 @@ def hands_change(read, *, beyond=False):
 
 
 def fisher_test(count, total, other, of_other, side="two-sided"):
-    """Compare two shares of runs, ``count`` of ``total`` and ``other`` of ``of_other``, by Fisher's
-    exact test; the value of the estimate is the first less the second."""
+    """Compare two shares of runs by Fisher's exact test.
+
+    The shares are ``count`` of ``total`` and ``other`` of ``of_other``. The value of the estimate
+    is the first share less the second.
+    """
     table = [[count, total - count], [other, of_other - other]]
     p = float(scipy.stats.fisher_exact(table, alternative=side).pvalue)
     return Estimate(count / total - other / of_other, n=(total, of_other), p=p)
 
 
 def changed_hands(read, label):
-    """Return whether each run on two-armed task 1 hits a goal before the last with another hand
-    than the initial solution, shape ``(runs,)``."""
+    """Return for each run on two-armed task 1 whether it changes hands, shape ``(runs,)``.
+
+    A run changes hands if it hits a goal before the last with another hand than the initial
+    solution.
+    """
     initial = read.initial_execution(TASK_1).hands[:-1]
     return np.array([hands[:-1] != initial for hands in read.hands(TASK_1, label)])
 
 
 def most_do(words, does, *, claimed=True):
-    """Test that more than three quarters of the runs do something, or fewer, if not ``claimed``.
-    ``does``: a truth value for each run; ``words`` begin the evidence."""
+    """Test that more than three quarters of the runs do something (fewer, if not ``claimed``).
+
+    ``does`` has a truth value for each run. The evidence begins with ``words``.
+    """
     count, total = sum(does), len(does)
     side, other = ("greater", "less") if claimed else ("less", "greater")
     test, contrary = (share_test(count, total, MARGINS.most, which) for which in (side, other))
@@ -83,8 +92,10 @@ def most_do(words, does, *, claimed=True):
 
 
 def runs_that(read, task, label, what, does):
-    """Say how many runs do something (``what``, in words; ``does``, a truth value for each run),
-    with the hand sequences of all runs."""
+    """Return a phrase on how many runs do something, with the hand sequences of all runs.
+
+    ``what`` says in words what they do. ``does`` has a truth value for each run.
+    """
     counts = sorted(Counter(read.hands(task, label)).items(), key=lambda item: (-item[1], item[0]))
     each = ", ".join(f"{hands} {count}" for hands, count in counts)
     who = f"{read.title(task)} {read.who(label)}"
@@ -92,8 +103,10 @@ def runs_that(read, task, label, what, does):
 
 
 def half_find(read, task, label, hands):
-    """Test that neither few nor most runs (:data:`MARGINS`) learn these hands; the opposite is that
-    their share differs from the published one."""
+    """Test that neither few nor most runs learn these hands (:data:`MARGINS`).
+
+    The opposite is that their share differs from the published share.
+    """
     does = [each == hands for each in read.hands(task, label)]
     count, total = sum(does), len(does)
     share = count / total
@@ -121,21 +134,23 @@ def no_reversal(read):
     runs = [run for run in read.cell(TASK_1, EC2).runs if run.hands == "RRLR"]
     if not runs:
         raise MissingError(f"no run of EC2 on {read.title(TASK_1)} learned RRLR")
-    along = [np.append(q0[0], run.configurations[:, 0]) for run in runs]  # the base, length unit
+    along = [np.append(q0[0], run.configurations[:, 0]) for run in runs]  # x of the base
     rightward = [bool((np.diff(x) > 0).all()) for x in along]
     return most_do(runs_that(read, TASK_1, EC2, "RRLR rightward", rightward), rightward)
 
 
 def ec4_mixed(read):
-    """Count the runs on two-armed task 2 without the commonest hand sequence; the claim, that
-    there are some, is not tested. Raises MissingError without runs."""
+    """Count the runs on two-armed task 2 that do not have the most common hand sequence.
+
+    The claim is that there are such runs. It is not tested. Raises MissingError without runs.
+    """
     learned = read.hands(TASK_2, EC4)
     others = [hands != mode(learned) for hands in learned]
     return Finding(any(others), runs_that(read, TASK_2, EC4, "not commonest", others))
 
 
 def rail(read):
-    """Test that most runs have the commonest hands if the base is on its rail, and only then."""
+    """Test that most runs have the most common hands if, and only if, the base is on its rail."""
     findings = []
     for task, consistent in ((TASK_1, True), (FREE_BASE, False)):
         learned = read.hands(task, EC3)

@@ -1,4 +1,4 @@
-"""Claims on the corrective process, and on what learning gains."""
+"""Define the rules of claims on the corrective process, and on what learning gains."""
 
 import itertools
 import math
@@ -17,14 +17,15 @@ from coartic.estimates import SEED, Estimate
 from common.judging import Finding
 
 LEAST_DISPLACEMENT = "trajectory-optimisation/squared-displacement"
-"""The plan with the least squared joint displacement, a smoothness cost of Jordan's."""
+"""Plan with the smallest squared joint displacement, a smoothness cost of Jordan's."""
 SMOOTH_PLANS = (
     LEAST_DISPLACEMENT,
     "trajectory-optimisation/acceleration",
     "trajectory-optimisation/jerk",
 )
 TENTHS = 10
-"""Corrections are counted in the first and in the last tenth of the trials."""
+"""Number of parts into which the trials are divided. Corrections are counted in the first part and
+in the last part."""
 
 
 def no_trial_fails(read, cells):
@@ -64,7 +65,10 @@ def corrective_near_shortest(read, tasks):
 
 
 def excess_over_shortest(task, initial):
-    """Return the shares by which subtasks, and last all together, exceed the shortest paths."""
+    """Return the shares by which subtasks exceed the shortest paths.
+
+    The last share is that of all subtasks together.
+    """
     after = initial.configurations
     before = np.array([task.q0, *after[:-1]])
     shortest = np.array([
@@ -76,12 +80,13 @@ def excess_over_shortest(task, initial):
 
 
 def shortest_reach(task, q, hand, goal, near):
-    """Return the least joint-space distance from ``q`` to a configuration that hits a goal.
+    """Return the smallest joint-space distance from ``q`` to a configuration that hits a goal.
 
-    ``goal`` counts from 1; ``near``, shape ``(dof,)``, is a configuration close to a hit.
-    Sequential quadratic programming (Kraft 1988, scipy's SLSQP) on the joints that can move the
-    hand, from ``near`` and eight random starts about it. The distance, length unit and rad mixed,
-    is the best local minimum, at least as long as the global minimum; infinite without a minimum.
+    ``goal`` counts from 1. ``near``, shape ``(dof,)``, is a configuration close to a hit. The
+    minimum is searched by sequential quadratic programming (Kraft 1988, scipy's SLSQP) over the
+    joints that can move the hand, from ``near`` and from eight random starts around it. The
+    distance mixes length units and rad. It is that of the best local minimum, which can be longer
+    than the global minimum, and infinite if no minimum is found.
     """
     joints, centre = movable(task, hand), np.array(task.goals[goal - 1])
 
@@ -109,11 +114,12 @@ def shortest_reach(task, q, hand, goal, near):
 
 
 def corrected_less_later(read, cells):
-    """Test that runs make fewer corrective movements in the last trials, and in the learned
-    solution, than in the first trials.
+    """Test that corrective movements become rarer in learning.
 
-    Trial 0 does not count: all its movements are corrective by construction. In an experiment the
-    opposite needs both counts, as the targets of the last trials have noise.
+    Runs must make fewer corrective movements in the last trials, and in the learned solution, than
+    in the first trials. Trial 0 does not count, because all its movements are corrective by
+    construction. For the opposite, both counts must be higher than in the first trials, because the
+    targets of the last trials have noise.
     """
     words = "share of movements that are corrected, in the"
     pairs, parts, learned = [], [], []
@@ -139,13 +145,13 @@ def corrected_less_later(read, cells):
 
 
 def resemblance(read, task):
-    """Return the share of the initial solution's distance to the plan that each run covers."""
+    """Return which share of the initial solution's distance to the plan each run covers."""
     learned = read.cell(task, EC1).runs
     (plan,) = read.cell(task, LEAST_DISPLACEMENT).runs
     planned = plan.configurations
 
     def distance(execution):
-        """Return the mean distance of postures at the goals, length unit and rad mixed."""
+        """Return the mean distance of postures at the goals. It mixes length units and rad."""
         return float(np.linalg.norm(execution.configurations - planned, axis=-1).mean())
 
     before = distance(read.initial_execution(task))
@@ -172,8 +178,11 @@ def p_of(test):
 
 
 def two_of_three(findings):
-    """Return the finding that two of three findings hold, by twice the second smallest p (a partial
-    conjunction: Benjamini & Heller 2008, Biometrics 64)."""
+    """Return the finding that at least two of three findings hold.
+
+    p is twice the second smallest p (a partial conjunction: Benjamini & Heller 2008, Biometrics
+    64).
+    """
     tests = [max(finding.tests, key=p_of) for finding in findings]
     against = [
         Estimate(-test.value, n=test.n, p=finding.opposite_p)
@@ -190,7 +199,7 @@ def two_of_three(findings):
 
 
 def proficiency_rises(read):
-    """Test that each condition beats the one before, and the first beats the initial solution."""
+    """Test that each condition beats the previous one, and the first beats the initial solution."""
     comparisons = []
     for task, cells in itertools.groupby(CELLS_OF_TWO_ARMS, itemgetter(0)):
         rewards = [read.initial(task), *(read.reward(*cell) for cell in cells)]
@@ -199,8 +208,10 @@ def proficiency_rises(read):
 
 
 def rules_of(which, cells, best):
-    """Return the rules that are the same for tasks with one arm and with two; ``best`` is the
-    condition that explores most."""
+    """Return the rules that are the same for tasks with one arm and with two arms.
+
+    ``best`` is the condition that explores most.
+    """
     tasks = [*dict(cells)]
     return {
         f"corrective-ensures-{which}-armed": partial(corrective_ensures, cells=cells),

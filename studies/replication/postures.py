@@ -1,4 +1,4 @@
-"""Claims on coarticulation: what movements and postures show, and whether selection alone does."""
+"""Define the rules of claims on coarticulation, also in comparison with mere selection."""
 
 from contextlib import suppress
 from dataclasses import replace
@@ -28,7 +28,7 @@ from coartic.estimates import SEED, Estimate
 from common.judging import Finding
 
 ONE_GOAL = "posture-based/one-goal", "corrective-alone/given"
-"""Methods that look at the current goal alone."""
+"""Methods that consider only the current goal."""
 
 
 def first_movement_slower(read):
@@ -98,7 +98,7 @@ def contexts_of(read, label, *, replay=False):
 
 
 def overall_reward(read):
-    """Test that the learner rewarded by subtask earns less and has a faster first movement."""
+    """Test that a learner rewarded by subtask earns less and has a faster first movement."""
     comparisons = []
     for task in ONE_ARMED:
         first = read.signature("first", task, EC1, replay=True)
@@ -110,7 +110,7 @@ def overall_reward(read):
 
 
 def arm_coarticulation(read):
-    """Test that postures of base and chosen arm shorten the way to the next goal."""
+    """Test that postures of base and chosen arm shorten the path to the next goal."""
     cells = [(task, label) for task in TWO_ARMED for label in (EC3, EC4)]
     shown = [partial(read.signature, "arm", *cell, replay=True) for cell in cells]
     shown += [partial(read.signature, "arm", task, EC4_BY_SUBTASK) for task in TWO_ARMED]
@@ -131,7 +131,7 @@ def other_arm_coarticulation(read):
 
 
 def beyond_random_search(signature, cells):
-    """Return the rule that tests that learners show more of a signature than random search."""
+    """Return a rule that tests that learners show more of a signature than random search."""
     return lambda read: all_higher(
         pair for cell in cells for pair in read.beyond_random_search(signature, *cell)
     )

@@ -1,8 +1,8 @@
-"""Run EC4 on two-armed task 1 under other exploration and with longer practice.
+"""Run EC4 on two-armed task 1 with other exploration and with longer practice.
 
     python studies/replication/protocols.py
 
-Writes runs.csv.xz, a row for each run, and ec4.csv, which has the spread of their rewards.
+The script writes runs.csv.xz, with a row for each run, and ec4.csv, with the spread of rewards.
 """
 
 from dataclasses import replace
@@ -20,11 +20,14 @@ SETTINGS = {
     "noise 0.06": (200, TRIALS, {"noise_sd": 0.06}),
     "30,000 trials": (100, 30_000, {}),
 }
-"""Runs, trials, and fields that differ from EC4."""
+"""Number of runs, number of trials, and fields that differ from EC4, by setting."""
 
 
 def vary_ec4():
-    """Run the settings of EC4, with seeds that no other results have; a row for each run."""
+    """Run the settings of EC4, and return a row for each run.
+
+    The seeds are not used for any other results.
+    """
     rows = []
     for setting, (runs, trials, fields) in SETTINGS.items():
         rules = replace(coartic.CONDITIONS["EC4"], **fields)
@@ -44,7 +47,7 @@ def tabulate_ec4(runs):
 
 
 def main():
-    """Make the runs, and the table of them."""
+    """Make the runs, and write both tables."""
     runs = vary_ec4()
     stored = {"ec4.csv": tabulate_ec4(runs), "runs.csv.xz": runs.set_index("task")}
     for name, table in stored.items():

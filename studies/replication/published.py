@@ -1,4 +1,4 @@
-"""Rewards that Shah, Barto & Fagg (2013) publish, by task and condition (``published.toml``)."""
+"""Look up rewards that Shah, Barto & Fagg (2013) publish (``published.toml``)."""
 
 import math
 import tomllib
@@ -31,7 +31,7 @@ class Summary(NamedTuple):
     runs: int = RUNS
     """Number of runs: published with the reward, or the paper's general 20."""
     published_runs: int | None = None
-    """Number of runs with the hand sequence, if the paper has it with the mean."""
+    """Number of runs with the hand sequence, if the paper publishes it with the mean."""
     derived: bool = False
     """True if the reward is computed from other published numbers."""
     derived_runs: bool = False
@@ -39,9 +39,9 @@ class Summary(NamedTuple):
 
 
 def published_alone(task, kind):
-    """Return the published reward of the corrective process alone on a task, None without it.
+    """Return the published reward of the corrective process alone on a task, or None.
 
-    ``kind``: ``initial hands`` or ``best of all sequences``.
+    ``kind`` is ``initial hands`` or ``best of all sequences``.
     """
     of_task = [entry for entry in ENTRIES.values() if entry["task"] == task]
     hands = next((entry["hands"] for entry in of_task if entry["kind"] == kind), None)
@@ -52,10 +52,10 @@ def published_alone(task, kind):
 
 
 def published_cell(task, condition):
-    """Return the published rewards of a cell by hand sequence, and of all runs under ``""``.
+    """Return the published rewards of a cell by hand sequence, with ``""`` for all runs.
 
-    The paper has rewards by hand sequence for some cells, and hands alone for one. None for a cell
-    that it does not mention.
+    For some cells the paper has rewards by hand sequence, and for one cell it has only hands. The
+    result is None for a cell that the paper does not mention.
     """
     entries = {
         (entry["kind"], entry.get("hands", "")): entry

@@ -1,4 +1,4 @@
-"""A results folder as one claim reads it."""
+"""Read from a results folder what a claim needs."""
 
 import math
 import tomllib
@@ -18,10 +18,10 @@ from coartic.estimates import FEWEST
 LEARNER = "dual-process/"
 EC1, EC2, EC3, EC4 = CONDITIONS = tuple(f"{LEARNER}EC{n}" for n in (1, 2, 3, 4))
 EC1_BY_SUBTASK, EC4_BY_SUBTASK = f"{EC1}-subtask", f"{EC4}-subtask"
-"""The learner with a reward for each subtask by itself."""
+"""Ids of the learner that learns from the reward of each subtask."""
 RANDOM_SEARCH = "random-search"
 FEWEST_ON_INSTANCE = 3
-"""Least number of runs whose mean is the value of a random task."""
+"""Smallest number of runs whose mean is the value of a random task."""
 ONE_ARMED = "ascending", "descending"
 TWO_ARMED = TASK_1, TASK_2 = "two-armed-1", "two-armed-2"
 CELLS_OF_ONE_ARM = [(task, EC1) for task in ONE_ARMED]
@@ -42,15 +42,15 @@ class MissingError(Exception):
 
 @dataclass
 class Reader:
-    """A results folder as one claim reads it.
+    """A results folder, and the runs that a claim has read from it.
 
-    A ``label`` is a method with its setting. Methods raise MissingError for missing tasks, runs and
-    values.
+    Argument ``label`` is a method with its setting. All methods raise MissingError for missing
+    tasks, runs and values.
     """
 
     study: Study
     run_ids: list[str] = field(default_factory=list)
-    """Ids of the runs read so far, some of them more than once."""
+    """Ids of the runs that were read so far. An id can occur more than once."""
 
     def task(self, name):
         """Return a task of the folder."""
@@ -63,18 +63,25 @@ class Reader:
         return self.study.tasks[name].label if name in self.study.tasks else name
 
     def who(self, label):
-        """Return the name of a method in evidence, for the learner its condition."""
+        """Return the name of a method in the evidence. For the learner, this is its condition."""
         if label.startswith(LEARNER):
             return label.removeprefix(LEARNER)
         return self.study.methods.title.get(label, label.replace("-", " "))
 
     def least_runs(self, name):
-        """Return the least number of runs of a method on a task: fewer on an instance of a family,
-        where the mean is a single value of a test over instances."""
+        """Return the smallest number of runs of a method that a claim needs on a task.
+
+        It is lower on an instance of a family, where the mean over runs is one value of a test over
+        instances.
+        """
         return FEWEST_ON_INSTANCE if self.task(name).family else FEWEST
 
     def runs(self, task, label):
-        """Return the runs of a method on a task, if all of them have a solution."""
+        """Return the runs of a method on a task.
+
+        Raises MissingError if a run has no solution, or if there are too few runs or other numbers
+        of trials than in the paper.
+        """
         runs, title = self.study.cells.get((task, label)), self.title(task)
         if runs is None:
             raise MissingError(f"this folder has no runs of {label} on {title}")
@@ -105,7 +112,7 @@ class Reader:
         return list(map(str, self.runs(task, label).hands))
 
     def reward(self, task, label):
-        """Return the rewards of the best trials; a single reward for a deterministic method."""
+        """Return the rewards of the best trials, or one reward for a deterministic method."""
         rewards = self.runs(task, label).reward.to_numpy(dtype=np.float64)
         if not self.study.methods.stochastic[label]:
             rewards = np.array(rewards.mean())
@@ -114,8 +121,8 @@ class Reader:
     def replay(self, task, label):
         """Return the rewards of noiseless replays after learning.
 
-        A replay makes the movements that were learned. The reward of the best trial is a maximum,
-        never below the reward of trial 0.
+        A replay makes the learned movements. In contrast, the reward of the best trial is a
+        maximum, and never below the reward of trial 0.
         """
         rewards = self.runs(task, label).replay_reward.to_numpy(dtype=np.float64, na_value=np.nan)
         if np.isnan(rewards).any():
@@ -144,15 +151,17 @@ class Reader:
         return Measurement(self.title(task), "best", np.array(best), published=published)
 
     def signature(self, name, task, label, *, replay=False):
-        """Return a signature of coarticulation of the runs that have this signature."""
+        """Return a signature of coarticulation for the runs that have this signature."""
         self.runs(task, label)
         values = self.study.signature(name, task, label, replay=replay).to_numpy(np.float64)
         values = values[np.isfinite(values)]
         return self.shown(name, task, label, values, "in noiseless replays, " * replay)
 
     def beyond_random_search(self, name, task, label):
-        """Return the order of a signature of a method and of random search, for each hand sequence,
-        by the rule of :func:`coartic.analysis.with_control`."""
+        """Return comparisons of a method's signature with random search, by hand sequence.
+
+        Runs are selected as in :func:`coartic.analysis.with_control`.
+        """
         self.runs(task, label)
         pairs = []
         one_handed = len(self.task(task).hands) == 1
@@ -168,8 +177,10 @@ class Reader:
         return pairs
 
     def excess_over_random_search(self, name, task, label):
-        """Return the excess of a method's signature over random search on an instance of a family,
-        a single number, by the same rule."""
+        """Return by how much a method's signature exceeds random search on an instance of a family.
+
+        This is a single number. Runs are selected as in :func:`coartic.analysis.with_control`.
+        """
         self.runs(task, label)
         excess = mean_excess(self.study, name, task, label)
         if math.isnan(excess):
@@ -202,7 +213,7 @@ class Reader:
 
 
 def there(reads):
-    """Yield what the functions ``reads`` return, but for those that raise MissingError."""
+    """Yield the results of functions, and leave out functions that raise MissingError."""
     for read in reads:
         with suppress(MissingError):
             yield read()

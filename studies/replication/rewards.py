@@ -1,4 +1,4 @@
-"""Learned rewards and hands, compared with the published ones."""
+"""Compare learned rewards and hands with the published ones."""
 
 import math
 
@@ -18,14 +18,21 @@ MARKS = {"equivalent": "o", "different": "D", "undecided": "s"}
 
 
 def compare_rewards(study):
-    """Compare the cells that the paper has too, and their hand sequences, in the order of the plan.
+    """Compare the rewards of the cells that the paper has, and of their hand sequences.
 
-    Sequences follow their cell where the paper or our runs distinguish several: published ones come
-    first, then ours by their number of runs. Columns: ``hands`` (empty for the whole cell),
-    ``published_runs`` (0 only where all others are published), ``pooled`` (the published mean is
-    one over several hand sequences), ``several`` (the paper has rewards of several), ``runs`` with
-    a solution ``of_runs``, ``verdict`` if our runs have as many trials as the paper's, and p-values
-    of the published spread as a standard deviation (``p_sd``) and a standard error (``p_se``).
+    Cells are in the order of the plan. If the paper or our runs have several hand sequences, rows
+    for them follow the row of the cell: first the published sequences, then ours by their number of
+    runs. Columns:
+
+    - ``hands``: the hand sequence; empty for the whole cell;
+    - ``published_runs``: the published number of runs with the sequence (0 if the paper has the
+      numbers of all other sequences);
+    - ``pooled``: True if the published mean is computed from several sequences;
+    - ``several``: True if the paper has rewards of several sequences;
+    - ``runs``: number of our runs with the sequence, of ``of_runs`` with a solution;
+    - ``verdict``: see :func:`equivalence`; missing unless our runs have as many trials as the
+      paper's;
+    - ``p_sd`` and ``p_se``: p if the published spread is a standard deviation, or a standard error.
     """
     rows = {}
     for (task, label), every in study.cells.items():
@@ -54,7 +61,7 @@ def compare_rewards(study):
                 "published_sd": summary.sd,
                 "published_runs": summary.published_runs,
                 "pooled": summary.derived,
-                "several": len(published) > 2,  # with that of the whole cell
+                "several": len(published) > 2,  # one of them is that of the whole cell
                 "ours": rewards.mean() if len(rewards) else math.nan,
                 "ours_sd": standard_deviation(rewards),
                 "runs": len(rewards),
@@ -78,8 +85,11 @@ def compare_rewards(study):
 
 
 def difference_to_published(ours, published, sd, runs):
-    """Return our mean less the published mean, with Welch's interval from the published SD and
-    number of runs; Student's without a published SD (None), none for fewer than five runs."""
+    """Return our mean less the published mean, with an interval.
+
+    The interval is Welch's, with the published SD and number of runs. Without a published SD
+    (None), it is Student's. There is no interval for fewer than five runs of ours.
+    """
     n, value = len(ours), float(np.mean(ours)) - published
     if n < FEWEST:
         return Estimate(value, n=(n,))
@@ -96,10 +106,11 @@ def difference_to_published(ours, published, sd, runs):
 
 
 def equivalence(difference, margin):
-    """Compare the interval of a difference with ±margin: two one-sided tests at level 2.5 %
-    (TOST; D. J. Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15).
+    """Return whether a difference is equivalent to 0, by comparing its interval with ±margin.
 
-    Equivalent if it lies within the margin, different if it lies outside, or else undecided.
+    The result is ``equivalent`` if the interval is within ±margin, ``different`` if it is wholly
+    outside, and otherwise ``undecided``. This is two one-sided tests at level 2.5 % (TOST; D. J.
+    Schuirmann 1987, Journal of Pharmacokinetics and Biopharmaceutics 15).
     """
     if -margin <= difference.low and difference.high <= margin:
         return "equivalent"
@@ -109,11 +120,11 @@ def equivalence(difference, margin):
 
 
 def spread_p(values, published, runs, *, of_mean=False):
-    """Test whether ``runs`` runs like ours could have a published spread, two-tailed.
+    """Return the two-tailed p that ``runs`` runs like ours have the published spread.
 
-    That many of our ``values`` are drawn with replacement, and p is twice the share of samples
-    whose standard deviation, or standard error with ``of_mean``, is at least as far on the side of
-    the published spread. NaN with fewer than ten values.
+    Samples of ``runs`` of our ``values`` are drawn with replacement. p is twice the share of
+    samples whose standard deviation (with ``of_mean``, standard error) is at least as far on the
+    side of the published spread. p is NaN with fewer than ten values.
     """
     if len(values) < 10:
         return math.nan
@@ -148,7 +159,7 @@ def draw_rewards(rewards):
     axes.set_ylim(0.4 - len(shown), 0.6)
     axes.tick_params(axis="y", length=0)
     axes.spines["left"].set_visible(False)
-    # Symmetric about zero: wide enough for every interval and margin.
+    # The axis is symmetric about zero, and wide enough for every interval and margin.
     ends = shown[["difference", "difference_low", "difference_high", "margin"]]
     reach = np.nanmax(np.abs(ends.to_numpy(float)))
     axes.set_xlim(-1.05 * reach, 1.05 * reach)

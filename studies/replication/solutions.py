@@ -1,4 +1,4 @@
-"""Solutions goal by goal, as in Figures 5 to 7 of the paper."""
+"""Measure and draw solutions goal by goal, as in Figures 5 to 7 of the paper."""
 
 import numpy as np
 import pandas as pd
@@ -11,15 +11,16 @@ from coartic.analysis import figures
 from coartic.analysis.study import MOST_EXECUTED, solved, typical_run
 
 TALLEST = 8.8
-"""Height of a page that leaves room for a caption, inches."""
+"""Largest height (in inches) of a figure that leaves room for a caption on the page."""
 MARKERS = {"L": {"marker": "s", "markerfacecolor": "white"}, "R": {"marker": "o"}}
 
 
 def measure_solutions(study):
     """Measure the initial solution of each task and the median run of each condition.
 
-    The median run is the run with the reward nearest to the median. A row for each goal: ``hand``,
-    ``reward`` of the movement (ticks), and the configuration at the hit (length unit and rad).
+    The median run is the run whose reward is nearest to the median. There is a row for each goal,
+    with ``hand``, ``reward`` of the movements (in negative ticks), and the configuration at the hit
+    (in length units and rad).
     """
     rows = []
     for name, task in study.tasks.items():
@@ -45,7 +46,10 @@ def measure_solutions(study):
 
 @figures.styled
 def draw_solutions(solutions):
-    """Draw the posture that hits each goal and the posture before, a row of panels for each run."""
+    """Draw the posture that hits each goal, and the previous posture.
+
+    There is a row of panels for each run.
+    """
     runs = solutions.groupby(["task", "condition"], sort=False)
     most = solutions.goal.max()
     size = figures.TWO, min(TALLEST, 0.82 * runs.ngroups)
@@ -77,8 +81,10 @@ def draw_solutions(solutions):
 
 
 def draw_posture(axes, task, q, colour, marked=""):
-    """Draw base, arms and goals in a configuration; joints of the arm of the ``marked`` hand, ``L``
-    or ``R``, have markers."""
+    """Draw base, arms and goals in a configuration.
+
+    Joints of the arm of the ``marked`` hand (``L`` or ``R``) have markers.
+    """
     axes.fill(*task.robot.base_outline(q).T, facecolor="none", edgecolor=colour, linewidth=0.5)
     for hand in task.hands:
         letter = hand[0].upper()

@@ -4,10 +4,13 @@
     PYTHONPATH=studies python studies/replication/study.py results/comparison [FOLDER ...]
         [--out FOLDER]
 
-The folder of suite ``comparison`` comes first; claims for which it has no runs are judged by the
-folders that follow, of suites ``ablations`` and ``families``. Writes tables, figures and page.html
-into the folder ``--out``; without it, which needs all three, the tables without ids of runs, the
-figures and README.md into this folder. Without folders: figures and page, of the stored tables.
+The folder of suite ``comparison`` comes first. Claims for which it has no runs are judged by the
+other folders, of suites ``ablations`` and ``families``.
+
+- With ``--out``, the script writes tables, figures and page.html into that folder.
+- Without ``--out``, it needs all three folders. It writes tables (without ids of runs), figures and
+  README.md into the folder of this study.
+- Without folders, it makes figures and page again from the stored tables.
 """
 
 import argparse
@@ -26,7 +29,7 @@ from common.writing import fill_page
 HERE = Path(__file__).parent
 STYLE = HERE.parents[1] / "analysis" / "report" / "page.css"
 VERDICTS = "not supported", "depends on the goals", "undecided", "supported"
-"""Verdicts in the order of the page: failures first."""
+"""Verdicts in the order of the page, failures first."""
 
 
 def measure(folders):
@@ -49,14 +52,17 @@ def judge_by_first(studies):
 
 
 def rank(verdicts):
-    """Return the places of a column of verdicts in :data:`VERDICTS`."""
+    """Return the positions of a column of verdicts in :data:`VERDICTS`."""
     return verdicts.map(VERDICTS.index)
 
 
 def write(out):
-    """Draw the figures and fill in the page from the tables in a folder: README.md here, page.html
-    with the evidence of each claim elsewhere, whose links to the project are names of its files:
-    the folder may be moved."""
+    """Draw the figures, and fill in the page, from the tables in a folder.
+
+    In the folder of this study, the page is README.md. In any other folder it is page.html, which
+    also has the evidence of each claim. There, links to the project become names of files, so that
+    the folder can be moved.
+    """
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in out.glob("*.csv")}
     for name, draw in (("rewards", draw_rewards), ("solutions", draw_solutions)):
         (out / f"{name}.svg").write_bytes(figures.picture(draw(stored[name]), ".svg"))

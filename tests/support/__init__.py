@@ -1,1 +1,1 @@
-"""What test modules share: suites run into folders, commands, reports read back, made-up rows."""
+"""Functions that test modules share: suites that are run, processes, and made-up studies."""

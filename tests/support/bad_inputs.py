@@ -1,4 +1,4 @@
-"""A good task file, of which bad ones are made."""
+"""A valid task file, from which tests make invalid ones."""
 
 GOOD = """
 name = "mine"

@@ -1,4 +1,4 @@
-"""Texts of a drawn figure, and what is wrong with their places."""
+"""Find the texts of a drawn figure, and texts in wrong positions."""
 
 import itertools
 
@@ -8,7 +8,10 @@ from matplotlib.text import Text
 
 
 def texts_of(figure):
-    """Yield the texts that are drawn: of axes that are off none of the axis, of ticks in sight."""
+    """Return the texts that are drawn.
+
+    Labels of an axis that is off, and labels of ticks that are out of sight, are left out.
+    """
     kept = {*figure.findobj(Text)}
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
@@ -22,7 +25,7 @@ def texts_of(figure):
 
 
 def misplaced(figure):
-    """Texts that leave the figure, and pairs of texts that overlap by more than a pixel."""
+    """Return texts that leave the figure, and pairs of texts that overlap by more than a pixel."""
     canvas = FigureCanvasAgg(figure)
     figure.draw_without_rendering()
     boxes = [(text.get_text(), text.get_window_extent(canvas.get_renderer()).extents)

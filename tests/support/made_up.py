@@ -1,4 +1,4 @@
-"""The builder of planted studies: rows of runs, rewards of trials and solutions by hand."""
+"""Build made-up studies from rows of runs, rewards of trials and solutions."""
 
 import ast
 from contextlib import suppress
@@ -26,8 +26,11 @@ MADE_WITH = {
 
 
 class MadeUp(Study):
-    """A study with some of its parts made up: ``MadeUp(study, optima=...)``; what its methods
-    return as well, ``MadeUp(study, executed=made(...))``."""
+    """A study some of whose parts are made up.
+
+    Parts can be values, as in ``MadeUp(study, optima=...)``, or methods, as in ``MadeUp(study,
+    executed=made(...))``.
+    """
 
     def __init__(self, study, **parts):
         runs = vars(study).get("runs", study.stored)  # with what a test has changed
@@ -38,13 +41,16 @@ class MadeUp(Study):
 
 
 def made(values):
-    """A method that returns values by its arguments, of replays by ``True`` as well."""
+    """Return a method that looks up values by its arguments; those of replays end in ``True``."""
     return lambda *key, replay=False: values[(*key, replay) if replay else key]
 
 
 def found(holds, *p, against=None, n=20):
-    """A finding of a claim, with tests of these p-values, and of its opposite with others, by
-    default of the other tails."""
+    """Return a finding of a claim, with tests of the claim and of its opposite.
+
+    ``p`` are the p-values of the claim. ``against`` are those of its opposite, by default of the
+    other tails.
+    """
     tests, contrary = (
         tuple(Estimate(1.0, p=each, n=(n,), resamples=9_999) for each in values)
         for values in (p, [1 - each + 1e-4 for each in p] if against is None else against)
@@ -53,9 +59,9 @@ def found(holds, *p, against=None, n=20):
 
 
 def made_up_optima(*tasks):
-    """Proven optima of some tasks, for ``MadeUp(results, optima=...)``.
+    """Return proven optima of some tasks, for ``MadeUp(results, optima=...)``.
 
-    Whatever the shipped ones are: those of the two-armed tasks change with their goals.
+    They do not depend on the shipped optima, which change with the goals of two-armed tasks.
     """
     best = {"ascending": -292, "two-armed-1": -465, "two-armed-2": -306}
     return {task: BestKnown(best[task], best[task]) for task in tasks}
@@ -77,7 +83,7 @@ def row(method, reward, *, task="two-armed-1", run=0, setting="", **more):
 
 
 def runs_of(task, method, rewards, **more):
-    """Rows of the runs of a cell; a list in ``more`` has a value for each run."""
+    """Return rows of the runs of a cell. A list in ``more`` has a value for each run."""
     return [
         row(method, reward, task=task, run=run,
             **{name: of[run] if isinstance(of, list) else of for name, of in more.items()})
@@ -86,7 +92,7 @@ def runs_of(task, method, rewards, **more):
 
 
 def declared(method, deterministic=()):
-    """What a made-up method declares; planners and ``deterministic`` methods draw nothing."""
+    """Return a declaration of a method. Planners and ``deterministic`` are not stochastic."""
     planners = "trajectory-optimisation", "corrective-alone"
     stochastic = not method.startswith((*planners, *deterministic))
     origin = BUILT_IN if method in KNOWN_METHODS else "file.py"
@@ -94,14 +100,17 @@ def declared(method, deterministic=()):
 
 
 def study_of(rows, tasks=(), *, deterministic=(), **parts):
-    """A study of rows of runs, with parts made up; tasks that are not given are loaded by name."""
+    """Return a study of rows of runs, with made-up parts.
+
+    Tasks that are not in ``tasks`` are loaded by name.
+    """
     runs = pd.DataFrame(rows).reset_index(drop=True)
     runs = runs.astype({"reward": "Int64"})
     by_name, plan = {task.name: task for task in tasks}, []
     for (name, method, setting), _ in runs.groupby(["task", "method", "setting"], sort=False):
         parameters = {}
         for key, value in (item.split("=") for item in setting.split(", ") if item):
-            with suppress(ValueError):  # a text
+            with suppress(ValueError):  # the value is a string
                 value = ast.literal_eval(value)
             parameters[key] = value
         task = by_name.get(name) or load_task(name)
@@ -112,16 +121,20 @@ def study_of(rows, tasks=(), *, deterministic=(), **parts):
 
 
 def study_of_rewards(rewards, **parts):
-    """A study of ``{(task, method): rewards}``, None for a failed run; optima are proven."""
+    """Return a study of ``{(task, method): rewards}`` with proven optima.
+
+    The reward of a failed run is None.
+    """
     rows = [run for cell, of in rewards.items() for run in runs_of(*cell, of)]
     optima = made_up_optima(*{task for task, _ in rewards})
     return study_of(rows, **{"optima": optima, **parts})
 
 
 def study_of_trials(trials, plans, **more):
-    """A study of the rewards of trials of each run, ``{(task, method): [rewards, ...]}``.
+    """Return a study of rewards of trials, ``{(task, method): [rewards of a run, ...]}``.
 
-    ``plans`` are rows of runs without trials; each trial takes ``more["forward_kinematics"]``.
+    ``plans`` are rows of runs without trials. Each trial takes ``more["forward_kinematics"]``
+    evaluations.
     """
     rows, by_run = [], {}
     evaluations = more.pop("forward_kinematics")
@@ -136,7 +149,10 @@ def study_of_trials(trials, plans, **more):
 
 
 def study_of_solutions(cells, rows=None, replays=(), **parts):
-    """A study whose runs are executed as these ``Solutions``; one without runs is a failed run."""
+    """Return a study whose executed runs are ``cells``, a list of ``Solutions``.
+
+    ``Solutions`` without runs stand for a failed run.
+    """
     if rows is None:
         rows = [run for cell in cells for run in runs_of(
             cell.task.name, cell.label, [-300] * len(cell.runs) or [None],

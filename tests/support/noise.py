@@ -1,7 +1,7 @@
-"""Execution with motor noise, one robot after the other: slow and obvious.
+"""Execute solutions with motor noise, one robot after the other: slow and obvious.
 
-It makes every step of every movement by :mod:`tests.support.reference` and shares nothing with
-:mod:`coartic.motion.noise` but the order in which it draws.
+Every step of every movement is made by :mod:`tests.support.reference`. Only the order of random
+numbers is the same as in :mod:`coartic.motion.noise`; no code is shared.
 """
 
 from types import SimpleNamespace
@@ -15,7 +15,7 @@ from tests.support import reference
 def execute_noisy(
     task, solutions, motor_noise, repeats, seed, model=PAPER, *, signal_dependent=False
 ):
-    """:func:`coartic.execute_noisy`; NaN where an execution failed."""
+    """Return the ticks of :func:`coartic.execute_noisy`, which are NaN if an execution failed."""
     rows = []
     for k, solution in enumerate(solutions):
         whole = np.random.SeedSequence(seed, spawn_key=(k,)) if isinstance(seed, int) else seed[k]
@@ -85,7 +85,7 @@ def _move(task, robot, hand, goal, target, model, **how):
 
 
 def _make(task, robot, movement, corners, goal, model):
-    """A movement to the last of some corners, or along them."""
+    """Make a movement to the last of some corners, or a path along all of them."""
     how = {"stop_on_arrival": movement.kind in ("learned", "planned")}
     if movement.kind == "path":
         how = {"waypoints": corners}
@@ -93,7 +93,7 @@ def _make(task, robot, movement, corners, goal, model):
 
 
 def _aims_without_noise(task, solution, model):
-    """The movements to targets of the solution, with the coordinates that they move."""
+    """Return the movements of a solution to targets, with the coordinates that they move."""
     robot, aims = _robot(task), []
     for number, goal in enumerate(task.goals, 1):
         due = [movement for movement in solution if movement.goal == number]

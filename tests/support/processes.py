@@ -1,4 +1,4 @@
-"""Processes as Linux shows them, none elsewhere; and what is done in one of its own."""
+"""Look at processes (only on Linux), and call functions in separate processes."""
 
 import contextlib
 import importlib.util
@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def python(*arguments, cwd=None, fails=False, **environment):
-    """Output and end of Python on this code, in a process of its own."""
+    """Run Python with these arguments in a new process, and return the completed process."""
     command, env = [sys.executable, *arguments], os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, cwd=cwd, env=env | environment, capture_output=True, text=True)
     assert fails == bool(done.returncode), done.stderr
@@ -22,7 +22,7 @@ def python(*arguments, cwd=None, fails=False, **environment):
 
 
 def processes():
-    """Parent, session, working folder and command of each, by id; without those that have ended."""
+    """Return parent, session, working folder and command of each running process, by its id."""
     processes = {}
     for place in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
@@ -34,12 +34,12 @@ def processes():
 
 
 def folders_of_session(number):
-    """Where the processes of a session are."""
+    """Return the working folders of the processes of a session."""
     return [folder for _, session, folder, _ in processes().values() if session == number]
 
 
 def comes(condition):
-    """Whether a condition comes true, for which a busy machine has ten minutes."""
+    """Return True as soon as a condition is true, or False after ten minutes."""
     for _ in range(6000):
         if condition():
             return True
@@ -48,22 +48,26 @@ def comes(condition):
 
 
 def started(what, *arguments):
-    """A fork of this process, which has imported already what takes longest (a fresh one where
-    there are none), that calls a function with an end of a pipe and these arguments; and the other
-    end."""
+    """Start a process that calls a function with one end of a pipe and these arguments.
+
+    Returns the process and the other end of the pipe. On Linux the process is a fork, which has
+    already imported the slow modules; elsewhere it is a new process.
+    """
     how = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
     received, answers = how.Pipe(duplex=False)
     process = how.Process(target=what, args=(answers, *arguments))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of threads, which a fork does not have
+        warnings.simplefilter("ignore")  # Python warns that a fork does not copy threads
         process.start()
     answers.close()
     return process, received
 
 
 def apart(what, *arguments):
-    """What a function of a module returns in a process of its own (:func:`started`). Raises
-    ChildProcessError where it fails, after its traceback."""
+    """Call a function of a module in a separate process (:func:`started`), and return its result.
+
+    If the function fails, the process prints a traceback, and ChildProcessError is raised.
+    """
     process, received = started(_say, what, arguments)
     try:
         return received.recv()
@@ -78,8 +82,11 @@ def _say(answers, what, arguments):
 
 
 def pythons():
-    """Pythons of this machine by their minor version: this one, and those on the path and of pyenv,
-    but no shims, which need not start."""
+    """Return the paths of this machine's Pythons by their minor version.
+
+    They are this Python, and those on the path and of pyenv. Shims are left out, because they may
+    not start.
+    """
     by_minor = {sys.version_info[1]: [Path(sys.executable)]}
     places = map(Path, os.environ.get("PATH", "").split(os.pathsep))
     for place in (*places, *Path.home().glob(".pyenv/versions/*/bin")):
@@ -91,8 +98,10 @@ def pythons():
 
 
 def program(path):
-    """The module of a file that imports others from its folder, as where it is run: modules of the
-    same names from other folders are forgotten."""
+    """Import a file that imports modules from its folder, as if it were run, and return its module.
+
+    Modules of the same names from other folders are removed from ``sys.modules``.
+    """
     for other in path.parent.glob("*.py"):
         if getattr(sys.modules.get(other.stem), "__file__", None) != str(other):
             sys.modules.pop(other.stem, None)
@@ -105,11 +114,11 @@ def program(path):
 
 
 def programs(study, *names):
-    """Programs of a folder of ``studies/``."""
+    """Return the modules of some files of a folder of ``studies/``."""
     return [program(ROOT / "studies" / study / f"{name}.py") for name in names]
 
 
 def forget(*packages):
-    """Have these imported anew."""
+    """Remove packages from ``sys.modules``, so that they are imported again."""
     for name in [name for name in sys.modules if name.partition(".")[0] in packages]:
         del sys.modules[name]

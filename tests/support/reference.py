@@ -1,8 +1,9 @@
-"""The model as the paper publishes it, in plain NumPy: slow and obvious.
+"""Implement the model as the paper publishes it, in plain NumPy: slow and obvious.
 
-Movements are those of :mod:`analysis.verify`. Corrective process, execution and learner share the
-robot's formulas with the package and nothing of its kernels, which are tested against them; only a
-policy's initial hands are taken over. Draws from its generator in the same order as the learner.
+Movements are made by :mod:`analysis.verify`. Corrective process, execution and learner use the
+package's formulas of the robot, but none of its kernels, which are tested against them. Only the
+initial hands of a policy come from the package. The learner draws random numbers in the same order
+as the package's learner.
 """
 
 import math
@@ -26,16 +27,20 @@ ReferenceRun = namedtuple(
     "rewards completed values targets corrections corrective_iterations visits ticks_by_goal "
     "replay",
 )
-"""What the slow learner found; values and targets by state (goal, hand before) and hand. By trial:
-``corrections``; ``visits`` has state, hand and posture at each hit, ``ticks_by_goal`` the ticks for
-each goal. ``replay``: hands and ticks by goal of the greedy trial after the last; None where that
-failed."""
+"""Result of the slow learner.
+
+- ``values`` and ``targets`` are by state (goal, previous hand) and hand.
+- ``corrections`` are by trial. ``visits`` has, by trial, the state, hand and posture at each hit,
+  and ``ticks_by_goal`` the ticks for each goal.
+- ``replay`` has the hands and the ticks by goal of the greedy trial after the last trial, or is
+  None if that trial failed.
+"""
 
 
 def move(robot, q, target, hand, goal, radius, *, stop_on_arrival=True, model=PAPER, waypoints=()):
-    """:func:`coartic.move`, or a path along waypoints, by the engine of :mod:`analysis.verify`.
+    """Make a movement as :func:`coartic.move`, or a path along waypoints.
 
-    It visits every step, and is exact to the last bit.
+    :mod:`analysis.verify` makes it and visits every step. Results are equal to the last bit.
     """
     arm = robot.arm(hand)
     rules = SimpleNamespace(
@@ -52,11 +57,14 @@ def move(robot, q, target, hand, goal, radius, *, stop_on_arrival=True, model=PA
 
 
 Outcome = namedtuple("Outcome", "reward ticks corrections iterations hits movements rows")
-"""An execution; without a reward where it failed. ``rows``: the configuration at each tick."""
+"""Result of an execution. ``reward`` is None if it failed; ``rows`` are configurations by tick."""
 
 
 def execute(task, solution, model=PAPER):
-    """:func:`coartic.execute`, movement after movement; joints whose target is NaN stay."""
+    """Execute a solution as :func:`coartic.execute`, movement after movement.
+
+    Joints whose target is NaN do not move.
+    """
     q, hits, made, model = np.array(task.q0), [], [], model.for_radius(task.radius)
     rows, corrections, iterations = [np.empty((0, len(q)))], 0, 0
     for number, goal in enumerate(task.goals, 1):
@@ -97,8 +105,11 @@ def execute(task, solution, model=PAPER):
 
 
 def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, preferred=None):
-    """:func:`coartic.motion.correction.correct`, with the Jacobian as a matrix; each iteration adds
-    β N(x) (p − x) with the pull β and a preferred posture p."""
+    """Correct a posture as :func:`coartic.motion.correction.correct`.
+
+    The Jacobian is a matrix. Each iteration adds β N(x) (p − x) with the pull β and a preferred
+    posture p.
+    """
     free, model = np.ones(robot.dof), model.for_radius()
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
     q = np.array(q)
@@ -114,7 +125,7 @@ def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, pref
             moving = _moving(robot, hand, free)
             toward = (preferred - before)[moving]
             q[moving] += pull * null_space(robot, before, hand, moving) @ toward
-        if (q == before).all():  # a stationary point away from the goal: it stays for ever
+        if (q == before).all():  # a stationary point away from the goal: no iteration changes it
             return Correction(q, False, iteration + 1)
     error = goal - robot.forward_kinematics(q, hand)
     converged = math.sqrt(_sum_of_squares(error)) <= model.correction_tolerance
@@ -122,19 +133,19 @@ def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, pref
 
 
 def _moving(robot, hand, joints):
-    """Numbers of those of the joints that move a hand."""
+    """Return the indices of those joints (True in ``joints``) that move a hand."""
     of_hand = [0, 1, *np.arange(robot.dof)[robot.joints(hand)]]
     return [joint for joint in np.flatnonzero(joints) if joint in of_hand]
 
 
 def null_space(robot, q, hand, joints):
-    """N(q) = I − J⁺J of a hand over some joints, by singular values."""
+    """Return N(q) = I − J⁺J of a hand over some joints, by singular values."""
     jacobian = robot.jacobian(q, hand)[:, joints]
     return np.asarray(np.eye(len(joints)) - np.linalg.pinv(jacobian, rcond=1e-6) @ jacobian)
 
 
 def preferred_posture(task, condition, q, number, hand, values, targets):
-    """The preferred posture p at a goal that has become current, with the hand that is chosen."""
+    """Return the preferred posture p at the current goal, for the chosen hand."""
     if condition.direction == "start":
         return np.array(task.q0)
     p = np.array(q)
@@ -149,7 +160,7 @@ def preferred_posture(task, condition, q, number, hand, values, targets):
 
 
 def hits_of(task, condition, *, trials, seed, subject):
-    """Hits of a person who learns like this, as people's trials are recorded."""
+    """Return the hits of a person who learns as the learner does, as a recording of trials."""
     run = learn(task, condition, seed=seed, trials=trials)
     rows = [
         [subject, trial, goal, hand, ticks, *q]
@@ -161,7 +172,10 @@ def hits_of(task, condition, *, trials, seed, subject):
 
 
 def learn(task, condition, *, seed, trials, model=PAPER, start=()):
-    """:func:`coartic.learner.learning.learn`, after Figure 3 line by line; ``start``: trial 0."""
+    """Learn as :func:`coartic.learner.learning.learn`, after Figure 3 line by line.
+
+    ``start`` has the movements of trial 0.
+    """
     rng = np.random.default_rng(seed)
     first_hands = [movement.hand for movement in start] or hands_of(
         initial_hands(task, condition.hands, model=model)
@@ -175,7 +189,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
     by_trial = np.zeros(trials + 1, dtype=np.int64)
     visits, ticks_by_goal = [], []
     for trial in range(trials + 1):
-        if trial == trials:  # the replay, of which nothing is learned or counted
+        if trial == trials:  # the replay: nothing is learned from it or counted
             direction = condition.direction if condition.pull else "next-goal"
             greedy = {"hand_exploration": "none", "drift": 0.0, "noise_sd": 0.0}
             condition, counted = replace(condition, direction=direction, **greedy), iterations
@@ -255,7 +269,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
 
 
 def _choose(task, condition, q, goal, state, values, rng, model):
-    """The hand, and the iterations of the corrective process that the choice takes."""
+    """Return the chosen hand, and the iterations of the corrective process for the choice."""
     hands = [hand for hand in HANDS if hand in condition.hands]
     if condition.hand_exploration != "none" and rng.random() < condition.epsilon:
         if condition.hand_exploration == "nearest-posture":

@@ -34,7 +34,8 @@ PAPER_CELLS = [
 ]
 
 UNEVEN = Robot(left_links=(0.7,), right_links=(1.2, 0.4, 0.9, 0.6), left_shoulder=(-0.3, 0.2))
-"""As many links as the paper's robot at most: its kernels are compiled for that number."""
+"""Robot with uneven arms. It has at most as many links as the paper's robot, for which kernels are
+compiled."""
 
 
 def configurations(robot, low=-4.0, high=4.0):
@@ -42,8 +43,10 @@ def configurations(robot, low=-4.0, high=4.0):
 
 
 def posture(x=0.0, y=0.0, **joints):
-    """The paper's arms straight along +x, its base at (x, y): the right hand is at (x + 4.5, y +
-    0.1); ``right_2=0.3`` and the like bend them."""
+    """Return a posture of the paper's robot with its base at (x, y) and arms straight along +x.
+
+    The right hand is at (x + 4.5, y + 0.1). Keyword arguments such as ``right_2=0.3`` set joints.
+    """
     q = np.array([x, y, *[0.0] * 8])
     for name, angle in joints.items():
         hand, number = name.split("_")
@@ -52,8 +55,10 @@ def posture(x=0.0, y=0.0, **joints):
 
 
 def tiny_task(**changes):
-    """A two-goal task for the paper's robot, whose initial hands are right ones; keyword arguments
-    replace its keys."""
+    """Return a task with two goals for the paper's robot. Its initial hands are right hands.
+
+    Keyword arguments replace keys of the task.
+    """
     content = {
         "name": "tiny",
         "goals": [[5.0, 1.0], [5.0, 2.0]],
@@ -65,18 +70,24 @@ def tiny_task(**changes):
 
 
 STUCK = tiny_task(name="stuck", locked_base=["x", "y"], hands=["right"], goals=[[2.5, 0.1]])
-"""The corrective process cannot leave where it starts."""
+"""Task on which the corrective process cannot leave the start."""
 
 
 def failing_task(goals=((1.5, 0.1),), hands="R"):
-    """The left hand starts on a stationary point: its corrective process cannot leave."""
+    """Return a task on which the corrective process of the left hand cannot leave the start.
+
+    The left hand starts on a stationary point.
+    """
     start = {"left": [0.0] * 4, "right": [0.5, 0.5, 0.0, 0.0]}
     return tiny_task(goals=goals, initial_hands=hands, locked_base=["x", "y"], start=start)
 
 
 def uneven_task(left=(1.0,), right=(0.5, -0.5, 0.2, 1.0), base=(0.0, 0.0), **changes):
-    """As :func:`tiny_task`, for an uneven robot, whose arms start with these joints (rad); with
-    three goals for both hands unless others are given."""
+    """Return a task as :func:`tiny_task`, but for an uneven robot.
+
+    Its arms start with the joints ``left`` and ``right`` (in rad). By default it has three goals
+    for both hands.
+    """
     if "goals" not in changes:
         changes["goals"], changes["initial_hands"] = [[2.5, 1.0], [-0.5, 2.0], [2.0, -1.0]], "RLR"
     keys = ("left_links", "right_links", "left_shoulder")
@@ -87,7 +98,10 @@ def uneven_task(left=(1.0,), right=(0.5, -0.5, 0.2, 1.0), base=(0.0, 0.0), **cha
 
 
 def metres_task(radius=0.01, **changes):
-    """As :func:`tiny_task`, for a person's right arm in metres, 0.33 + 0.27, with a fixed trunk."""
+    """Return a task as :func:`tiny_task`, but for a person's right arm (0.33 + 0.27 m).
+
+    The trunk is fixed.
+    """
     place = [0.0, 0.0]
     robot = {"left_links": [0.33], "right_links": [0.33, 0.27], "left_shoulder": place}
     return tiny_task(
@@ -104,22 +118,22 @@ def metres_task(radius=0.01, **changes):
 TIED = tiny_task(
     goals=[[4.0, 0.1], [4.9, 0.1], [3.1, 0.1]], radius=0.6, initial_hands="best-of-all"
 )
-"""At the start both hands are in goal 1, the right one in goal 2 and the left one in goal 3: of LRL
-and RRL, which need no movement, RRL has fewer changes of hand."""
+"""Task with a tie. At the start, both hands are in goal 1, the right hand is in goal 2, and the
+left hand is in goal 3. LRL and RRL need no movement; RRL has fewer changes of hand."""
 
 
 def changed(like, **update):
-    """A shipped task with some keys changed, reachable or not."""
+    """Return a shipped task with some keys changed. Its goals can be out of reach."""
     content = {**load_task(like).model_dump(mode="json"), **update}
     return parse_task(content, "test", reach=False)
 
 
 AS_RELEASED = changed("two-armed-2", goals=[[6.5, 0.5], [6.0, 1.5], [6.5, 2.5], [6.5, 3.5]])
-"""The task with its goals of the first release, in which RLRR and RRRR tie."""
+"""The task with the goals of the first release, on which RLRR and RRRR tie."""
 
 
 def sample(task, count, noise=0.3, seed=0):
-    """Hand sequences, and targets around what the corrective process does with them."""
+    """Return random hand sequences, with noisy targets around their corrective postures."""
     rng = np.random.default_rng(seed)
     hands = [str(sequence) for sequence in rng.choice(hand_sequences(task), count)]
     targets = np.array([corrective_trial(task, sequence).configurations for sequence in hands])
@@ -128,8 +142,11 @@ def sample(task, count, noise=0.3, seed=0):
 
 
 def random_solution(task, model, rng):
-    """Movements of all kinds, up to three for a goal, near what hits the goal and far from it; some
-    coordinates stay where the corrective process alone would have them before."""
+    """Return random movements of all kinds, up to three for a goal.
+
+    Targets are near postures that hit the goal, or far from them. Some coordinates have the values
+    that they have in the corrective process alone before the goal.
+    """
     hands = str(rng.choice(hand_sequences(task)))
     alone = [task.q0, *corrective_trial(task, hands, model=model).configurations]
     alone += [alone[-1]] * (len(task.goals) + 1 - len(alone))
@@ -158,8 +175,7 @@ def random_solution(task, model, rng):
 
 
 def solve(method, task, seed=0, *, budget=None, model=PAPER, **parameters):
-    """What a method of this project finds on a task or its name, the execution of it, and the
-    session."""
+    """Run a built-in method on a task, and return its result, the execution, and the session."""
     options = {"trial_budget": budget, "model": model, "trusted": True}
     session = Session(as_task(task), seed, method.information, **options)
     result = method(method.Parameters(**parameters)).solve(session)
@@ -167,18 +183,22 @@ def solve(method, task, seed=0, *, budget=None, model=PAPER, **parameters):
 
 
 def make_trials(task, hands, targets, model=PAPER):
-    """Trials in a session of their own."""
+    """Make trials in a new session."""
     return Session(task, 0, OPTIMISER_INFORMATION, model=model).trials(hands, targets)
 
 
 def steps_from(q, configurations):
-    """Changes of the joints from one posture to the next, beginning with ``q``."""
+    """Return the changes of the joints from one posture to the next, beginning with ``q``."""
     return np.diff(np.vstack([q, *configurations]), axis=0)
 
 
 def least_cost(task, hands, moving, starts, *, radius, square=False):
-    """The least length, or sum of squares, of steps in joint space by which hands hit all goals: by
-    SLSQP, from steps of the joints that are ``moving``, shape (G, dof); all others are 0."""
+    """Return the smallest length of steps in joint space with which hands hit all goals.
+
+    With ``square``, it is the smallest sum of squares. The minimum is found by SLSQP from
+    ``starts``, over the steps of the joints that are ``moving``, shape (G, dof). All other steps
+    are 0.
+    """
 
     def steps(x):
         steps = np.zeros(moving.shape)
@@ -200,5 +220,5 @@ def least_cost(task, hands, moving, starts, *, radius, square=False):
 
 
 def shipped_optima():
-    """Entries of the shipped optima, with None for what they do not have."""
+    """Return the entries of the shipped optima, with None for a missing reward or bound."""
     return [SimpleNamespace(**({"reward": None, "bound": None} | entry)) for entry in entries()]

@@ -1,4 +1,4 @@
-"""Suites run into folders, in this process where processes are not what is tested."""
+"""Run suites into folders, in this process unless processes are tested."""
 
 import fcntl
 import json
@@ -25,7 +25,7 @@ KNOWN = registry()
 
 
 class InProcess(Local):
-    """An executor without processes, for tests of everything else."""
+    """Executor that starts no processes, for tests of everything else."""
 
     workers = 1
 
@@ -37,7 +37,7 @@ class InProcess(Local):
 
 
 class Failing(InProcess):
-    """An executor that loses the workers of some jobs, by their number."""
+    """Executor that loses the workers of some jobs, which are named by number."""
 
     def __init__(self, *numbers):
         self.numbers = numbers
@@ -49,7 +49,7 @@ class Failing(InProcess):
 
 
 def cell_on(task, method, **parameters):
-    """A cell with these parameters, and the defaults of the others."""
+    """Return a cell with these parameters, and defaults of other parameters."""
     return cell_of(task, method, parameters)
 
 
@@ -69,7 +69,7 @@ def suite_of(tmp_path, *blocks):
 
 
 def planned(cells=None, *, runs=2, trials=150, seed=0, time_limit_s=300.0, trial_budget=None):
-    """A plan of some cells, or of those of the paper, as parts of suite ``paper``."""
+    """Return a plan of some cells, by default those of the paper, as a part of suite ``paper``."""
     plan = []
     for each in paper_cells() if cells is None else cells:
         defaults, numbers = each.method.defaults, range(runs if each.method.stochastic else 1)
@@ -80,13 +80,16 @@ def planned(cells=None, *, runs=2, trials=150, seed=0, time_limit_s=300.0, trial
 
 
 def run_and_write(folder, cells=None, *, executor=None, **options):
-    """The study of a folder into which a plan of :func:`planned` is performed."""
+    """Perform a plan of :func:`planned` into a folder, and return the study of the folder."""
     perform(planned(cells, **options), folder, executor=executor or InProcess())
     return load(folder)
 
 
 def made_once(tmp_path_factory, name, make):
-    """A folder that ``make`` fills, once for all workers of pytest: the others wait for it."""
+    """Return a folder that ``make`` fills once for all workers of pytest.
+
+    The other workers wait for it.
+    """
     root = tmp_path_factory.getbasetemp()
     root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
     folder, made = root / name, root / f"{name}.made"
@@ -99,22 +102,25 @@ def made_once(tmp_path_factory, name, make):
 
 
 def unpacked(place, folder):
-    """A results folder of the packed runs that are stored in a place."""
+    """Unpack the runs that are stored in folder ``place`` into a results folder."""
     packed = (place / f"{RUNS_FILE}.xz").read_bytes()
     (folder / RUNS_FILE).write_bytes(lzma.decompress(packed))
     return folder
 
 
 def edit(folder, statement, *values):
-    """A change of a results folder by hand."""
+    """Change a results folder with an SQL statement, which must change at least one row."""
     with closing(sqlite3.connect(folder / RUNS_FILE)) as database:
         assert database.execute(statement, values).rowcount
         database.commit()
 
 
 def edit_movement(folder, run, change, part="solution", order=0):
-    """A change of a stored movement by hand: of run number ``run`` in the order in which they were
-    written, from 1. ``change`` gets goal, hand, kind, ticks and path, a list of numbers."""
+    """Change a stored movement.
+
+    ``run`` is the number of the run in the order of writing, from 1. ``change`` is called with a
+    list of goal, hand, kind, ticks and path (a list of numbers), and changes it.
+    """
     with closing(sqlite3.connect(folder / RUNS_FILE)) as database:
         query = "SELECT movements FROM results WHERE rowid = ?"
         parts = json.loads(database.execute(query, [run]).fetchone()[0])
@@ -126,7 +132,7 @@ def edit_movement(folder, run, change, part="solution", order=0):
 
 
 def same_results(a, b):
-    """Two studies agree in all but times."""
+    """Assert that two studies agree in everything but times and environments."""
     times = ["build_s", "solve_s", "wall_s", "cpu_s", "warm", "together", "process_peak_mb"]
     times += ["commit", "packages", "date"]
     pd.testing.assert_frame_equal(a.runs.drop(columns=times), b.runs.drop(columns=times))
@@ -137,7 +143,7 @@ def same_results(a, b):
 
 
 def traced_cells():
-    """Of the paper, beside planners, a search without a corrective process, and an ablation."""
+    """Return cells of learners, planners and hill climbing, and of a learner with more noise."""
     cells = [
         cell_on(load_task(task), KNOWN[method])
         for task, methods in (
