@@ -1,8 +1,7 @@
 """Compute mean gains and signatures for each task, method, number of trials and dose of memory."""
 
+import numpy as np
 import pandas as pd
-
-from coartic.analysis import TwoContexts
 
 MEASURES = {
     "gain": "gain (ticks)",
@@ -24,6 +23,10 @@ NAMES = {
     "posture-based/two-goals": "posture planning",
     "posture-qp/goals-ahead": "posture QP",
 }
+CONTEXTS = ("ascending", "descending")
+"""Tasks with the same first goal."""
+POSTURE = ["at_x", "at_y", *(f"at_{joint}" for joint in range(1, 5))]
+"""Columns of the posture at goal 1: base (length unit) and joints of the right arm (rad)."""
 TRIALS = 10_000
 LEAST_SHARE = 0.1
 
@@ -80,19 +83,47 @@ def groups_of(cells, measure):
     return {"all": families} | {family: [family] for family in families}
 
 
-def measure_contexts(study):
-    """Tabulate the posture difference at the first goal of both one-armed tasks of the paper, with
-    the mean gain on both, by label of the method."""
-    rows = {}
-    runs = measure_runs(study)
-    runs = runs[runs.task.isin(("ascending", "descending"))]
-    for label, of in runs.groupby("label", sort=False):
-        if of.task.nunique() == 2:
-            both = (study.executed(task, label) for task in ("ascending", "descending"))
-            contexts = TwoContexts(*both, 1, "right")
-            rows[label] = {
-                "runs": len(of) // 2,
-                "gain": of.groupby("task").gain.mean().mean(),
-                "distance": contexts.posture_difference,
-            }
-    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("label")
+def measure_postures(study, runs):
+    """Return the runs on :data:`CONTEXTS` with the posture in which each hits goal 1."""
+    rows = []
+    of_contexts = runs[runs.task.isin(CONTEXTS)]
+    for (task, label), of_label in of_contexts.groupby(["task", "label"], sort=False):
+        executed = study.executed(task, label)
+        arm = executed.task.robot.joints("right")
+        hits = executed.configurations[:, 0]
+        hits = pd.DataFrame(np.hstack([hits[:, :2], hits[:, arm]]), executed.run_ids, POSTURE)
+        rows.append(of_label.join(hits, on="run_id"))
+    return pd.concat(rows)
+
+
+def postures(rows):
+    """Return the postures of rows on the two tasks of :data:`CONTEXTS`, shape ``(runs, 6)``
+    each."""
+    return [rows.loc[rows.task == task, POSTURE].to_numpy(float) for task in CONTEXTS]
+
+
+def distance(groups):
+    """Return the distance of the mean postures of two groups."""
+    return float(np.linalg.norm(groups[0].mean(axis=0) - groups[1].mean(axis=0)))
+
+
+def rows_of_contexts(study, runs):
+    """Return the runs behind table ``contexts``, a row each: the learner, and random search with
+    each dose of memory."""
+    is_learner = (runs.name == "learner") & (runs.trials == TRIALS)
+    rows = measure_postures(study, runs[is_learner | (runs.name == "random search")])
+    return rows[["label", "task", "run", "gain", *POSTURE]].set_index("label")
+
+
+def tabulate_contexts(rows):
+    """Tabulate the posture difference at the first goal of :data:`CONTEXTS`, with the mean gain on
+    both tasks, by label of the method. ``rows``: :func:`rows_of_contexts`."""
+    table = {
+        label: {
+            "runs": len(of_label) // 2,
+            "gain": of_label.groupby("task").gain.mean().mean(),
+            "distance": distance(postures(of_label)),
+        }
+        for label, of_label in rows.groupby("label", sort=False)
+    }
+    return pd.DataFrame.from_dict(table, orient="index").rename_axis("label")

@@ -3,10 +3,11 @@
     coartic run studies/memory/one-selection.toml --out results/one-selection
     python studies/memory/one_selection.py results/one-selection
 
-writes one_selection.csv, a row for each task and signature: random search (the best of 10,000
-trials), and by how much the learner exceeds it, after as many trials (``more``) and after the
-number of trials at which its gain is nearest to random search's (``equal``). On two arms both have
-the hands in which the learner ends.
+writes one_selection.csv.xz, a row for each run, and one_selection.csv, a row for each task and
+signature: random search (the best of 10,000 trials), and by how much the learner exceeds it, after
+as many trials (``more``) and after the number of trials at which its gain is nearest to random
+search's (``equal``). On two arms both have the hands in which the learner ends. Without a folder
+the table is made again from the stored runs.
 """
 
 import sys
@@ -14,18 +15,36 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from cells import MEASURES, TRIALS, measure_runs
+from cells import (
+    CONTEXTS,
+    MEASURES,
+    POSTURE,
+    TRIALS,
+    distance,
+    measure_postures,
+    measure_runs,
+    postures,
+)
 
 from coartic.analysis import load
 from coartic.estimates import Estimate, difference_of_means
 
-CONTEXTS = "ascending", "descending"
+HERE = Path(__file__)
 RESAMPLES = 9_999
+COLUMNS = ["task", "name", "trials", "run", "hands", *MEASURES, *POSTURE]
 
 
-def tabulate(study):
+def rows_of(study):
+    """Return the runs, a row each, by task; postures at goal 1 are only of :data:`CONTEXTS`."""
+    runs = measure_runs(study)
+    others = runs[~runs.task.isin(CONTEXTS)]
+    rows = pd.concat([measure_postures(study, runs), others])
+    return rows[COLUMNS].set_index("task")
+
+
+def tabulate(runs):
     """Return the table; posture differences are those at the first goal of two tasks."""
-    runs, rows = measure_runs(study), {}
+    runs, rows = runs.reset_index(), {}
     for task, of_task in runs.groupby("task", sort=False):
         search = of_task[of_task.name == "random search"]
         learner = of_task[of_task.name == "learner"]
@@ -42,9 +61,9 @@ def tabulate(study):
     both = runs[runs.task.isin(CONTEXTS)]
     search, learner = (both[both.name == name] for name in ("random search", "learner"))
     equal = as_much(learner, search)
-    theirs = postures(study, search)
+    theirs = postures(search)
     rows["contexts posture"] = row_of(distance(theirs), equal, {
-        word: excess(postures(study, learner[learner.trials == trials]), theirs)
+        word: excess(postures(learner[learner.trials == trials]), theirs)
         for word, trials in (("more", TRIALS), ("equal", equal))
     })  # fmt: skip
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
@@ -67,16 +86,6 @@ def row_of(value, trials, excesses):
     return row
 
 
-def postures(study, runs):
-    """Return configurations at goal 1 on both tasks of a method, shape ``(runs, dof)`` each."""
-    return [study.configurations(task, runs.label.iloc[0])[:, 0] for task in CONTEXTS]
-
-
-def distance(groups):
-    """Return the distance of the mean configurations of two groups."""
-    return float(np.linalg.norm(groups[0].mean(axis=0) - groups[1].mean(axis=0)))
-
-
 def excess(ours, theirs):
     """Return by how much a posture difference exceeds another, with an interval.
 
@@ -92,5 +101,7 @@ def excess(ours, theirs):
 
 
 if __name__ == "__main__":
-    table = tabulate(load(sys.argv[1]))
-    table.to_csv(Path(__file__).with_suffix(".csv"), float_format="%.6g")
+    if sys.argv[1:]:
+        rows_of(load(sys.argv[1])).to_csv(HERE.with_suffix(".csv.xz"), float_format="%.6g")
+    stored = pd.read_csv(HERE.with_suffix(".csv.xz"), index_col=0)
+    tabulate(stored).to_csv(HERE.with_suffix(".csv"), float_format="%.6g")

@@ -3,8 +3,8 @@
     python studies/memory/protocols.py results/memory
     PYTHONPATH=studies python studies/memory/study.py results/memory
 
-Without a folder, tables and page are made from cells.csv. hands.py has the runs on the learner's
-rule for hands, and one_selection.py those at equal gain.
+Without a folder, tables and page are made from cells.csv and runs.csv.xz. hands.py has the runs on
+the learner's rule for hands, and one_selection.py those at equal gain.
 
 Random search is the learner without its memory. Here it has memory by the dose: after each of r
 equal parts of its trials it goes on from its best trial, from the postures that this trial reached
@@ -19,7 +19,15 @@ import sys
 from pathlib import Path
 
 import pandas as pd
-from cells import KEEPS, MEASURES, groups_of, measure_cells, measure_contexts, measure_runs
+from cells import (
+    KEEPS,
+    MEASURES,
+    groups_of,
+    measure_cells,
+    measure_runs,
+    rows_of_contexts,
+    tabulate_contexts,
+)
 from equal_gain import tabulate_equal
 from scales import MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
 
@@ -92,14 +100,16 @@ def draw(results):
 
 def measure(study):
     """Return the tables by name; each becomes a CSV file."""
-    cells = measure_cells(measure_runs(study))
-    return {"cells": cells, "contexts": measure_contexts(study), **tables_of(cells)}
+    runs = measure_runs(study)
+    cells, rows = measure_cells(runs), rows_of_contexts(study, runs)
+    return {"cells": cells, "runs": rows, **tables_of(cells, rows)}
 
 
-def tables_of(cells):
-    """Return the tables that are made from means over runs, by name."""
+def tables_of(cells, rows):
+    """Return the tables that are made from means over runs and from runs on two tasks, by name."""
     scales = every_scale(cells)
     return {
+        "contexts": tabulate_contexts(rows),
         "results": tabulate(scales),
         "scales": tabulate_scales(scales),
         "keeping": tabulate_keeping(cells),
@@ -112,4 +122,5 @@ if __name__ == "__main__":
     if sys.argv[1:]:
         write_study(HERE, measure(load(sys.argv[1])), draw)
     else:
-        write_study(HERE, tables_of(pd.read_csv(HERE / "cells.csv", index_col=0)), draw)
+        stored = [pd.read_csv(HERE / name, index_col=0) for name in ("cells.csv", "runs.csv.xz")]
+        write_study(HERE, tables_of(*stored), draw)
