@@ -13,12 +13,12 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from coartic.analysis.figures import dots, styled
-from coartic.analysis.methods import COLORS, KNOWN_METHODS, MARKS
+from coartic.analysis.figures import dots, look_of, styled
 
 Table = Callable[[str, str], pd.DataFrame]
 """Function that returns a stored table of a suite or a study by their names."""
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
+BLUE = look_of("dual-process/EC4")["color"]
 LEARNER, RANDOM = "dual-process (EC1, EC4)", "random-search"
 METHODS = {
     "cma-es/bandit": ("CMA-ES", "cma-es/bandit"),
@@ -54,7 +54,7 @@ def draw(
 ) -> Figure:
     """Draw a dot plot with a panel for each quantity, and an estimate in it for each name."""
     rows = pd.DataFrame({"name": names, "bold": False})
-    rows[["color", "marker"]] = looks or [(COLORS["navy"], "D")] * len(rows)
+    rows[["color", "marker"]] = looks or [(BLUE, "D")] * len(rows)
     for label, estimates in quantities.items():
         rows[[label, f"{label}_low", f"{label}_high"]] = estimates
     return dots(rows, {label: label for label in quantities}, lines.get("at", {}))
@@ -110,9 +110,9 @@ def gaps(table: Table) -> Figure:
         column = f"in {family}/v1"
         label = f"{'14 goals' if family == 'many-goals' else family}\ngap (%)"
         panels[label] = [estimate(families.loc[m], column, 100) for m in METHODS]
-    looks = [KNOWN_METHODS[method].look for _, method in METHODS.values()]
+    looks = [look_of(method) for _, method in METHODS.values()]
     names = [name for name, _ in METHODS.values()]
-    return draw(names, panels, [(COLORS[color], MARKS[mark][0]) for color, mark in looks])
+    return draw(names, panels, [(look["color"], look["marker"]) for look in looks])
 
 
 @styled

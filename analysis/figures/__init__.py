@@ -15,12 +15,13 @@ from coartic.analysis.figures.style import (
     dots,
     legend,
     letters,
+    look_of,
     means,
     panels,
     styled,
 )
 
 __all__ = [
-    "COVERAGE", "GREY", "ONE", "PALETTE", "TWO", "Plot", "dots", "legend", "letters", "means",
-    "panels", "picture", "styled",
+    "COVERAGE", "GREY", "ONE", "PALETTE", "TWO", "Plot", "dots", "legend", "letters", "look_of",
+    "means", "panels", "picture", "styled",
 ]  # fmt: skip

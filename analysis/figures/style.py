@@ -26,7 +26,7 @@ from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from coartic import estimates
 from coartic.analysis.frames import checked
-from coartic.analysis.methods import COLORS
+from coartic.analysis.methods import COLORS, KNOWN_METHODS, MARKS
 
 INCH = 25.4  # mm
 ONE = 89 / INCH
@@ -59,6 +59,23 @@ styled = style.context(["default", RC])
 
 Look = dict[str, Any]
 """Look of a method's lines and markers: arguments of Matplotlib's ``plot``."""
+
+
+def look_of(method: str) -> Look:
+    """Return the colour, the marker and the line style of a built-in method in all figures.
+
+    Parameters
+    ----------
+    method : str
+        Id of a method that ships and is drawn in figures, such as ``"cma-es/bandit"``.
+
+    Returns
+    -------
+    dict
+        ``color``, ``marker`` and ``linestyle``, arguments of Matplotlib's ``plot``.
+    """
+    color, mark = KNOWN_METHODS[method].look
+    return {"color": COLORS[color], "marker": MARKS[mark][0], "linestyle": MARKS[mark][1]}
 
 
 def grid(panels: int) -> tuple[int, int]:

@@ -127,7 +127,8 @@ SECTIONS = (
 {{ ", which %s settings have" % tied if tied > 1 }}.
 {%- for next in others[1].to_dict("records")[:1] if tied == 1 %}
  The gap of {{ next.subject.removesuffix(",") }} is larger by \
-{{ interval(next, "difference", scale=100) }} percentage points{{ ", which %s chance (%s)" % ("exceeds" if next.p_holm < LEVEL else "may be", \
+{{ interval(next, "difference", scale=100) }} percentage points\
+{{ ", which %s chance (%s)" % ("exceeds" if next.p_holm < LEVEL else "may be", \
 p_value(next.p_holm)) if next.p_holm >= 0 else few(next) }}.
 {%- endfor %}
 {%- set said = [best.method] + others[1].method[:1].tolist() %}

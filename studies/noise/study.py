@@ -17,7 +17,6 @@ import pandas as pd
 import why
 
 from coartic.analysis import figures, load
-from coartic.analysis.methods import COLORS, KNOWN_METHODS, MARKS
 from common.writing import write_study
 
 GROUPS = {"paper": "the paper's tasks", "families": "200 random tasks"}
@@ -92,9 +91,7 @@ def draw(results):
     for axes, (group, title) in zip(panels, GROUPS.items(), strict=True):
         of_group = results[(results.group == group) & ~results.signal_dependent]
         for name, method in {name: method for method, name in order.NAMES.items()}.items():
-            color, mark = KNOWN_METHODS[method].look
-            marker, dash = MARKS[mark]
-            look = {"color": COLORS[color], "marker": marker, "linestyle": dash, "label": name}
+            look = figures.look_of(method) | {"label": name}
             figures.means(axes, of_group[of_group.name == name], x="motor_noise", y="gap", **look)
         axes.set(title=title, xlabel="motor noise s (rad, length units)", yscale="log")
         axes.set_xticks([0, 0.005, 0.01, 0.02])
