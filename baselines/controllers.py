@@ -27,8 +27,8 @@ from coartic.motion.movement import follow
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import beyond_reach, letters_of
 
-_HIT_MARGIN = 1e-9  # length unit: the scorer interpolates along the path, and rounds
-_STALL_STEPS = 50  # steps after which a hand is stuck that comes no tenth of a step nearer
+_HIT_MARGIN = 1e-9  # in length units: the scorer interpolates along the path, and rounds
+_STALL_STEPS = 50  # a hand is stuck if it comes less than a tenth of a step nearer in so many steps
 _BINDS = 1e-3  # least difference of joint changes at which a level counts as binding
 
 

@@ -27,7 +27,7 @@ from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
 _EPSILON = 0.2  # probability of a random hand, for each goal
-_MOST_DRAWN = 128  # most trials that are drawn before the first of them is made
+_MOST_DRAWN = 128  # largest number of trials that are drawn ahead
 
 
 class HillClimbingParameters(UninformedParameters):

@@ -50,13 +50,13 @@ Mask = NDArray[np.bool_]
 PER_ROUND = 60
 """Number of postures that a round generates for each hand sequence."""
 # Feedforward correction: damped Gauss-Newton steps on the hand's error.
-_DAMPING = 1e-3  # length unit squared: the Jacobian of a straight arm is singular
-_LONGEST = 0.5  # length unit: largest part of the error that one step corrects
+_DAMPING = 1e-3  # in squared length units: the Jacobian of a straight arm is singular
+_LONGEST = 0.5  # in length units: largest part of the error that one step corrects
 _RETRIEVED = 40  # steps for a stored posture, which may be far from the goal
 _GENERATED = 3  # steps for a generated posture, which is near the goal
 _INSIDE = 0.999  # a step aims at this part of the tolerated error
-_SPREAD = 1.0  # largest SD of stored postures around the starting posture, rad
-_FIRST_SD = 0.3  # first SD of the diffusion, length unit (base) or rad (joints)
+_SPREAD = 1.0  # largest SD of stored postures around the starting posture, in rad
+_FIRST_SD = 0.3  # first SD of the diffusion, in length units (base) or rad (joints)
 _LAST_SD = 0.01  # last SD of the diffusion, as a part of the first
 
 

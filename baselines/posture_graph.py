@@ -42,7 +42,7 @@ QUICK = {"nodes": 40, "graphs": 1, "chains": 1}
 """Parameters of a planner for a check that takes seconds."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # SD of samples, in length units (base) and rad (joints)
-_NEAR = 2.0  # length unit: at a larger distance the base first moves the hand this near
+_NEAR = 2.0  # in length units: at a larger distance the base first moves the hand this near
 
 
 def _sample_postures(

@@ -66,13 +66,13 @@ its sides are at most 2 % of the radius from the rim."""
 
 _FACE_NORMALS = directions(2 * np.pi * np.arange(FACES) / FACES)
 _INSET = float(directions(np.pi / FACES)[0])
-_MARGIN = 1e-4  # length unit: the hand approaches the polygon without end, but enters the disc
+_MARGIN = 1e-4  # in length units: the hand never reaches the polygon, but enters the disc
 _CLOSING = 0.03  # least speed of the hand towards the goal, as a share of even speed
-_POSTURE_STEPS = 400  # most steps of a search for a posture
-_POSTURE_STEP = 0.1  # longest of these steps, length unit and rad: longer steps end far away
+_POSTURE_STEPS = 400  # largest number of steps of a search for a posture
+_POSTURE_STEP = 0.1  # longest of these steps, in length units and rad: longer steps end far away
 _POSTURE_GAIN = 0.5  # share of the path to the preferred posture in a step: 1 may oscillate
-_POSTURE_TOLERANCE = 1e-3  # length of a step at which a search ends, length unit and rad
-_SHORTEST = 0.02  # shorter paths get the weight of this length, length unit and rad
+_POSTURE_TOLERANCE = 1e-3  # length of a step at which a search ends, in length units and rad
+_SHORTEST = 0.02  # shorter paths get the weight of this length, in length units and rad
 
 
 class PostureController(Controller):

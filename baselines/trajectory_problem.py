@@ -69,8 +69,8 @@ _RATES: dict[Cost, int] = {
     "jerk": 2,
     "hand-jerk": 2,
 }  # derivatives that are variables
-# IPOPT's tolerance, where it is not 1e-9. With it, a plan by jerk of the hand is within about 1e-6
-# of the least cost, like the better plan of two starts with 1e-9.
+# IPOPT's tolerance, where it is not 1e-9. With this value, a plan by jerk of the hand is within
+# about 1e-6 of the least cost, as is the better plan of two starts with 1e-9.
 _TOLERANCE: dict[Cost, float] = {"hand-jerk": 5e-10}
 _SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _OPTIONS: dict[str, Any] = {

@@ -19,7 +19,7 @@ LONGEST_LINE = 500
 """Largest number of characters of a title, a description or a citation."""
 LONGEST_REASON = 2000
 """Largest number of characters of a stored reason."""
-_MOST_NAMED = 12  # most names in a sentence
+_MOST_NAMED = 12  # largest number of names in a sentence
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:

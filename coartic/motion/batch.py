@@ -163,7 +163,7 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
         "q": (np.float64, width),  # where the robot is, in length units and rad
         "target": (np.float64, width),  # of a movement; where a correction has ended
         "preferred": (np.float64, width),  # preferred posture, in length units and rad
-        "drift": np.float64,  # by what share of the path to it exploration's mean moves
+        "drift": np.float64,  # share of the path to it by which the mean of exploration moves
         "pull": np.float64,  # share of that path in an iteration of the corrective process
         "goal": (np.float64, 2),  # x and y, in length units
         "hand": np.int64,  # the hand that is to hit the goal: 0 left, 1 right
@@ -210,10 +210,10 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "goal": (2,),
         "start": joints,
         "target": joints,
-        "rate": (links,),  # of the absolute link angles, rad a step
+        "rate": (links,),  # of the absolute link angles, in rad per step
         "base_rate": (2,),
         "end": (2,),  # position to which the target would bring the hand
-        "distance": (),  # from start to target; before divide_steps its square
+        "distance": (),  # from start to target (its square before divide_steps)
         **dict.fromkeys(("step", "last", "slowness", "bend", "clearance"), ()),
         "x": (links + 1,),  # of shoulder, joints and hand
         "y": (links + 1,),

@@ -203,7 +203,7 @@ def _set_up_numba() -> Any:
     finally:
         del modules["yaml"]
         modules.update(yaml_module)
-    config._config_fname = ""  # nor does it before it compiles
+    config._config_fname = ""  # nor when it compiles
 
     from llvmlite import binding  # installed with Numba, in the version that Numba needs
 

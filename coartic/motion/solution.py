@@ -350,7 +350,7 @@ def _execution_of(
     shape ``(G,)``.
     """
     hits = sum(goals["hit"].tolist())
-    # The position of the hand is evaluated before the first movement, and where that leads.
+    # The hand is evaluated before the first movement and, unless it is corrective, at its end.
     checked = [2 - (of_goal[0].kind == "corrective") for of_goal in plan[: hits + 1]]
     return Execution(
         movements=tuple(movements),
