@@ -87,9 +87,8 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     -------
     Estimate
         The budget. It is infinite if no budget is enough. The ends of the interval are percentiles
-        of a bootstrap that resamples runs within tasks. Unlike other intervals, this one is not
-        widened for few runs, because budgets can be infinite. There is no interval if a task has
-        fewer than five runs.
+        of a bootstrap that resamples runs within tasks. The interval is not widened for few runs,
+        because budgets can be infinite. There is no interval if a task has fewer than five runs.
     """
     values, weights, runs = _pairs(times)
 
