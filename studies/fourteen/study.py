@@ -1,4 +1,4 @@
-r"""Is a planner's horizon a number of goals, or a share of those left?
+r"""Measure whether a planner's horizon is a number of goals, or a share of the goals left.
 
     coartic run studies/fourteen/suite.toml \
         --family-file studies/fourteen/fourteen-one.v1.toml \
