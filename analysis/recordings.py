@@ -355,7 +355,7 @@ def _table(path: str | Path) -> pd.DataFrame:
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)  # of rows with too many values
+            warnings.simplefilter("error", pd.errors.ParserWarning)  # for rows with too many values
             frame = pd.read_csv(
                 path, comment="#", index_col=False, skipinitialspace=True, keep_default_na=False,
                 na_values=[""], dtype={"subject": str, "hand": str}, encoding="utf-8-sig",
