@@ -173,11 +173,12 @@ def smallest_shift(n):
 
 
 def spreads(contexts):
-    """Return the SDs between people of a lean that is not there, without looking at the lean.
+    """Return SDs that the leans of people would have without a lean, not using the leans.
 
-    ``repeats``: what the variance of the repeats within contexts explains. ``at right angles``:
-    the spread between people of the same difference, end less start, on the three directions at
-    right angles to n_A − n_B, in which no lean counts; the mean over people is taken out.
+    - ``repeats``: the SD that the variance of the repeats within contexts explains;
+    - ``at right angles``: the SD between people of the same difference (end less start) in the
+      three directions at right angles to n_A − n_B, in which a lean has no effect. The mean over
+      people is subtracted.
     """
     variances, across = {}, {}
     for of_target in contexts.values():
@@ -192,7 +193,7 @@ def spreads(contexts):
             variances.setdefault(person, []).append(
                 sum((each @ way / length).var(ddof=1) / len(each) for each in moved)
             )
-            # The first column is the way; the others follow the joints in their order.
+            # The first column is the direction of n_A − n_B; the others are orthogonal to it.
             basis, triangle = np.linalg.qr(np.column_stack([way, np.eye(len(way))[:, :-1]]))
             basis *= np.sign(np.diag(triangle))
             difference = moved[0].mean(axis=0) - moved[1].mean(axis=0)
