@@ -127,7 +127,7 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
         return True
     if not run.method.startswith(METHOD_PREFIX):
         return bool(run.get("idle_arm", True))
-    name = study.methods.condition[label] or run.base  # of the learner with an own condition
+    name = study.methods.condition[label] or run.base  # the base of a user's condition
     changed = run.get("modify_other")
     return EVERY_CONDITION[name].modify_other if pd.isna(changed) else bool(changed)
 

@@ -66,7 +66,7 @@ def checked(
     Returns
     -------
     DataFrame
-        Its index has no names, because they could be names of columns.
+        The checked columns. Their index has no names, because these could be names of columns.
 
     Raises
     ------

@@ -182,12 +182,12 @@ def hits_from_markers(
         A frame or a CSV file in UTF-8 with a row for each sample, in the order of time, with the
         columns ``subject``, ``trial`` (from 1), ``time`` (s), and the position of each marker in
         the length unit of the task: ``right_1_x``, ``right_1_y`` for the shoulder (joint 1),
-        ``right_2`` for the next joint, ``right_tip`` for the hand; likewise ``left``.
+        ``right_2`` for the next joint, ``right_tip`` for the hand; the same for ``left``.
     task : Task
         The task that was practised.
     side : {"left", "right", "both"}, optional
-        The arms to read; by default the task's arms whose hands have a marker. The other arm stays
-        as at the start of the task.
+        The arms to read; by default the task's arms whose hands have a marker. An arm that is not
+        read stays as at the start of the task.
     ticks_per_unit : float
         Number of ticks in a second.
 
@@ -311,7 +311,7 @@ def draw_recording(
     Raises
     ------
     CoarticError
-        A table cannot be read, or neither ``hits`` nor ``samples`` is given.
+        A table cannot be read, or ``hits`` and ``samples`` are both None.
     """
     trials = [] if samples is None else _trials_of(samples, task, None)[1]
     if hits is None:
@@ -355,7 +355,7 @@ def _table(path: str | Path) -> pd.DataFrame:
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)  # of rows with too many values
+            warnings.simplefilter("error", pd.errors.ParserWarning)  # for rows with too many values
             frame = pd.read_csv(
                 path, comment="#", index_col=False, skipinitialspace=True, keep_default_na=False,
                 na_values=[""], dtype={"subject": str, "hand": str}, encoding="utf-8-sig",

@@ -32,7 +32,7 @@ TARGETS = tuple(n / 20 for n in range(1, 21))
 """Targets, as shares of the distance between two rewards: that of the corrective process alone with
 its best hands, and the best known reward."""
 
-_MOST_RUNS_DRAWN = 20_000_000  # in all resamples together; with very many runs, fewer resamples
+_MOST_RUNS_DRAWN = 20_000_000  # in all resamples together; very many runs have fewer resamples
 RunningTimes = Sequence[Array]
 """For each task, the cost at which each run of a method reaches each target, shape
 ``(runs, targets)``; infinite if the run does not reach the target."""
@@ -87,9 +87,8 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
     -------
     Estimate
         The budget. It is infinite if no budget is enough. The ends of the interval are percentiles
-        of a bootstrap that resamples runs within tasks. Unlike other intervals, this one is not
-        widened for few runs, because budgets can be infinite. There is no interval if a task has
-        fewer than five runs.
+        of a bootstrap that resamples runs within tasks. The interval is not widened for few runs,
+        because budgets can be infinite. There is no interval if a task has fewer than five runs.
     """
     values, weights, runs = _pairs(times)
 

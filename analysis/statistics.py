@@ -57,7 +57,7 @@ from coartic.internal.limits import MOST_RUNS
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
-_MOST_PLACES = 2_000_000  # most indices of resamples that are cached together
+_MOST_PLACES = 2_000_000  # largest number of indices of resamples that are cached together
 _Count = Annotated[int, Field(ge=0, le=MOST_RUNS)]
 _Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -404,7 +404,7 @@ def places(
             yield part, drawn_rows(runs, chosen, size, rng)
 
 
-@lru_cache(maxsize=16)  # most samples have as many values as another
+@lru_cache(maxsize=16)  # many samples have the same numbers of values
 def _kept_places(
     runs: int, chosen: int, resamples: int, exact: bool
 ) -> list[tuple[slice, NDArray[np.int32]]]:

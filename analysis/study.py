@@ -308,8 +308,8 @@ class Study:
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with any setting, represents its algorithm;
-        - ``under``: label of the method of which this row is a setting or an ablation, if lists
-          show it under that method; otherwise empty;
+        - ``under``: if this row is a setting or an ablation of another method, under which lists
+          show it, the label of that method; otherwise empty;
         - ``look``: names of colour and marker in figures, a tuple of two strings.
         """
         return methods_of(self.runs, self.declared, self.marks)

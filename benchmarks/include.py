@@ -98,7 +98,7 @@ def include_folders(
                 )
             sources[name] = stack.enter_context(open_store(folder))
         for source in sources.values():
-            source.check_file()  # before the first row is copied
+            source.check_file()  # all sources are checked before the first row is copied
         joined = _join(plan, sources, tasks)
         target = stack.enter_context(writing(out))
         _check_same_results({str(out): target, **sources})

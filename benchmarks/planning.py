@@ -185,7 +185,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 
 
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
-    """Return the ids of the methods of each user's file of which no method is named.
+    """Return the ids of all methods in those user's files from which no method is named.
 
     Methods are named by the request (``methods``) or by the suite.
     """

@@ -1,6 +1,6 @@
 """Perform jobs in worker processes on this machine, with a limit of CPU time for each job.
 
-Built-in methods share processes. Each method of a file has processes of its own, so that it cannot
+Built-in methods share processes. Each method from a file has its own processes, so that it cannot
 break other methods. Package ``pebble`` starts and restarts processes, and ends jobs that exceed
 their limit of wall time.
 The system counts the CPU time of all threads of a process, and ends the process when a job has used

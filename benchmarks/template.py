@@ -23,7 +23,7 @@ class Mine(Optimiser):
         When no trial is left, ``objective`` raises BudgetError. Do not catch it: the best point so
         far is the solution.
         """
-        # Use only rng for random numbers. A point has the joints of all goals, length unit and rad.
+        # Use only rng for random numbers. A point has the joints at all goals (length units, rad).
         x = objective.x0  # the postures of the corrective process
         best = objective(x)  # ticks
         while True:

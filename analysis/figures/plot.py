@@ -32,7 +32,7 @@ from coartic.internal.text import one_line
 from coartic.internal.threads import environment
 
 FORMATS = (".svg", ".pdf", ".png")
-_LONGEST_NAME = 48  # most letters of a line of a name; half of it in a narrow figure
+_LONGEST_NAME = 48  # longest line of a name, in characters; half as many in a narrow figure
 _NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # replaces the user's value, so that no date is written
 
 

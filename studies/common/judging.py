@@ -62,8 +62,8 @@ class Finding:
         - *not supported*: the claim does not hold, and ``opposite_p`` is below 5 %. The verdict is
           also *not supported* if the claim has no test, or if a test of five or more values has no
           p and no positive estimate, because all values are equal.
-        - *undecided*: any other claim, and a claim that holds if one of its tests has fewer than
-          five values and no p.
+        - *undecided*: any other claim. A claim that holds is also undecided if one of its tests has
+          fewer than five values and no p.
         """
         untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
         if self.holds is None or (self.holds and untested):

@@ -22,7 +22,7 @@ _OF_RUN = [
     *("run_id", "task", "method", "setting", "run", "seed", "status", "trials", "reward", "hands"),
     *("replay_reward", "replay_hands", "initial_reward", "corrective_best", "best_known"),
 ]
-"""Columns of runs that a study ships."""
+"""Columns of runs that are stored with a study."""
 
 
 def tabulate_runs(study: Study) -> pd.DataFrame:

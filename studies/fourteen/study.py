@@ -1,4 +1,4 @@
-r"""Is a planner's horizon a number of goals, or a share of those left?
+r"""Measure whether a planner's horizon is a number of goals, or a share of the goals left.
 
     coartic run studies/fourteen/suite.toml \
         --family-file studies/fourteen/fourteen-one.v1.toml \
@@ -54,7 +54,7 @@ def measure_plans(study):
     plans = plans.sort_values(["order", "nodes", "horizon"])
     before = plans.groupby(["task", "nodes"])[["horizon", "ticks"]].shift()
     more = plans.horizon - before.horizon
-    # The sum of n - h over the goals ahead since the horizon before.
+    # The sum of n - h over the goals ahead after the previous horizon.
     movements = more * (plans.goals - (before.horizon + 1 + plans.horizon) / 2)
     mean_movement = -plans.best_known / plans.goals
     gain = (before.ticks - plans.ticks) / movements / mean_movement

@@ -1,4 +1,4 @@
-"""How far ahead must a planner look?
+"""Measure how far ahead a planner must look.
 
     coartic run studies/horizon/suite.toml
     PYTHONPATH=studies python studies/horizon/study.py results/horizon

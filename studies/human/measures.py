@@ -74,7 +74,7 @@ def slope_norms(runs, model, distance):
         ]
         away = np.array(by_place.index) - np.mean(by_place.index)
         slopes = np.einsum("p,prj->rj", away / (away**2).sum(), postures)
-        slopes = slopes if count > 1 else slopes.repeat(2, axis=0)  # a run that is deterministic
+        slopes = slopes if count > 1 else slopes.repeat(2, axis=0)  # a single deterministic run
         products = slopes.sum(axis=0) ** 2 - (slopes**2).sum(axis=0)
         square = products.sum() / (len(slopes) * (len(slopes) - 1))
         norms[task] = round(float(np.sign(square) * np.sqrt(abs(square))), 6)  # 0, not 1e-12
@@ -103,8 +103,8 @@ def ratio_of_means(pairs):
 def norms_and_benefits(runs, model):
     """Return by task the slope norm at distance 1, and the ticks that preparation can save.
 
-    The latter are the ticks of the planner with no goal ahead, less the fewest ticks of any run.
-    Only tasks without a moved goal count.
+    What can be saved are the ticks of the planner with no goal ahead, less the fewest ticks of any
+    run. Only tasks without a moved goal count.
     """
     alone = mean_by_task(unmoved(runs, "no goal ahead", arms=1).map(lambda path: path.ticks))
     saved = alone + runs.groupby("task").best.first()[alone.index]

@@ -56,7 +56,7 @@ def tabulate_equal(cells):
                 mine, learner = weights * both.T
                 places = drawn(pairs.group)
                 differences = (mine - learner)[places].sum(axis=1)
-                with np.errstate(invalid="ignore"):  # 0 / 0 where no drawn task shows anything
+                with np.errstate(invalid="ignore"):  # 0 / 0 if no drawn task has the signature
                     ratios = mine[places].sum(axis=1) / learner[places].sum(axis=1)
                 for word, value, each in (
                     ("difference", (mine - learner).sum(), differences),

@@ -6,13 +6,15 @@
 Without a folder, tables and page are made from cells.csv and runs.csv.xz. hands.py has the runs on
 the learner's rule for hands, and one_selection.py those at equal gain.
 
-Random search is the learner without its memory. Here it has memory by the dose: after each of r
-equal parts of its trials it goes on from its best trial, from the postures that this trial reached
-or from the targets that it aimed at. Against the expected answer, that such a memory makes the
-learner's coarticulation: signatures that do not rise with r, or a learner beyond their level.
+Random search is the learner without its memory. In this study it gets memory in doses: after each
+of r equal parts (stages) of its trials, it continues from its best trial, either from the postures
+that this trial reached, or from the targets at which it aimed. The expected answer is that such a
+memory makes the learner's coarticulation. Against it would be signatures that do not rise with r,
+or a learner beyond their level.
 
-On two arms all of this has the hands in which the learner ends, each weighted as the learner's runs
-weight it. All tests and intervals resample tasks within families, which weigh the same.
+On two arms, random search has the hand sequences in which the learner's runs end, weighted by the
+numbers of these runs. All tests and intervals resample tasks within families. All families have the
+same weight.
 """
 
 import sys

@@ -36,9 +36,7 @@ from coartic import PAPER, Hand
 
 _FEW_SEQUENCES = 16  # up to this number, hand sequences are bounded one by one, which is faster
 _NEAR = 0.97  # share of the path to be proven above which programmes are solved exactly
-_HAND_FIRST = (
-    0.2  # a hand is decided first if angles are less wrong than this share of its distance
-)
+_HAND_FIRST = 0.2  # share of a hand's distance below which wrong angles wait for its decision
 
 
 def mergeable(task, hands):

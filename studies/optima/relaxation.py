@@ -58,9 +58,9 @@ class Relaxed(NamedTuple):
 class Relaxation:
     """Cone programme of one hand sequence. Its parameters are the half-spaces of a box.
 
-    ``merged`` are the goals (from 0) that are hit without a movement; the hands of all goals must
-    then be decided. If ``still``, the idle arm must not move. A box has intervals (in rad) of the
-    absolute link angles of the chosen arms at the goals whose hand is decided, goal by goal, shape
+    ``merged`` are the goals (from 0) that are hit without a movement; their hands must be decided.
+    If ``still``, the idle arm must not move. A box has intervals (in rad) of the absolute link
+    angles of the chosen arms at the goals whose hand is decided, goal by goal, shape
     ``(links, 2)``.
     """
 

@@ -101,7 +101,7 @@ def spans_of(task, hands):
     may be anywhere.
     """
     goals, last = len(hands), dict.fromkeys(task.hands, -1)
-    spans = []  # first and last goal, least path
+    spans = []  # first and last goal, and the bound on the path
     for goal, hand in enumerate(hands):
         if hand is not None:
             spans.append((last[hand] + 1, goal, path_between(task, hand, last[hand], goal)))

@@ -39,7 +39,7 @@ PANELS = {
     "lean": "lean\n(share of the way)",
 }
 QUANTITIES = {"lean": "more", "difference": "difference", "apart": "apart"}
-"""Columns of the leans from which the columns of the results are made, by the latter's names."""
+"""Columns of the results, with the columns of the leans from which they are made."""
 
 
 def over_people(values):

@@ -79,8 +79,8 @@ class Reader:
     def runs(self, task, label):
         """Return the runs of a method on a task.
 
-        Raises MissingError if a run has no solution, or if there are too few runs or other numbers
-        of trials than in the paper.
+        Raises MissingError if a run has no solution. For the learner and random search, it is also
+        raised for too few runs, and for another number of trials than that of the paper.
         """
         runs, title = self.study.cells.get((task, label)), self.title(task)
         if runs is None:

@@ -33,7 +33,7 @@ class MadeUp(Study):
     """
 
     def __init__(self, study, **parts):
-        runs = vars(study).get("runs", study.stored)  # with what a test has changed
+        runs = vars(study).get("runs", study.stored)  # includes changes by a test
         super().__init__(study.folder, study.plan, study.made_with, runs)
         for name in parts:
             assert isinstance(getattr(Study, name, None), cached_property) or hasattr(study, name)
