@@ -7,7 +7,8 @@ import pytest
 from coartic.analysis.statistics import bootstrap_test
 from tests.support.processes import ROOT, programs
 
-CELLS, SCALES, EQUAL, STUDY = programs("memory", "cells", "scales", "equal_gain", "study")
+NAMES = "cells", "scales", "equal_gain", "study", "one_selection"
+CELLS, SCALES, EQUAL, STUDY, ONE = programs("memory", *NAMES)
 STAGES = SCALES.STAGES
 
 
@@ -145,9 +146,11 @@ def test_a_mean_of_unequal_families_is_tested_at_its_level():
     assert np.mean(np.array(pooled) <= 0.05) > 0.09
 
 
-def test_tables_are_made_from_the_cells_that_ship():
+def test_tables_are_made_from_the_rows_that_ship():
     folder = ROOT / "studies" / "memory"
-    made = STUDY.tables_of(pd.read_csv(folder / "cells.csv", index_col=0))
-    for name in ("keeping", "equal"):
+    rows = (pd.read_csv(folder / name, index_col=0) for name in ("cells.csv", "runs.csv.xz"))
+    made = STUDY.tables_of(*rows)
+    made["one_selection"] = ONE.tabulate(pd.read_csv(folder / "one_selection.csv.xz", index_col=0))
+    for name in ("keeping", "equal", "contexts", "one_selection"):
         stored = pd.read_csv(folder / f"{name}.csv", index_col=0)
         pd.testing.assert_frame_equal(made[name], stored, rtol=1e-4, atol=1e-4, check_dtype=False)
