@@ -9,7 +9,8 @@ import pytest
 from coartic.analysis.statistics import bootstrap_test
 from tests.support.processes import ROOT, programs
 
-CELLS, SCALES, EQUAL, STUDY = programs("memory", "cells", "scales", "equal_gain", "study")
+NAMES = "cells", "scales", "equal_gain", "study", "one_selection"
+CELLS, SCALES, EQUAL, STUDY, ONE = programs("memory", *NAMES)
 STAGES = SCALES.STAGES
 
 
@@ -152,7 +153,7 @@ SOME = ["learner", "compared", "informed learner", "posture QP"]
 """Cells whose methods are compared at equal gain here; the other methods are by the same lines."""
 
 
-def test_tables_are_made_from_the_cells_that_ship(monkeypatch):
+def test_tables_are_made_from_the_rows_that_ship(monkeypatch):
     """Intervals of all resamples where there are few of them; the other tables have fewer, from
     which no mean and no verdict depends."""
     folder = ROOT / "studies" / "memory"
@@ -170,7 +171,11 @@ def test_tables_are_made_from_the_cells_that_ship(monkeypatch):
     modules = sys.modules[STUDY.Scale.__module__], sys.modules[STUDY.judge_means.__module__]
     monkeypatch.setattr(modules[0], "RESAMPLES", 499)
     monkeypatch.setattr(modules[1], "RESAMPLES_OF_CLAIMS", 999)
-    tables = STUDY.tables_of(cells[~cells.name.isin(due.name)])
+    rows = pd.read_csv(folder / "runs.csv.xz", index_col=0)
+    tables = STUDY.tables_of(cells[~cells.name.isin(due.name)], rows)
+    made["contexts"] = tables["contexts"], shipped("contexts")
+    one_selection = ONE.tabulate(pd.read_csv(folder / "one_selection.csv.xz", index_col=0))
+    made["one_selection"] = one_selection, shipped("one_selection")
     for name in ("results", "scales", "claims"):
         resampled = r"_(low|high)$|^level$|^where$|^p_|_p_|evidence"
         made[name] = (

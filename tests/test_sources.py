@@ -1,0 +1,62 @@
+"""The tables that ship: each has a program of the present code, and runs of its versions."""
+
+import tomllib
+
+import pandas as pd
+import pytest
+
+from coartic.benchmarks.registry import built_in
+from tests.support.processes import ROOT
+
+TABLES = tomllib.loads((ROOT / "docs" / "stored" / "SOURCES.toml").read_text("utf-8"))["tables"]
+BEFORE = {"docs/stored/reconstruction/readings.csv", "studies/replication/sets.csv"}
+"""Tables of an earlier version, which the present code cannot make; their pages say so."""
+CODE = {name: info.code for name, info in built_in().items()}
+"""Versions of model and method by the id of the method."""
+
+
+def stale(methods):
+    """Return the methods that now have another version; ``methods`` has versions by the first part
+    of an id."""
+    return [
+        f"{name} is {code}, not {version}"
+        for method, version in methods.items()
+        for name, code in CODE.items()
+        if name.startswith(method) and code != version
+    ]
+
+
+def test_each_shipped_table_is_listed_once():
+    folders = (ROOT / "docs" / "stored", ROOT / "studies")
+    paths = [path for folder in folders for path in folder.glob("*/*.csv*")]
+    listed = [file for table in TABLES for file in table["files"]]
+    assert sorted(listed) == sorted(str(path.relative_to(ROOT)) for path in paths)
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table["files"][0])
+def test_program_and_pages_exist(table):
+    is_before = {*table["files"]} <= BEFORE
+    assert is_before == ("version" in table)
+    assert is_before or (ROOT / table["program"]).is_file()
+    assert table["pages"]
+    assert [page for page in table["pages"] if not (ROOT / page).is_file()] == []
+
+
+@pytest.mark.parametrize(
+    "table",
+    [table for table in TABLES if "version" not in table],
+    ids=lambda table: table["files"][0],
+)
+def test_runs_are_of_the_present_versions(table):
+    assert stale(table["methods"]) == []
+    for file in table["files"]:
+        runs = pd.read_csv(ROOT / file, usecols=lambda name: name in ("run_id", "method"))
+        if {*runs} == {"run_id", "method"}:  # the id of a run ends in the version of its method
+            runs = runs[runs.method.isin(CODE)].drop_duplicates()
+            assert [*runs.run_id.str.rpartition("-")[2]] == [*runs.method.map(CODE)], file
+
+
+def test_another_version_of_a_method_makes_its_tables_stale():
+    code = CODE["cma-es/bandit"]
+    assert stale({"cma-es": code}) == []
+    assert f"cma-es/bandit is {code}, not 0.9" in stale({"cma-es": "0.9"})
