@@ -4,7 +4,8 @@ Folders can be joined if they have
 
 - the same suite, seed and trial budget;
 - the same task for each name of a task;
-- the same version or code of each method;
+- the same version or code of each method (runs of a method file that has changed since are not
+  used, and a message names them);
 - the same parameters for each setting of a method.
 
 Versions of coartic and of libraries, and machines, may differ. A folder may lack runs.
@@ -15,6 +16,7 @@ from __future__ import annotations
 import itertools
 import os
 import warnings
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -25,6 +27,7 @@ from coartic.benchmarks.reproduce import compare_runs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted
+from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, hash_of
 from coartic.runs.shipped import SHIPPED, open_shipped
 from coartic.runs.store import Store, open_store, writing
@@ -35,6 +38,7 @@ def include_folders(
     folders: Sequence[str | Path],
     out: Path,
     tasks: Collection[str] | None = None,
+    methods: Mapping[str, MethodInfo] | None = None,
 ) -> list[Job]:
     """Copy the runs of other folders into a results folder, and join the plans.
 
@@ -53,6 +57,9 @@ def include_folders(
     tasks : collection of str, optional
         Names of tasks. Cells of the folders on other tasks are left out. By default, the cells on
         all tasks are joined.
+    methods : mapping of str to MethodInfo, optional
+        Methods that the command knows, by id; by default those of ``plan``. Runs of a method from
+        a file are only used if they were made by the code of the method here.
 
     Returns
     -------
@@ -76,7 +83,8 @@ def include_folders(
 
         - a folder lacks runs of its own plan;
         - a folder has a stochastic cell that ``plan`` lacks, with fewer runs than the largest
-          number that ``plan`` asks for.
+          number that ``plan`` asks for;
+        - a folder has runs of a method file that has changed.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
@@ -99,7 +107,8 @@ def include_folders(
             sources[name] = stack.enter_context(open_store(folder))
         for source in sources.values():
             source.check_file()  # all sources are checked before the first row is copied
-        joined = _join(plan, sources, tasks)
+        known = methods or {job.cell.method.name: job.cell.method for job in plan}
+        joined = _join(plan, sources, tasks, known)
         target = stack.enter_context(writing(out))
         _check_same_results({str(out): target, **sources})
         target.replace_plan(joined, made_with())
@@ -109,29 +118,47 @@ def include_folders(
 
 
 def _join(
-    plan: Sequence[Job], sources: Mapping[str, Store], tasks: Collection[str] | None
+    plan: Sequence[Job],
+    sources: Mapping[str, Store],
+    tasks: Collection[str] | None,
+    known: Mapping[str, MethodInfo],
 ) -> list[Job]:
     """Return the plan joined with the plans of ``sources``, which are stores by name.
 
     - Cells of the sources on tasks that are not in ``tasks`` are left out, unless it is None.
+    - Cells of method files with other code than in ``known`` are left out, with a warning.
     - A cell has the runs that the plan asks for, and the following runs that the sources have, up
       to the first missing one. A cell without runs is left out.
 
     Raises CoarticError if the sources cannot be joined.
     """
-    all_jobs = {name: source.plan() for name, source in sources.items()}
-    plans = {
-        name: [job for job in jobs if tasks is None or job.cell.task.name in tasks]
-        for name, jobs in all_jobs.items()
-    }
-    stored = {
-        (all_jobs[name][position].cell.digest, number)
-        for name, source in sources.items()
-        for position, number, *_ in source.present()
-    }
+
+    def is_current(job: Job) -> bool:
+        here = known.get(job.cell.method.name, job.cell.method)
+        return here.is_ours or here.code == job.cell.method.code
+
+    plans, stored = dict[str, list[Job]](), set[tuple[str, int]]()
+    for name, source in sources.items():
+        on_tasks = {
+            position: job
+            for position, job in enumerate(source.plan())
+            if tasks is None or job.cell.task.name in tasks
+        }
+        plans[name], unused = [*filter(is_current, on_tasks.values())], Counter[str]()
+        for position, number, *_ in source.present():
+            if (job := on_tasks.get(position)) and is_current(job):
+                stored.add((job.cell.digest, number))
+            elif job:
+                unused[job.cell.method.name] += 1
+        for method, count in unused.items():
+            warnings.warn(
+                f"{name}: {counted(count, 'run')} of {method} not used, made before its file, or a "
+                "file that it imports or reads, changed",
+                stacklevel=3,
+            )
     asked = {job.cell.digest: len(job.numbers) for job in plan}
-    # Cells of ``plan`` with all runs in the sources will not be performed here. So their methods
-    # may have other code here.
+    # Cells of ``plan`` with all runs in the sources will not be performed here. So built-in methods
+    # may have another version here.
     missing = [
         job for job in plan if not stored.issuperset((job.cell.digest, n) for n in job.numbers)
     ]
@@ -182,17 +209,18 @@ def _warn_of_gaps(
                 stacklevel=4,
             )
         if few:
-            count = counted(len(jobs[few[0].cell.digest].numbers), "run")
             warnings.warn(
-                f"{name} has {count} of {_named(few)}; this command asks for {most_runs}",
+                f"{name} has fewer than {counted(most_runs, 'run')}, which this command asks for, "
+                f"of {_named(few)}",
                 stacklevel=4,
             )
 
 
 def _named(jobs: Sequence[Job]) -> str:
-    """Return the name of the cell of the first job, and the number of other jobs."""
-    others = f" and of {counted(len(jobs) - 1, 'other')}" if len(jobs) > 1 else ""
-    return f"{jobs[0].cell.label} on {jobs[0].cell.task.name}{others}"
+    """Return method and task of at most three jobs, and the number of further jobs."""
+    names = [f"{job.cell.label} on {job.cell.task.name}" for job in jobs[:3]]
+    more = f" and {len(jobs) - 3} more" if len(jobs) > 3 else ""
+    return f"{', '.join(names)}{more}"
 
 
 def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:

@@ -96,7 +96,7 @@ def test_what_no_folder_has_is_performed(parts, left, tmp_path):
     assert joined(parts[:1], tmp_path / "more", LEFT, runs=3).done == 1
     assert joined([tmp_path / "more", parts[0]], tmp_path / "most", LEFT).present == 3 + 1
     with pytest.warns(
-        UserWarning, match=rf"right has 2 runs of {EC1} on descending; this command asks for 3"
+        UserWarning, match=rf"right has fewer than 3 runs, .* of {EC1} on descending$"
     ):
         joined(parts[1:], tmp_path / "few", LEFT, runs=3)
 
@@ -154,6 +154,24 @@ def test_what_does_not_go_together(parts, tmp_path):
         with pytest.raises(CoarticError, match=said):
             include_folders(asked, [folder], out)
     assert not out.exists()
+
+
+@pytest.mark.usefixtures("not_repeated")
+def test_runs_of_a_changed_method_file_are_not_used(tmp_path):
+    """Runs of a method whose file the command does not have are included as they are."""
+    mine = replace(KNOWN["hill-climbing"], origin="mine.py", code="1" * 12)
+    changed, old = replace(mine, code="2" * 12), tmp_path / "old"
+    on_task = [cell_on(load_task("ascending"), method) for method in (mine, changed)]
+    run_and_write(old, on_task[:1], **OPTIONS)
+    with pytest.warns(UserWarning, match="old: 2 runs of hill-climbing not used"):
+        assert joined([old], tmp_path / "again", on_task[1:]).done == 2
+    assert {*load(tmp_path / "again").runs.code} == {changed.code}
+    asked, known = planned(LEFT, **OPTIONS), {**KNOWN, mine.name: changed}
+    with pytest.warns(UserWarning, match="old: 2 runs of hill-climbing not used"):
+        plan = include_folders(asked, [old], tmp_path / "beside", methods=known)
+    assert mine.name not in {job.cell.method.name for job in plan}
+    plan = include_folders(asked, [old], tmp_path / "without")
+    assert mine.code in {job.cell.method.code for job in plan}
 
 
 def test_shipped_results(monkeypatch, tmp_path):

@@ -138,7 +138,7 @@ def run(
         if include:
             only = {job.cell.task.name for job in asked} if tasks else None
             display.show(f"Including the runs of {' and '.join(include)}")
-            asked = include_folders(asked, include, out, only)
+            asked = include_folders(asked, include, out, only, registered)
             display.line(f"Included the runs of {' and '.join(include)}.")
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(asked, out, executor=executor, watch=display.update)
