@@ -219,10 +219,10 @@ def interaction_test(cells: Sequence[Sequence[Sequence[Array]]]) -> float:
     """Return the p-value of the interaction of two factors in means over tasks.
 
     The statistic is that of E. Brunner, H. Dette & A. Munk (1997, Journal of the American
-    Statistical Association 92): the sum of squares of what the effects of both factors leave of the
-    cells' means, divided by the sum of the variances of these means. Its distribution without
-    interaction comes from resampling the runs of each cell and task around their mean. p = (1 +
-    resamples at least as extreme) / (1 + resamples).
+    Statistical Association 92): the sum of squares of the cells' means after the effects of both
+    factors are subtracted, divided by the sum of the variances of these means. Its distribution
+    without interaction is found by resampling the runs of each cell and task around their mean.
+    p = (1 + resamples at least as extreme) / (1 + resamples).
 
     Parameters
     ----------
@@ -233,7 +233,8 @@ def interaction_test(cells: Sequence[Sequence[Sequence[Array]]]) -> float:
     Returns
     -------
     float
-        p; NaN with fewer than five runs of a task in a cell, and if no run differs from others.
+        p. It is NaN if a cell has fewer than five runs of a task, or if runs do not vary within any
+        cell and task.
 
     Examples
     --------

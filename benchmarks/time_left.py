@@ -19,8 +19,8 @@ _Kind = tuple[str, str, int]
 _EARLY = 0.1
 """Share of the work before which there is no estimate, because processes are starting."""
 _RECENT = 0.15
-"""Share of the finished work after which an earlier run counts half, because the load of a machine
-changes."""
+"""Share of the finished work after which the weight of an earlier run is halved. The weight falls
+because the load of a machine changes."""
 
 
 class TimeLeft:
@@ -33,7 +33,7 @@ class TimeLeft:
     - a run of a shipped method takes as long as the shipped runs of the method on this task, or on
       all tasks if this one is not shipped, times a factor of this machine;
     - a run of another method takes as long as its runs here;
-    - recent runs tell more than earlier ones;
+    - recent runs have more weight than earlier ones;
     - ``workers`` runs are made at once, or more if the times of finished runs add up to more.
     """
 
@@ -88,14 +88,16 @@ class TimeLeft:
         return max(left_s / at_once - since_s, since_s / 4)
 
     def _factor(self, method: str) -> float:
-        """Return the time of runs here as a multiple of :func:`_shipped_s`, NaN before the first
-        run."""
+        """Return the time of a method's runs here as a multiple of :func:`_shipped_s`.
+
+        It is NaN before the first run of the method's group.
+        """
         usual_s = self._usual_s[_group_of(method)]
         return self._took_s[_group_of(method)] / usual_s if usual_s else math.nan
 
 
 def _group_of(method: str) -> str:
-    """Return a method's group, whose runs have the same factor: shipped methods are one group."""
+    """Return the group of a method. Its runs have the same factor; shipped methods are a group."""
     return "" if method in _shipped_means() else method
 
 

@@ -136,8 +136,10 @@ POSTURE = ["at_x", "at_y", *(f"at_{joint}" for joint in range(1, 5))]
 
 
 def foreign_rows(study: Study) -> pd.DataFrame:
-    """Return the runs of suite ``foreign`` or ``tuning``, a row each; on the paper's one-armed
-    tasks with the posture at goal 1."""
+    """Return the runs of suite ``foreign`` or ``tuning``, with a row for each run.
+
+    Runs on the paper's one-armed tasks have the posture at goal 1.
+    """
     runs = study.runs[study.runs.status == "ok"]
     runs = runs.assign(method=runs.method.replace(r"dual-process/EC\d", "learner", regex=True))
     rows = runs.set_index("run_id")[FOREIGN].reindex(columns=[*FOREIGN, *POSTURE])
@@ -151,9 +153,12 @@ def foreign_rows(study: Study) -> pd.DataFrame:
 
 
 def foreign_gaps() -> pd.DataFrame:
-    """Return the gaps of suite ``foreign``, per cent, a row for each method and setting: on the
-    paper's tasks with intervals over runs, on random tasks (``random``) with intervals over tasks,
-    and the posture difference at the first goal of ascending and descending."""
+    """Return the gaps of suite ``foreign`` (in per cent), with a row for each method and setting.
+
+    - ``gap``: gap on the paper's tasks, with an interval for other runs;
+    - ``random``: gap on random tasks, with an interval for other tasks;
+    - ``difference``: posture difference at the first goal of ascending and descending.
+    """
     runs = pd.read_csv(STORED / "foreign" / "runs.csv").fillna({"setting": ""})
     names = (runs.method + " " + runs.setting).str.strip()
     table = {}
@@ -168,8 +173,10 @@ def foreign_gaps() -> pd.DataFrame:
 
 
 def shipped_gaps(method: str) -> dict[str, float]:
-    """Return what :func:`foreign_gaps` has, of a method of the shipped suites on the same tasks: a
-    mean of their three runs on each random task."""
+    """Return a row as in :func:`foreign_gaps` for a method of the shipped suites.
+
+    The tasks are the same. On each random task, the gap is a mean over three runs.
+    """
     paper = row("comparison", "ranking", method)
     tasks = table("families", "by-task").reset_index()
     tasks = tasks[tasks.task.str[-4:].isin(["i000", "i001", "i002"])]

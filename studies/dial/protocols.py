@@ -2,10 +2,15 @@
 
     python studies/dial/protocols.py results/dial
 
-writes ``runs.csv``, a row for each run of the learner, ``others.csv``, a row for each run of
-another method, ``shifts.csv``, a row for each goal before a goal that is moved, and
-``named_runs.csv``, a row for each run of a named setting on a task of the paper. A task is done at
-a time; what is done is not done again. It takes about an hour on two cores.
+writes
+
+- ``runs.csv``, a row for each run of the learner;
+- ``others.csv``, a row for each run of another method;
+- ``shifts.csv``, a row for each goal before a goal that is moved;
+- ``named_runs.csv``, a row for each run of a named setting on a task of the paper.
+
+The rows of a task are written when all of its runs are finished. Tasks that a file has already are
+not run again. All takes about an hour on two cores.
 """
 
 import csv
@@ -107,7 +112,10 @@ def run_others(name):
 
 
 def run_named(name):
-    """Run the named settings on a task; rows of :data:`NAMED_COLUMNS`, of best rewards so far."""
+    """Run the named settings on a task, and return rows of :data:`NAMED_COLUMNS`.
+
+    ``after_N`` is the best reward after N trials.
+    """
     task, rows = load_task(name), []
     for setting, fields in NAMED.items():
         condition = replace(base_of(task), **fields)

@@ -61,7 +61,7 @@ def tabulate(runs):
 
 
 def tabulate_named(runs):
-    """Tabulate the named settings: mean best rewards over the runs of each on a task."""
+    """Tabulate the mean best rewards of the named settings over the runs on each task."""
     groups = runs.groupby(["task", "setting"], sort=False)
     table = groups[[name for name in runs if name.startswith("after_")]].mean()
     table.insert(0, "runs", groups.size())

@@ -46,7 +46,7 @@ EFFECTS_WITH_POWER = {
     "serial-where-it-may learner benefit correlation": "value",
     "bends-away learner bow slope": "value",
 }
-"""Effects whose smallest size is stated that a test would find, with the column that is tested."""
+"""Effects for which power is computed (:func:`tabulate_power`), with the column that is tested."""
 MARKS = {
     "agrees": ("+", figures.PALETTE[0]), "disagrees": ("−", figures.PALETTE[3]),
     "undecided": ("?", figures.GREY), "silent": ("·", figures.GREY), "no cases": ("", figures.GREY),
@@ -395,11 +395,12 @@ def judge_all(effects, values):
 
 
 def tabulate_power(effects, judged):
-    """Return the smallest effects that a test finds with 90 % power: a row for each effect.
+    """Return the smallest effects that a test finds with 90 % power, with a row for each effect.
 
-    ``least``: by a single test of the finding. ``least_corrected``: after the correction over
-    ``judged`` verdicts, by the smallest p. ``larger``: by how much the distance from the bound has
-    to be larger after the correction, as a share.
+    - ``least``: smallest effect for a single test of the finding;
+    - ``least_corrected``: smallest effect after the correction over ``judged`` verdicts, for the
+      smallest p;
+    - ``larger``: by which share the distance from the bound must be larger after the correction.
     """
     rows, of_power = {}, stats.norm.ppf(POWER)
     for name, column in EFFECTS_WITH_POWER.items():

@@ -26,7 +26,7 @@ NAMES = {
 CONTEXTS = ("ascending", "descending")
 """Tasks with the same first goal."""
 POSTURE = ["at_x", "at_y", *(f"at_{joint}" for joint in range(1, 5))]
-"""Columns of the posture at goal 1: base (length unit) and joints of the right arm (rad)."""
+"""Columns of the posture at goal 1: base (in length units) and joints of the right arm (in rad)."""
 TRIALS = 10_000
 LEAST_SHARE = 0.1
 
@@ -97,27 +97,31 @@ def measure_postures(study, runs):
 
 
 def postures(rows):
-    """Return the postures of rows on the two tasks of :data:`CONTEXTS`, shape ``(runs, 6)``
-    each."""
+    """Return the postures of rows on the two :data:`CONTEXTS`, shape ``(runs, 6)`` each."""
     return [rows.loc[rows.task == task, POSTURE].to_numpy(float) for task in CONTEXTS]
 
 
 def distance(groups):
-    """Return the distance of the mean postures of two groups."""
+    """Return the distance between the mean postures of two groups."""
     return float(np.linalg.norm(groups[0].mean(axis=0) - groups[1].mean(axis=0)))
 
 
 def rows_of_contexts(study, runs):
-    """Return the runs behind table ``contexts``, a row each: the learner, and random search with
-    each dose of memory."""
+    """Return the runs from which table ``contexts`` is made, with a row for each run.
+
+    They are runs of the learner, and of random search with each dose of memory.
+    """
     is_learner = (runs.name == "learner") & (runs.trials == TRIALS)
     rows = measure_postures(study, runs[is_learner | (runs.name == "random search")])
     return rows[["label", "task", "run", "gain", *POSTURE]].set_index("label")
 
 
 def tabulate_contexts(rows):
-    """Tabulate the posture difference at the first goal of :data:`CONTEXTS`, with the mean gain on
-    both tasks, by label of the method. ``rows``: :func:`rows_of_contexts`."""
+    """Tabulate the posture difference at the first goal of :data:`CONTEXTS`, by method.
+
+    The table also has the mean gain on both tasks. ``rows`` are those of
+    :func:`rows_of_contexts`.
+    """
     table = {
         label: {
             "runs": len(of_label) // 2,

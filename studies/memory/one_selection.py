@@ -3,11 +3,15 @@
     coartic run studies/memory/one-selection.toml --out results/one-selection
     python studies/memory/one_selection.py results/one-selection
 
-writes one_selection.csv.xz, a row for each run, and one_selection.csv, a row for each task and
-signature: random search (the best of 10,000 trials), and by how much the learner exceeds it, after
-as many trials (``more``) and after the number of trials at which its gain is nearest to random
-search's (``equal``). On two arms both have the hands in which the learner ends. Without a folder
-the table is made again from the stored runs.
+writes
+
+- one_selection.csv.xz, with a row for each run;
+- one_selection.csv, with a row for each task and signature. It has the value of random search (the
+  best of 10,000 trials), and by how much the learner exceeds it after as many trials (``more``),
+  and after the number of trials at which its gain is nearest to that of random search (``equal``).
+
+On two arms, both have the hands in which the learner's runs end. Without a folder, the table is
+made again from the stored runs.
 """
 
 import sys
@@ -35,7 +39,7 @@ COLUMNS = ["task", "name", "trials", "run", "hands", *MEASURES, *POSTURE]
 
 
 def rows_of(study):
-    """Return the runs, a row each, by task; postures at goal 1 are only of :data:`CONTEXTS`."""
+    """Return the runs by task. Only runs on :data:`CONTEXTS` have the posture at goal 1."""
     runs = measure_runs(study)
     others = runs[~runs.task.isin(CONTEXTS)]
     rows = pd.concat([measure_postures(study, runs), others])

@@ -108,7 +108,7 @@ def measure(study):
 
 
 def tables_of(cells, rows):
-    """Return the tables that are made from means over runs and from runs on two tasks, by name."""
+    """Return the tables by name, from means over runs and from runs on :data:`cells.CONTEXTS`."""
     scales = every_scale(cells)
     return {
         "contexts": tabulate_contexts(rows),

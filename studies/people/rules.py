@@ -152,9 +152,12 @@ def sign_flips(values):
 
 
 def needed(values):
-    """Return what the test would have needed to reject: ``mean_needed``, the smallest mean with
-    these deviations, and ``spread_needed``, the largest share of these deviations with this mean.
-    NaN where none is enough."""
+    """Return what the test would have needed to reject.
+
+    ``mean_needed`` is the smallest mean that is enough with the same deviations from the mean.
+    ``spread_needed`` is the largest factor of these deviations that is enough with the same mean.
+    A value is NaN if none is enough.
+    """
     mean = np.mean(values)
     away = np.asarray(values, float) - mean
     found = {
@@ -190,10 +193,11 @@ def smallest_shift(n):
 def spreads(contexts):
     """Return SDs that the leans of people would have without a lean, not using the leans.
 
-    ``repeats``: what the variance of the repeats within contexts explains. ``at right angles``:
-    the spread between people of the same difference, end less start, on the three directions at
-    right angles to n_A − n_B, in which no lean counts; the mean over people is taken out. ``as
-    vectors``: the same, but a person's differences are averaged over targets as vectors.
+    - ``repeats``: the SD that the variance of the repeats within contexts explains;
+    - ``at right angles``: the SD between people of the same difference (end less start) in the
+      three directions at right angles to n_A − n_B, in which a lean has no effect. The mean over
+      people is subtracted;
+    - ``as vectors``: the same, but a person's differences are averaged over targets as vectors.
     """
     variances, across, vectors = {}, {}, {}
     for of_target in contexts.values():
