@@ -16,10 +16,9 @@ from coartic import execute, load_task
 from coartic.analysis import means
 from coartic.baselines.receding_horizon import RecedingHorizon, RecedingHorizonParameters
 from coartic.method import run_method
-from coartic.robot import BASE_DOF, HANDS
-from coartic.tasks.task import Start, hands_of
 
 HERE = Path(__file__)
+HANDS = {"L": "left", "R": "right"}
 FIRST = "010"
 """Number of the first instance that is left out."""
 PLANNER = RecedingHorizon(RecedingHorizonParameters(horizon=0, nodes=100))
@@ -44,10 +43,10 @@ def ticks_one_by_one(task, hands):
     """Return the ticks of the shortest paths from goal to goal, each planned for itself, with these
     hands."""
     q, ticks = np.array(task.q0), 0
-    for goal, hand in zip(task.goals, hands_of(hands), strict=True):
-        arms = {name: tuple(q[task.robot.joints(name)].tolist()) for name in HANDS}
-        start = Start(base=tuple(q[:BASE_DOF].tolist()), **arms)
-        one = {"goals": (goal,), "hands": (hand,), "initial_hands": hand[0].upper()}
+    for goal, letter in zip(task.goals, hands, strict=True):
+        arms = {name: tuple(q[task.robot.joints(name)].tolist()) for name in HANDS.values()}
+        start = task.start.model_copy(update={"base": tuple(q[:2].tolist()), **arms})
+        one = {"goals": (goal,), "hands": (HANDS[letter],), "initial_hands": letter}
         alone = task.model_copy(update={**one, "start": start})
         execution = execute(alone, run_method(PLANNER, alone)[0].solution)
         ticks, q = ticks - execution.reward, execution.configurations[-1]
