@@ -134,12 +134,11 @@ def _draw_lines(study: Study, axes: Axes, rows: pd.DataFrame, other: str = "") -
     axes.set_xticks([], minor=True)
     axes.margins(x=0.08)
     lines = [*rows.groupby("line", sort=False)]
-    apart = 0.01 * np.ptp(np.log(places) if is_log else places)  # so that intervals do not overlap
     is_few = False
     for place, (line, of_line) in enumerate(lines):
         at = of_line.value.map(dict(zip(values, places, strict=True))).to_numpy(np.float64)
-        shift = (place - (len(lines) - 1) / 2) * apart
-        at = at * math.e**shift if is_log else at + shift
+        share = 0.01 * (place - (len(lines) - 1) / 2)  # of the axis, so that no intervals overlap
+        at = at * (places[-1] / places[0]) ** share if is_log else at + share * np.ptp(places)
         color, marker = style.PALETTE[place], "osD^"[place]
         look: Any = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.6}
         drawn = of_line.assign(x=at)
