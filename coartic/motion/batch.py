@@ -346,9 +346,10 @@ def have_small_angles(slots: SlotArrays, count: int) -> bool:
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Return a kernel that fills ``slots.x`` and ``slots.y`` with a given cosine and sine.
+    """Return a kernel that writes the positions of shoulder, joints and hand into its slots.
 
-    The arguments of the kernel are the slots and the number of columns to fill
+    The kernel computes them with the functions ``cos`` and ``sin``, and writes them to ``slots.x``
+    and ``slots.y``. The arguments of the kernel are the slots and the number of columns to fill
     (:func:`find_positions`).
     """
 
