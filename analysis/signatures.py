@@ -330,9 +330,10 @@ def other_arm(runs: Solutions) -> Array:
 
 
 def arm(runs: Solutions) -> Array:
-    """Return the mean number of ticks that postures save for the next goal.
+    """Return how many ticks the chosen posture at a goal saves for the next goal, on average.
 
-    Postures are those of base and chosen arm. The result has shape ``(n,)``: the mean of
+    The posture is compared with that in which the corrective process would have hit the goal. Only
+    the base and the chosen arm count. The result has shape ``(n,)``: the mean of
     :func:`gain_at_next` over goals g < G. It is NaN on a task with one goal, and for a run with a
     gain that is NaN.
     """

@@ -321,10 +321,10 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return an upper bound on the absolute link angles in a slot (in rad).
+    """Return an upper bound on the size of each link's angle to the x axis (in rad).
 
-    The bound is the sum of the absolute angles of the arm's joints. ``q`` has a column for each
-    slot.
+    The bound is the sum of the sizes of the joint angles of the arm in a slot. ``q`` has a column
+    for each slot.
     """
     total = 0.0
     for k in range(len(q) - BASE_DOF):
