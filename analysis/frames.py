@@ -240,7 +240,8 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     ------
     CoarticError
         - The frame has no rows, or a column is missing.
-        - A value is not a number, or a reward is above 0 (rewards are negative, costs positive).
+        - A value is neither a finite number nor missing (NaN), or a reward is above 0 (rewards are
+          negative, costs positive).
         - A reward is above the best known reward, or a best known reward is 0.
 
     Examples

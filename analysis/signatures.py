@@ -214,10 +214,10 @@ def ticks_slower(runs: Solutions) -> Array:
 
     r(q(i, g − 1), g, h(i, g)) − min over hands h of r(q(i, g − 1), g, h)
 
-    This is the number of ticks that the corrective process takes from the previous hit with the
-    chosen hand, minus the number that it takes with the fastest hand. The value is above 0 if the
-    chosen hand is not the fastest for this goal alone. It is infinite if the reach with the chosen
-    hand ends without a hit.
+    Both reaches start where the previous goal was hit. The value is the number of ticks that the
+    corrective process needs from there with the chosen hand, minus the number that it needs with
+    the fastest hand. The value is above 0 if another hand would be faster for this goal. The value
+    is infinite if the reach with the chosen hand ends without a hit.
     """
     goals = 1 + np.arange(len(runs.task.goals))
     isolated = np.full((len(HANDS), *runs.hands.shape), np.inf)
@@ -330,9 +330,10 @@ def other_arm(runs: Solutions) -> Array:
 
 
 def arm(runs: Solutions) -> Array:
-    """Return the mean number of ticks that postures save for the next goal.
+    """Return how many ticks the chosen posture at a goal saves for the next goal, on average.
 
-    Postures are those of base and chosen arm. The result has shape ``(n,)``: the mean of
+    The posture is compared with that in which the corrective process would have hit the goal. Only
+    the base and the chosen arm count. The result has shape ``(n,)``: the mean of
     :func:`gain_at_next` over goals g < G. It is NaN on a task with one goal, and for a run with a
     gain that is NaN.
     """

@@ -934,8 +934,8 @@ def list_runtimes(study: Study) -> Rows:
 def list_learning(study: Study) -> Rows:
     """Yield the best reward of each method after some numbers of trials.
 
-    There is a row for each individual task and each method, except searches, if all of its runs on
-    the task have a solution and made at least 100 trials. Rewards are means over runs, negative
+    A method, unless it is a search, has a row for each individual task on which all of its runs
+    have a solution and made at least 100 trials. Rewards are means over runs, negative
     ticks, after each number of trials in :data:`BUDGETS`. A reward is NaN if not all runs made so
     many trials, or a run had no solution by then.
     """

@@ -141,9 +141,9 @@ class PostureController(Controller):
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
         """Move each posture by a step that shortens the path from ``q`` through all of them.
 
-        The preferred posture of a step (:meth:`step_nearer`) is the mean of the postures before and
-        after, weighted by inverse distances (Weiszfeld 1937). The preferred posture of the last
-        posture is the posture before.
+        Each posture steps towards a preferred one (:meth:`step_nearer`): the mean of its two
+        neighbours on the path, weighted by inverse distances (Weiszfeld 1937). The neighbour before
+        the first posture is ``q``. The last posture has one neighbour, and steps towards it.
 
         Parameters
         ----------

@@ -97,7 +97,10 @@ class Rounding:
     def plans(
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
-        """Yield the shortest plan for each choice of goals that take no movement.
+        """Yield the shortest plan for choices of goals that take no movement.
+
+        A goal can be chosen if its hand may be inside it before its turn. Choices for which no plan
+        is found are left out.
 
         Parameters
         ----------
@@ -105,15 +108,15 @@ class Rounding:
             Shortest plan with a movement to each goal.
         task : Task
         worth : callable
-            Function that says whether a number of ticks is of interest. Choices that cannot have
-            such a number, by :meth:`least`, are not tried.
+            Function that says whether a number of ticks is of interest. A choice is not extended
+            if, by :meth:`least`, none of its extensions can have such a number.
 
         Yields
         ------
         tuple of int
             Numbers (from 0) of the goals that take no movement. The first tuple is empty.
         PathPlan
-            Shortest plan found for this choice.
+            Shortest plan found for these goals.
         """
         hands, goals = self._instance.hands, len(self._instance.hands)
         # A hand can be in its goal before the turn of the goal: at the start, if the other hand

@@ -60,8 +60,8 @@ def check_method(
         Tasks to run the method on, by default the shipped tasks. Tasks to which the method does not
         apply are left out.
     verbose : bool
-        True to show what the method prints and logs, and the tracebacks of its errors. Output of
-        the repeat in another process is not shown.
+        True to show what the method prints and logs, and the tracebacks of its errors. One
+        run is repeated in another process; its output is not shown.
 
     Returns
     -------

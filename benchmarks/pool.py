@@ -80,7 +80,7 @@ class Local:
     """Executor that performs jobs in processes on this machine.
 
     A job has a limit of CPU time, which is a day if the job does not set it. The limit of its wall
-    time is three times the limit of CPU time plus ``timeout_s``. A job that reaches one of the
+    time is ``timeout_s`` plus three times the limit of CPU time. A job that reaches one of the
     limits is ended.
 
     Parameters

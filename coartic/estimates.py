@@ -193,7 +193,7 @@ def mean_of_means(
         The sum with its interval. The interval is the first of these that applies:
 
         - none, if a sample has fewer than :data:`FEWEST` values;
-        - the value itself, if no sample varies (the populations may vary all the same);
+        - the value itself, if no sample varies (which does not show that populations do not vary);
         - the normal interval, if a sample has more than :data:`HUGE` values;
         - the percentile interval, if a sample has more than :data:`LARGE` values or BCa is not
           defined;

@@ -527,11 +527,12 @@ def draw_runtimes(study: Study) -> Parts | None:
     Budgets are numbers of trials and of forward-kinematics evaluations, each in its own panel. A
     panel without a curve is left out. Returns None if there is no curve.
 
-    Of :func:`.headline_methods`, except the corrective process alone, there are curves for
+    The curves are those of :func:`.headline_methods`, without the corrective process alone. Shown
+    are
 
-    - methods that use the reward of each trial;
-    - methods from files;
-    - of the other methods, the one that reaches most targets.
+    - all methods that use the reward of each trial;
+    - all methods from files;
+    - the one other method that reaches most targets.
     """
     if not len(tabled := list_runtimes(study)):
         return None

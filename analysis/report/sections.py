@@ -339,7 +339,7 @@ def finding(study: Study, section: Section) -> list[str]:
     subjects = methods.apply(subject_of, axis=1)
 
     def few(row: Mapping[str, Any]) -> str:
-        """Return the words that a stochastic method has too few runs to test, or none."""
+        """Return a remark that a stochastic method has too few runs for a test, or ""."""
         labels = {str(row["method"]), str(row["against"])}
         drawn = [
             runs_on(study, label, solved_tasks(study, str(row["against"]))) for label in labels

@@ -226,8 +226,8 @@ def _perform_again(
 def _describe_run(run: Run, code: str) -> None:
     """Print id, seed, parameters and result of a run.
 
-    ``code`` is the version or code of its method here. If it differs from the run's, a sentence
-    says so.
+    ``code`` is the version of the run's method as installed now, or the hash of a method from a
+    file. If another one made the run, a sentence says so.
     """
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number

@@ -212,9 +212,9 @@ def learner_parameters(
 def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
     """Return tables in which nothing is learned, shape ``(runs, G, 3, 2)``.
 
-    The axes are run, goal, previous hand (left, right, none) and hand. An entry is a record of
-    ``value``, Q (-inf), and ``target``, q*: ``dof`` entries of NaN, then zeros up to the width of
-    kernel records.
+    The axes are run, goal, previous hand (left, right, none) and hand. An entry is a record with
+    two fields: ``value`` is Q, here -inf; ``target`` is q*, here ``dof`` times NaN. Zeros fill
+    ``target`` up to the width of kernel records.
     """
     learned = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
     tables = np.zeros((runs, len(task.goals), 3, 2), learned)

@@ -321,10 +321,10 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return an upper bound on the absolute link angles in a slot (in rad).
+    """Return an upper bound on the size of each link's angle to the x axis (in rad).
 
-    The bound is the sum of the absolute angles of the arm's joints. ``q`` has a column for each
-    slot.
+    The bound is the sum of the sizes of the joint angles of the arm in a slot. ``q`` has a column
+    for each slot.
     """
     total = 0.0
     for k in range(len(q) - BASE_DOF):
@@ -346,9 +346,10 @@ def have_small_angles(slots: SlotArrays, count: int) -> bool:
 
 
 def _chains_by(cos: Any, sin: Any) -> Any:
-    """Return a kernel that fills ``slots.x`` and ``slots.y`` with a given cosine and sine.
+    """Return a kernel that writes the positions of shoulder, joints and hand into its slots.
 
-    The arguments of the kernel are the slots and the number of columns to fill
+    The kernel computes them with the functions ``cos`` and ``sin``, and writes them to ``slots.x``
+    and ``slots.y``. The arguments of the kernel are the slots and the number of columns to fill
     (:func:`find_positions`).
     """
 

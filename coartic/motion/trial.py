@@ -294,10 +294,10 @@ class Accounts(NamedTuple):
 
 @inlined
 def _are_within(targets: Any) -> bool:
-    """Return whether no target of a trial has an entry beyond 1e5 in absolute value.
+    """Return whether no entry of a trial's targets is beyond :data:`LARGEST_ENTRY` in size.
 
-    ``targets`` has shape ``(G, M, dof)``; NaN, a joint that stays, is within
-    (:data:`LARGEST_ENTRY`).
+    ``targets`` has shape ``(G, M, dof)``. NaN means that a joint stays, and counts as within the
+    bound.
     """
     large = 0
     for g in range(targets.shape[0]):

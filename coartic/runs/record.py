@@ -178,7 +178,7 @@ class Run:
 
     @property
     def early_corrections(self) -> int | None:
-        """Corrective movements in the first tenth of a learner's trials after trial 0.
+        """Number of corrective movements in the first tenth of a learner's trials, without trial 0.
 
         The value is None if the corrections were not counted.
         """
