@@ -20,6 +20,8 @@ LONGEST_LINE = 500
 LONGEST_REASON = 2000
 """Largest number of characters of a stored reason."""
 _MOST_NAMED = 12  # most names in a sentence
+BACKWARDS = "{!r} goes backwards; put the lower number first"
+"""Error message for a range, such as ``50..9``."""
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
@@ -105,9 +107,8 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     if isinstance(name, str) and (sentence := foreign_file(name)):
         return f"{sentence}."
     known = list(names)
-    others = len(known) - _MOST_NAMED
-    and_more = f" and {counted(others, 'other')}" if others > 0 else ""
-    listed = f". Known: {', '.join(known[:_MOST_NAMED])}{and_more}."
+    end = ", ...; `coartic list` shows all." if len(known) > _MOST_NAMED else "."
+    listed = f". Known: {', '.join(known[:_MOST_NAMED])}{end}"
     hint = (did_you_mean(name, known) if isinstance(name, str) else "") or listed
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 
