@@ -20,8 +20,6 @@ LONGEST_LINE = 500
 LONGEST_REASON = 2000
 """Largest number of characters of a stored reason."""
 _MOST_NAMED = 12  # most names in a sentence
-BACKWARDS = "{!r} goes backwards; put the lower number first"
-"""Error message for a range, such as ``50..9``."""
 
 
 def plain(text: str, most: int = LONGEST_REASON) -> str:
@@ -77,6 +75,8 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f"; did you mean {by_lower_case[nearest[0]]!r}?" if nearest else ""
 
 
+BACKWARDS = "{!r} goes backwards; put the lower number first"
+"""Error message for a range, such as ``50..9``."""
 FOREIGN = (
     *(".urdf", ".xml", ".osim", ".mot", ".sto", ".trc"),
     *(".c3d", ".mat", ".xlsx", ".xls", ".ods"),
