@@ -34,7 +34,6 @@ from coartic.tasks.task import check_task
 CHECK_TRIALS = 60  # trials of a run: enough to learn something, few enough to be quick
 _LIMIT_S = 120.0  # limit of CPU time of a run
 _BUDGET = 7  # trial budget of the runs that check ``limits``
-_UNDECLARED = ("does not declare", "own compiled", "outside its session")  # words in reasons
 
 
 class CheckResult(NamedTuple):
@@ -42,8 +41,8 @@ class CheckResult(NamedTuple):
 
     name: str
     """Name of the check, such as ``determinism``."""
-    passed: bool
-    """True if the check found no problem."""
+    passed: bool | None
+    """True if the check found no problem, False if it found one, None if it was not made."""
     finding: str
     """The first problem, or a sentence on what was checked."""
 
@@ -52,6 +51,8 @@ def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[CheckResult]:
     """Check a method, and return the result of each of :data:`CHECKS`, in order.
+
+    If ``solution`` fails, the checks after it are not made.
 
     Parameters
     ----------
@@ -92,10 +93,14 @@ def check_method(
     if tasks:
         last_task = tasks[-1].name
         runs["elsewhere"] = {last_task: next(perform_in_order([jobs["first", last_task]]))}
-    results = []
+    results, is_solved = list[CheckResult](), True
     for name, (problems, finding) in CHECKS.items():
+        if not is_solved:
+            results.append(CheckResult(name, None, "not checked, because solution failed"))
+            continue
         problem = next(problems(info, runs), "")
         results.append(CheckResult(name, not problem, problem or finding(info, runs)))
+        is_solved = not (name == "solution" and problem)
     return results
 
 
@@ -152,11 +157,8 @@ def _used(runs: _Runs) -> set[str]:
 
 
 def _information(info: MethodInfo, runs: _Runs) -> Iterator[str]:
-    for task, run in runs.get("first", {}).items():
-        if any(words in run.outcome.reason for words in _UNDECLARED):
-            yield f"on {task}: {run.outcome.reason}"
     metered = {item.value for item in METERED if item.value in info.information}
-    if runs and (unused := sorted(metered - _used(runs))):
+    if unused := sorted(metered - _used(runs)):
         yield f"declared but not used: {', '.join(unused)}"
 
 

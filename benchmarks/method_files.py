@@ -17,6 +17,7 @@ from concurrent.futures import BrokenExecutor
 from dataclasses import replace
 from functools import partial
 from importlib import metadata
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from coartic.internal.text import LONGEST_LINE, error_line, plain
 from coartic.internal.threads import begin_worker
 from coartic.internal.toml_files import read_bytes
 from coartic.method import Information, Method
+from coartic.method.optimisers import Optimiser
 from coartic.model import MODEL_VERSION
 from coartic.runs.method_info import (
     READERS,
@@ -148,6 +150,15 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
             raise CoarticError(
                 f"{where}: information must be a set of Information, not {information!r}"
             )
+        function, arguments = "solve", "session"
+        if issubclass(method, Optimiser):
+            function, arguments = "optimise", "objective, rng"
+        try:
+            signature(getattr(method, function)).bind("self", *arguments.split(", "))
+        except TypeError:
+            raise CoarticError(
+                f"{where}: {function} must be defined as {function}(self, {arguments})"
+            ) from None
         info = method_info(method, shown, str(path), _code_of(method, path, files))
         infos.append(replace(info, packages=packages))
     return infos

@@ -20,6 +20,7 @@ from coartic.benchmarks.suites import (
     TaskNamed,
     TrialCount,
     check_kind,
+    errors_of_block,
     load_suite,
     suites,
     tasks_of,
@@ -144,11 +145,11 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
 
 def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     """Return the jobs of :func:`plan_suite` for a checked request and all known methods."""
-    asked = {name: methods_named(name, registered) for name in request.methods}
-    asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
     jobs = [*_suite_jobs(suite, registered, own, task_named, job)]
+    asked = {name: methods_named(name, registered) for name in request.methods}
+    asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     ids = dict.fromkeys(itertools.chain(*asked.values()))
     if not request.methods:
         ids = dict.fromkeys(planned.cell.method.name for planned in jobs) | ids
@@ -273,10 +274,12 @@ def _asked_tasks(
                 f"{asked}: the name {task.name!r} belongs to {owner}: give this task another name"
             )
         names[task.name] = None
-    of_suite = {name for block in suite.blocks for entry in block.tasks for name in named_by(entry)}
-    if own:
-        suite_tasks = [t for block in suite.blocks for t in tasks_of(suite, block, (), task_named)]
-        own = {name: task for name, task in own.items() if task not in suite_tasks}
+    of_suite, suite_tasks = set[str](), list[Task]()
+    for number, block in enumerate(suite.blocks, 1):
+        with errors_of_block(suite, number):
+            of_suite |= {name for entry in block.tasks for name in named_by(entry)}
+            suite_tasks += tasks_of(block, (), task_named) if own else ()
+    own = {name: task for name, task in own.items() if task not in suite_tasks}
     instances = (name for name in names if name not in of_suite and address_of(name))
     own |= {name: task_named(name) for name in instances}
     return names, own, task_named
@@ -291,15 +294,19 @@ def _suite_jobs(
 ) -> Iterator[Job]:
     """Yield the jobs of a suite, which ``job`` makes (:func:`_job_of`).
 
-    Raises CoarticError for an unknown method or parameter, and for a method that does not apply to
-    a task of a block without wildcards.
+    Raises CoarticError for an unknown method or parameter, for a block whose ``goals`` leave no
+    task, and for a method that does not apply to a task of a block without wildcards.
     """
-    for block in suite.blocks:
-        ids = dict.fromkeys(m for name in block.methods for m in methods_named(name, registered))
-        # In a block with a wildcard, methods are skipped on tasks to which they do not apply.
-        is_open = WILDCARD in "".join((*block.methods, *block.tasks))
-        for task in tasks_of(suite, block, own, task_named):
-            for method in map(registered.__getitem__, ids):
+    for number, block in enumerate(suite.blocks, 1):
+        with errors_of_block(suite, number):
+            named = itertools.chain(*(methods_named(name, registered) for name in block.methods))
+            methods = [registered[name] for name in dict.fromkeys(named)]
+            # In a block with a wildcard, methods are skipped on tasks to which they do not apply.
+            is_open = WILDCARD in "".join((*block.methods, *block.tasks))
+            tasks = [*tasks_of(block, own, task_named)]
+            if block.goals is not None and not tasks and not own:
+                raise CoarticError(f"goals = {[*block.goals]} leaves no task")
+            for task, method in itertools.product(tasks, methods):
                 for values in itertools.product(*block.grid.values()):
                     parameters = block.parameters | dict(zip(block.grid, values, strict=True))
                     reason = method.why_not(task, parameters)
@@ -307,8 +314,7 @@ def _suite_jobs(
                         yield job(task, method, parameters, block.runs)
                     elif not is_open:
                         raise CoarticError(
-                            f"suite {suite.name!r}: {reason}; name in a block only methods that "
-                            "apply to all of its tasks"
+                            f"{reason}; name in a block only methods that apply to all of its tasks"
                         )
 
 

@@ -29,13 +29,16 @@ def find_run(prefix: str, folder: Path) -> Run:
     """
     if not prefix or not set(prefix) <= set("0123456789abcdef-."):
         raise CoarticError(
-            f"{prefix!r} is not the beginning of a run id, such as 3f2a9c. Column run_ids of a "
-            "report's tables has the ids of the runs of each row."
+            f"{prefix!r} is not the beginning of a run id, such as 3f2a9c; `coartic list {folder}` "
+            "lists the ids"
         )
     with open_store(folder) as store:
         ids = sorted(store.ids(prefix))
         if not ids:
-            raise CoarticError(f"{folder} has no run with an id that begins with {prefix!r}")
+            raise CoarticError(
+                f"{folder} has no run with an id that begins with {prefix!r}; "
+                f"`coartic list {folder}` lists the ids"
+            )
         if len(ids) > 1:
             listed = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")
             raise CoarticError(f"{len(ids)} run ids begin with {prefix!r}: {listed}")

@@ -6,6 +6,7 @@ import itertools
 import os
 import sys
 from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any
@@ -130,12 +131,7 @@ def kind_of(name: str) -> str:
         - ``method file`` for a name that ends in ``.py``;
         - ``suite``, ``family`` or ``task`` for a TOML file, by its keys;
         - ``results folder`` for a folder with results, or a folder that cannot be opened;
-        - an empty string for anything else.
-
-    Raises
-    ------
-    CoarticError
-        A TOML file cannot be read.
+        - an empty string for anything else, such as a TOML file that cannot be read.
     """
     if name in suites():
         return "suite"
@@ -146,7 +142,10 @@ def kind_of(name: str) -> str:
     if not name.endswith(".toml"):
         closed = os.path.isdir(name) and not os.access(name, os.X_OK)
         return "results folder" if closed or os.path.isfile(Path(name) / RUNS_FILE) else ""
-    content = read_toml(Path(name))
+    try:
+        content = read_toml(Path(name))
+    except CoarticError:
+        return ""
     keys = {"blocks": "suite", "region": "family", "goals": "task"}  # a key that only this kind has
     return next((kind for key, kind in keys.items() if key in content), "")
 
@@ -191,16 +190,22 @@ def _read_suite(path: Path) -> Suite:
         raise CoarticError(f"{plain(str(path))}: {explain(error, keys)}") from None
 
 
-def tasks_of(
-    suite: Suite, block: _Block, own: Collection[str], task_named: TaskNamed
-) -> Iterator[Task]:
+@contextmanager
+def errors_of_block(suite: Suite, number: int) -> Iterator[None]:
+    """Name a suite and the number of a block, from 1, in each CoarticError of a ``with`` block."""
+    try:
+        yield
+    except CoarticError as error:
+        raise CoarticError(f"suite {suite.name!r}, block {number}: {error}") from None
+
+
+def tasks_of(block: _Block, own: Collection[str], task_named: TaskNamed) -> Iterator[Task]:
     """Yield the tasks of a block in order, with the changes that the block asks for.
 
     A block can ask for a free base, or for tasks with a moved goal.
 
     Parameters
     ----------
-    suite : Suite
     block : _Block
     own : collection of str
         Names of the user's tasks, which belong to a block for all tasks (``*``).
@@ -210,32 +215,36 @@ def tasks_of(
     Yields
     ------
     Task
+
+    Raises
+    ------
+    CoarticError
+        A task cannot be loaded, or cannot be changed as the block asks.
     """
     all_tasks = [*builtin_tasks(), *own]
     names = (all_tasks if entry == WILDCARD else named_by(entry) for entry in block.tasks)
     for name in dict.fromkeys(itertools.chain(*names)):
+        if name.endswith(".toml") and not os.path.exists(name):
+            raise CoarticError(f"file {name} does not exist; paths start from the current folder")
         task = task_named(name)
         if block.goals is None or len(task.goals) in block.goals:
-            yield from _changed_tasks(task, suite, block)
+            yield from _changed_tasks(task, block)
 
 
-def _changed_tasks(task: Task, suite: Suite, block: _Block) -> list[Task]:
+def _changed_tasks(task: Task, block: _Block) -> list[Task]:
     """Return the tasks that a block makes of a task: with a free base, or with a moved goal.
 
     Raises CoarticError if the base is free already, if the task does not have the goal, or if the
     goal would be out of reach.
     """
-    source = f"suite {suite.name!r}"
 
     def changed(name: str, difference: str, **changes: Any) -> Task:
         named = {"name": f"{task.name}.{name}", "description": f"{task.name} with {difference}"}
-        return parse_task(task.model_dump(mode="json") | named | changes, source)
+        return parse_task(task.model_dump(mode="json") | named | changes, named["name"])
 
     if block.free_base:
         if not task.locked_base:
-            raise CoarticError(
-                f"{source}: free_base has no effect on task {task.name!r}, whose base is free"
-            )
+            raise CoarticError(f"free_base has no effect on task {task.name!r}, whose base is free")
         provenance = {
             "status": "chosen",
             "source": f"not that of {task.name}, to see what its lock does",
@@ -252,8 +261,7 @@ def _changed_tasks(task: Task, suite: Suite, block: _Block) -> list[Task]:
     number = block.move.goal
     if number > len(task.goals):
         raise CoarticError(
-            f"{source}: move asks for goal {number}, and task {task.name!r} has "
-            f"{len(task.goals)} goals"
+            f"move asks for goal {number}, and task {task.name!r} has {len(task.goals)} goals"
         )
     moved = []
     for x, y in block.move.by:

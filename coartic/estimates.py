@@ -91,12 +91,13 @@ def vector(values: ArrayLike) -> Array:
     - has an entry other than 0 whose size is not from 1e-100 to 1e100.
     """
     sample = real_array("a sample", values)
+    if sample.size == 0:
+        raise ValueError("the sample is empty; it must have at least one value")
     size = np.abs(sample)
     usable = (size <= 1e100) & ((size >= 1e-100) | (size == 0))
-    if sample.ndim != 1 or sample.size == 0 or not usable.all():
+    if sample.ndim != 1 or not usable.all():
         raise ValueError(
-            "a sample must be a vector of at least one value; each value must be 0 or have a size "
-            "from 1e-100 to 1e100"
+            "a sample must be a vector; each value must be 0 or have a size from 1e-100 to 1e100"
         )
     return sample
 

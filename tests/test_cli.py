@@ -101,10 +101,7 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     assert text.splitlines()[-1] == "1 run performed again: none with another result."
     assert re.search(rf"Run +{first}: Ascending, .*, run 0\nSeed +[0-9]+\nParam.*\nResult", text)
     assert "checked" not in text
-    assert (
-        "with an id that begins with '0123456789'"
-        in coartic("verify", out, "--run", "0123456789")[2]
-    )
+    assert f"`coartic list {out}`" in coartic("verify", out, "--run", "0123456789")[2]
     part = tmp_path / "part"  # of an array, and of all methods those for one arm
     own = ("--methods", "dual-process/*", "--runs", "2..3")
     assert coartic(*SMALL, *own, "--out", part)[0] == 0
@@ -325,6 +322,32 @@ def test_a_task_of_a_small_radius_passes_every_door(coartic, tmp_path):
     env = TaskEnv(task)
     env.reset(seed=0)
     assert env.step(env.action_space.sample())[1] < 0
+
+
+@pytest.mark.parametrize(
+    ("command", "code", "words"),
+    [
+        ("run quick --runs 50..9", 2, "'50..9' goes backwards"),
+        ("list other", 2, "other is not a results folder"),
+        ("draw other", 2, "other is not a results folder"),
+        ("draw suite.toml", 2, "suite.toml is a suite: use `coartic run suite.toml`"),
+        ("check suite.toml", 2, "suite.toml is a suite: use `coartic run suite.toml`"),
+        ("draw ascending --run 12", 2, "--run needs a results folder; ascending is a task"),
+        ("check nothere", 2, "`coartic list` shows all"),
+        ("check nothere.toml", 2, "nothere.toml cannot be read"),
+        ("check bytes.toml", 1, "bytes.toml is not UTF-8"),
+    ],
+)
+def test_the_subject_of_a_command_is_explained(
+    coartic, tmp_path, monkeypatch, command, code, words
+):
+    monkeypatch.chdir(tmp_path)
+    Path("other").mkdir()
+    Path("suite.toml").write_text("blocks = []", "utf-8")
+    Path("bytes.toml").write_bytes(b'title = "\xff"')
+    ended, text, error = coartic(*command.split())
+    assert ended == code
+    assert words in text + error
 
 
 REFUSED = (

@@ -178,5 +178,9 @@ def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic,
     asked = ("--tasks", f"{path}/i000..i001", "--methods", "EC4", "--runs", 1, "--trials", 5)
     code, text, _ = coartic("run", "paper", *asked, "--out", "out")
     assert (code, text[:5]) == (0, "2 run")
-    with pytest.raises(TaskError, match="is not an instance of a family"):
-        load_task(f"{path}/i0")
+    for short, words in (
+        ("i0", "three digits: .*/i000"),
+        ("x000", "is not an instance of a family"),
+    ):
+        with pytest.raises(TaskError, match=words):
+            load_task(f"{path}/{short}")

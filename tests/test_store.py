@@ -291,7 +291,7 @@ def of_5_0_0(path):
         (sql(f"PRAGMA user_version = {FORMAT + 1}"), "later version.*update coartic"),
         (of_5_0_0, "was written by coartic 5.0.0, .*`coartic run` command with another --out"),
         (foreign, "was not written by coartic"),
-        (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it away"),
+        (lambda path: path.write_bytes(b"x" * 9999), "is damaged.*Move it out of"),
     ],
 )
 def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words):

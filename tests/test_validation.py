@@ -64,6 +64,12 @@ class A(Method):
     information = frozenset()
     def solve(self, session): ...
 """
+OPTIMISER = """
+from coartic import Optimiser
+class A(Optimiser):
+    name = title = citation = "a"
+    def optimise(self, objective): ...
+"""
 
 
 def changed(good, old, new):
@@ -78,10 +84,10 @@ TASKS = [
     (task("[[5.0, 1.0], [5.0, 2.0]]", "[]"), "goals is []; "),
     ('locked_base = ["x", "y"]\n' + task("[5.0, 2.0]", "[5.0, 20.0]"), "out of reach"),
     ("goal = 1\nrobots = 1\n" + GOOD, "goal is an unknown key; did you mean 'goals'?"),
-    (task('"RR"', '"RRR"'), "initial_hands: "),
+    (task('"RR"', '"RRR"'), "initial_hands is 'RRR'; it must have 2 letters L or R, such as 'LR'"),
     (task("right = [0.0, 0.0, 0.0, 0.0]", "right = [0.0, 0.0]"), "start.right"),
     (task('"mine"', '"my task"'), "name is 'my task'; "),
-    (task("goals = [[", "goals = [[["), "line"),
+    (task("goals = [[", "goals = [[["), "is not valid TOML: "),
 ]
 FAMILIES = [
     (family("[2, 3]", "[1, 3]"), "goals[0] is 1; "),
@@ -94,11 +100,16 @@ SUITES = [
     (SUITE + "grid = {noise_sd = [nan]}", "grid.noise_sd[0] is nan; "),
     (suite("runs = 1", "runs = 1.5"), "runs is 1.5; "),
     (SUITE + "move = {goal = 4, by = [[0, 1]]}", "asks for goal 4"),
+    (SUITE + "goals = [2]", "suite 'own', block 1: goals = [2] leaves no task"),
+    (SUITE + "parameters = {noise_sd = -1.0}", "suite 'own', block 1: method "),
+    (suite('"ascending"', '"shelf.toml"'), "paths start from the current folder"),
 ]
 METHODS = [
     ("import nothing_like_this", "ModuleNotFoundError"),
     ("x = 1", "must define a subclass of coartic.Method"),
     (method("def solve", "def solves"), "A has no solve"),
+    (method("self, session", "self"), "A: solve must be defined as solve(self, session)"),
+    (OPTIMISER, "A: optimise must be defined as optimise(self, objective, rng)"),
     (method('"a"', '"cma-es/bandit"'), "method id 'cma-es/bandit' exists already"),
     (method("frozenset()", '"goals"'), "information must be"),
 ]
@@ -262,6 +273,14 @@ def test_a_name_and_a_path_stand_for_the_task(call):
         (lambda: reach_goals(3, [TASK.q0], [0], [], 1.0), "robot is 3; .* Robot"),
         (lambda: interval({"a": "x", "a_low": 0, "a_high": 1}, "a"), "a_l"),
         (lambda: mean([1e101, 0.0, 1.0]), "1e100"),
+        (lambda: mean([]), "the sample is empty"),
+        (lambda: coartic.execute(TASK, np.zeros((3, 10))), r"movements_of\(hands, targets\)"),
+        (
+            lambda: coartic.objective(TASK, "RRR")(np.zeros(3)),
+            r"\(3,\); .* many\(x\) takes .* rows",
+        ),
+        (lambda: load_task("long/v1/i99"), "three digits: long/v1/i099"),
+        (lambda: load_task("long/v1/2027-7"), "three digits: long/v1/2027-007"),
         (lambda: holm([0.1, 1.01]), "p-values"),
         (lambda: perform([], "x"), "no jobs"),
         (lambda: movements_of("RRR", np.zeros((2, 10))), "3"),

@@ -16,7 +16,7 @@ import typer
 from coartic.cli.completion import Words
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
-from coartic.internal.text import unknown
+from coartic.internal.text import BACKWARDS, unknown
 
 if TYPE_CHECKING:
     from coartic.benchmarks.registry import Registry
@@ -65,10 +65,13 @@ def within(option: str, what: str, least: float, most: float) -> Any:
 def runs_named(text: str) -> Any:
     """Parse a number of runs, such as ``20``, or a range with both ends, such as ``50..99``.
 
-    Any other string is returned unchanged; the plan refuses it.
+    Any other string is returned unchanged; the plan refuses it. Raises CoarticError for a range
+    that goes backwards.
     """
     first, is_range, last = text.partition("..")
     with suppress(ValueError):
+        if is_range and int(last) < int(first):
+            raise CoarticError(f"--runs {BACKWARDS.format(text)}")
         return range(int(first), int(last) + 1) if is_range else int(first)
     return text
 

@@ -328,6 +328,8 @@ def draw(
 
     If --out is a folder, the files of the tasks are written there, too.
     """
+    from coartic import builtin_tasks
+
     if recording:
         if run or initial or width is not None:
             raise CoarticError("--run, --initial and --width have no effect with --recording")
@@ -339,23 +341,30 @@ def draw(
     if run:
         if len(tasks := tasks or []) != 1:
             raise CoarticError("--run needs one results folder: coartic draw FOLDER --run ID")
-        film = out or Path("film.gif")
-        return _film(folder_named(tasks[0]), run, film, initial, width or 800, replace)
+        film, folder = out or Path("film.gif"), folder_named(tasks[0])
+        if tasks[0] in builtin_tasks() and not folder.exists():
+            raise CoarticError(f"--run needs a results folder; {folder} is a task")
+        return _film(folder, run, film, initial, width or 800, replace)
     without = ["--initial"] * initial + ["--width"] * (width is not None)
     if without:
         has = "have" if without[1:] else "has"
         raise CoarticError(f"{' and '.join(without)} {has} no effect without --run")
-    from coartic import builtin_tasks, load_task
+    from coartic import load_task
+    from coartic.benchmarks.suites import check_kind
     from coartic.internal.files import check_ending, check_output, publish, write_output
     from coartic.runs.plan import tasks_by_name
+    from coartic.runs.store import open_store
     from coartic.tasks.families import named_by
     from coartic.tasks.task import task_text
 
-    for folder in [name for name in tasks or () if Path(name).is_dir()]:
-        raise CoarticError(
-            f"{folder} is a folder, not a task. `coartic draw {folder} --run ID` films a run, and "
-            f"`coartic list {folder}` lists the ids."
-        )
+    for name in tasks or ():
+        if Path(name).is_dir():
+            with open_store(Path(name)):  # explains what another folder lacks
+                raise CoarticError(
+                    f"{name} is a results folder, not a task. `coartic draw {name} --run ID` films "
+                    f"a run, and `coartic list {name}` lists the ids."
+                )
+        check_kind(name, "task", "family")
     out = out or Path("tasks.svg")
     if replace and not out.suffix:
         raise CoarticError(

@@ -206,6 +206,8 @@ def list_(
         try:
             methods = given.methods_meant([name], registered)
         except CoarticError as error:
+            if Path(name).is_dir():
+                return _list_runs(Path(name))  # explains what the folder lacks
             if not str(error).startswith("unknown"):
                 raise
             known = [*suites(), *builtin_tasks(), *families, *registered]
@@ -309,6 +311,7 @@ def check(
     from coartic.benchmarks.conformance import check_method, check_task_file
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.suites import check_kind
+    from coartic.internal.toml_files import read_bytes
     from coartic.tasks.task import address_of
 
     if subject in builtin_tasks() or address_of(subject):
@@ -318,6 +321,7 @@ def check(
         )
     registered = registry(method_file or [])
     if subject.endswith(".toml"):
+        read_bytes(subject)  # a file that is missing is not a check that fails
         check_kind(subject, "task")
         if verbose:
             raise CoarticError("--verbose has no effect on a task file")
@@ -339,10 +343,11 @@ def check(
 
 
 def _show_results(name: str, results: Sequence[CheckResult]) -> int:
-    """Print the results of checks, and return the number of checks that failed."""
+    """Print the results of checks, and return the number of checks that did not pass."""
+    words = {True: "pass", False: "FAIL", None: "skip"}
     for result in results:
-        say(f"{'pass' if result.passed else 'FAIL'}  {result.name}: {result.finding}")
-    passed = sum(result.passed for result in results)
+        say(f"{words[result.passed]}  {result.name}: {result.finding}")
+    passed = sum(result.passed is True for result in results)
     say(f"{name}: {passed} of {counted(len(results), 'check')} passed.")
     return len(results) - passed
 

@@ -75,6 +75,8 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f"; did you mean {by_lower_case[nearest[0]]!r}?" if nearest else ""
 
 
+BACKWARDS = "{!r} goes backwards; put the lower number first"
+"""Error message for a range, such as ``50..9``."""
 FOREIGN = (
     *(".urdf", ".xml", ".osim", ".mot", ".sto", ".trc"),
     *(".c3d", ".mat", ".xlsx", ".xls", ".ods"),
@@ -105,9 +107,8 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     if isinstance(name, str) and (sentence := foreign_file(name)):
         return f"{sentence}."
     known = list(names)
-    others = len(known) - _MOST_NAMED
-    and_more = f" and {counted(others, 'other')}" if others > 0 else ""
-    listed = f". Known: {', '.join(known[:_MOST_NAMED])}{and_more}."
+    end = ", ...; `coartic list` shows all." if len(known) > _MOST_NAMED else "."
+    listed = f". Known: {', '.join(known[:_MOST_NAMED])}{end}"
     hint = (did_you_mean(name, known) if isinstance(name, str) else "") or listed
     return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
 

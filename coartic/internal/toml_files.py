@@ -17,9 +17,10 @@ def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> 
     """
     try:
         return tomllib.loads(read_bytes(path, error=error).decode("utf-8-sig"))
-    except ValueError as failure:  # wrong TOML or UTF-8
+    except ValueError as failure:
+        form = "UTF-8" if isinstance(failure, UnicodeError) else "valid TOML"
         shown = plain(str(path), LONGEST_LINE)
-        raise error(f"{shown} is not valid TOML in UTF-8: {plain(str(failure), 80)}") from None
+        raise error(f"{shown} is not {form}: {plain(str(failure), 80)}") from None
 
 
 def read_bytes(path: str | Path, *, error: type[CoarticError] = CoarticError) -> bytes:

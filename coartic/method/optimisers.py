@@ -433,7 +433,8 @@ class Objective:
             return self.many(point.T, hands)
         if point.shape != (self.dim,):
             raise ValueError(
-                f"x has shape {point.shape}; it must be ({self.dim},) or ({self.dim}, N)"
+                f"x has shape {point.shape}; it must be ({self.dim},) or ({self.dim}, N); "
+                "many(x) takes points as rows"
             )
         # Points with NaN or large entries need a closer check.
         if hands is not None or not math.hypot(*point.tolist()) < LARGEST_ENTRY:

@@ -404,7 +404,10 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     plan: Plan = []
     for movement in solution:
         if not isinstance(movement, Movement):
-            raise SolutionError(f"task {task.name!r}: {brief_value(movement)} is not a Movement")
+            raise SolutionError(
+                f"task {task.name!r}: {brief_value(movement)} is not a Movement; make a solution "
+                "of arrays by movements_of(hands, targets)"
+            )
         if not isinstance(movement.goal, (int, np.integer)):
             raise SolutionError(
                 f"task {task.name!r}: goal of a movement is {brief_value(movement.goal)}; it must "

@@ -697,8 +697,8 @@ def explain_errors(folder: Path) -> Iterator[None]:
 
 _BUSY = "another program uses it: close it there, or wait for it"
 _DAMAGED = (
-    "it is damaged. Move it away and repeat the `coartic run` command, or restore a copy of the "
-    "file. A dump is not a copy. If the file is a pointer of Git LFS, run `git lfs pull`"
+    "it is damaged. Move it out of its folder and repeat the `coartic run` command, or restore a "
+    "copy of the file (not an SQL dump). If it is a pointer of Git LFS, run `git lfs pull`"
 )
 _SENTENCES = {
     "SQLITE_BUSY": _BUSY,

@@ -35,7 +35,7 @@ from pydantic_core import PydanticCustomError
 from coartic.errors import NotApplicableError, TaskError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MOST_CELLS, check_limits
-from coartic.internal.text import Line, counted, plain, unknown
+from coartic.internal.text import BACKWARDS, Line, counted, plain, unknown
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.motion.initial_hands import ranked_sequences, search_initial_hands
@@ -385,6 +385,9 @@ def instance(name: str) -> Task:
     family, _, short = name.rpartition("/")
     address = address_of(f"{load_family(family).name}/{short}" if is_file(family) else name)
     if address is None:
+        if few_digits := re.fullmatch(r"([di]|[0-9]{4}-)([0-9]{1,2})", short):
+            right = f"{family}/{few_digits[1]}{int(few_digits[2]):03d}"
+            raise TaskError(f"{name!r}: the number must have three digits: {right}")
         raise TaskError(
             f"{name!r} is not an instance of a family. Write for example two-armed/v1/i017 (test), "
             "two-armed/v1/d017 (development) or two-armed/v1/2027-017 (fresh, of the year 2027)."
@@ -417,7 +420,7 @@ def named_by(text: str) -> list[str]:
             "or the path of a task file of your own, which ends in .toml."
         )
     if high.number < low.number:
-        raise TaskError(f"{text!r} goes backwards; put the lower number first")
+        raise TaskError(BACKWARDS.format(text))
     if high.number - low.number >= MOST_CELLS:
         raise TaskError(f"{text!r} names more than {MOST_CELLS:,} instances")
     numbers = range(low.number, high.number + 1)

@@ -289,9 +289,13 @@ class Task(FileData):
         if not self.initial_is_policy:
             try:
                 check_hands(self, self.initial_hands)
-            except ValueError as error:
-                policies = ", ".join(INITIAL_POLICIES)
-                raise sentence_error(f"initial_hands: {error}, or be one of {policies}") from None
+            except ValueError:
+                letters, count = letters_of(sorted(self.hands)), len(self.goals)
+                raise sentence_error(
+                    f"initial_hands is {brief_value(self.initial_hands)}; it must have "
+                    f"{counted(count, 'letter')} {' or '.join(letters)}, such as "
+                    f"{(letters * count)[:count]!r}, or be {' or '.join(INITIAL_POLICIES)}"
+                ) from None
         # With any model the corrective process ends within the radius; check_task is stricter.
         if info.context != WITHOUT_REACH and (far := _out_of_reach(self, self.radius)) is not None:
             raise sentence_error(far)
