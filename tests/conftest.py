@@ -5,7 +5,6 @@ import os
 import shutil
 import signal
 import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -144,16 +143,6 @@ def shipped():
     from coartic.analysis.study import load
 
     return load("shipped")
-
-
-@pytest.fixture(scope="session")
-def shipped_families():
-    """The shipped results of suite ``families``, likewise."""
-    from coartic.analysis.study import Study
-    from coartic.runs.shipped import open_shipped
-
-    with open_shipped("families") as store:
-        return Study(Path("families"), store.plan(), store.made_with(), store.runs())
 
 
 @pytest.fixture(scope="session")

@@ -216,12 +216,8 @@ def test_a_study_of_numbers_of_trials_is_ranked_whole():
     assert rows.index.tolist() == [f"{EC1} {setting}" for setting in settings[::-1]]
 
 
-@pytest.mark.parametrize("every", [1, 10])
-def test_the_frame_of_shipped_runs_ranks_methods_on_all_tasks(every, shipped, shipped_families):
-    """Of the comparison, and of some instances of the families."""
-    seen = shipped if every == 1 else shipped_families
-    some = seen.runs.task.isin(seen.runs.task.unique()[::every])
-    runs = seen.runs[some & ~seen.runs.method.str.startswith("optimum")]
+def test_the_frame_of_shipped_runs_ranks_methods_on_all_tasks(shipped):
+    runs = shipped.runs[~shipped.runs.method.str.startswith("optimum")]
     ranked, tasks = ranking(runs), runs.task.nunique()
     ran = runs.groupby("ranked_as").task.nunique()
     complete = {*ran.index[ran == tasks]}

@@ -67,8 +67,8 @@ def share_rejected(studies, **kinds):
     "kind", [{}, {"drift": 0.1}, {"shift": 0.2}], ids=["noise", "drift", "shift"]
 )
 def test_without_a_lean_the_test_keeps_its_level(kind):
-    """Level 6/128; of 300 studies at most 8.3 % (three standard errors)."""
-    assert share_rejected(300, **kind) < 0.0834
+    """Level 6/128; of 200 studies at most 9.1 % (three standard errors)."""
+    assert share_rejected(200, **kind) < 0.0917
 
 
 def test_a_planted_lean_is_found():
