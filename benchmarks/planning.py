@@ -330,8 +330,8 @@ def _job_of(
     numbers = asked if isinstance(asked, range) else range(asked)
     numbers = numbers if method.stochastic else range(numbers.start, 1)
     limit_s = request.time_limit_s or suite.time_limit_s
-    by_suite = suite.trials if request.trials else None
-    return Job(cell, request.seed, numbers, limit_s, suite.name, by_suite)
+    due = min(filter(None, (trials, request.trial_budget)), default=None)
+    return Job(cell, request.seed, numbers, limit_s, suite.name, due)
 
 
 def _why_nothing_runs(
