@@ -90,7 +90,7 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
     it.
     """
     values = study.signature(signature, task, label).to_numpy(np.float64)
-    hands = np.array(study.cells[task, label].hands.tolist(), dtype=object)
+    hands = np.array(study.cells[task, label].hands.fillna("").tolist(), dtype=object)
     if signature == "hand":
         hands[:] = ""
     has_value = np.isfinite(values)

@@ -98,17 +98,17 @@ def ranking_budget(study: Study) -> int | None:
 
     - None, if no method has trials, or a method has several numbers, because the study then
       compares these numbers;
-    - otherwise the number in the suite's file, if the command asked for another number and a
-      method has the suite's number;
+    - otherwise the number that the last command, or else the suite's file, asked for, if a method
+      has it;
     - otherwise the number that most algorithms have; the smallest of them if there is a tie.
     """
     runs = compared_runs(study).dropna(subset="budget")
     if runs[["method", "budget"]].drop_duplicates().duplicated("method").any():
         return None
     algorithms = runs.label.map(study.methods.algorithm).groupby(runs.budget).nunique()
-    by_suite = study.plan[0].suite_trials
-    if by_suite in algorithms.index:
-        return by_suite
+    asked = study.plan[0].trials
+    if asked in algorithms.index:
+        return asked
     return int(algorithms.idxmax()) if len(runs) else None  # type: ignore[call-overload]
 
 
@@ -127,7 +127,8 @@ def standings(study: Study) -> pd.DataFrame:
         :func:`.ranking` and of :attr:`.Study.methods`; ``why`` says why a method is not ranked, and
         is empty for ranked methods. Column ``note`` says
 
-        - how many trials a method from a file made, if it was asked for another number;
+        - how many trials the solved runs of a method from a file made, if a run was asked for
+          another number;
         - how many of a method's solutions can fail with motor noise.
     """
     runs, budget = compared_runs(study), ranking_budget(study)
@@ -143,11 +144,13 @@ def standings(study: Study) -> pd.DataFrame:
             f"{listed(map(number, asked))} trials, not {number(budget or 0)}" if is_other else ""
         )
         reasons.append("; ".join(filter(None, [row.why, trials])))
-        most_trials, due = int(of_method.trials.fillna(0).max()), max([*asked, budget or 0])
-        is_told = not row.built_in and row.information == BY_TRIAL and due and most_trials != due
+        due = max([*asked, budget or 0])
+        made = of_method.trials[of_method.reward.notna()].dropna().astype(int)
+        is_told = not row.built_in and row.information == BY_TRIAL and due and (made != due).any()
+        ends = dict.fromkeys([made.min(), made.max()])
         fragile = int((of_method.reward.notna() & of_method.noisy_ticks.isna()).sum())
         note = [
-            f"made {number(most_trials)} of {number(due)} trials" * bool(is_told),
+            f"made {' to '.join(map(number, ends))} of {number(due)} trials" * bool(is_told),
             f"{fragile} of {counted(len(of_method), 'solution')} can fail with motor noise"
             * bool(fragile),
         ]

@@ -32,7 +32,7 @@ from coartic.motion.initial_hands import ranked_sequences
 from coartic.motion.solution import initial_reward
 from coartic.robot import Array
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, label_of, size_of, trials_in
+from coartic.runs.plan import Job, label_of, size_of
 from coartic.runs.record import execute_all
 from coartic.runs.shipped import open_results
 from coartic.runs.store import explain_errors
@@ -267,7 +267,7 @@ class Study:
                 "split": cell.task.split,
                 "goals": len(cell.task.goals),
                 "arms": len(cell.task.hands),
-                "budget": trials_in(cell.parameters) or None,
+                "budget": cell.trials,
             }
             for cell in cells
         ]

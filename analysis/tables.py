@@ -483,7 +483,7 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
     """Yield the rows of the methods of :func:`.standings` that are ranked, or of the others."""
     rows = standings(study)
     rows = rows[(rows.why == "") == ranked]
-    single = [task for task in ranked_tasks(study) if study.tasks[task].family is None]
+    single = [task for task in ranked_tasks(study) if task in study.individual_tasks]
     early = _gaps_after(study, _EARLY).to_dict() if ranked and len(rows) else {}
     for label, row in rows.iterrows():
         runs = runs_by_method(study)[str(label)]
@@ -541,8 +541,8 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
 def list_ranking(study: Study) -> Rows:
     """Yield a row for each ranked method (:func:`.standings`), the smallest gap first.
 
-    It has the gap and the share of the gain, means over tasks; the gap on each task that is not
-    random; the gap after a thousand trials; and the mean costs of a run.
+    It has the gap and the share of the gain, means over tasks; the gap on each individual task;
+    the gap after a thousand trials; and the mean costs of a run.
     """
     return _standing_rows(study, ranked=True)
 
@@ -567,15 +567,15 @@ def list_ranking(study: Study) -> Rows:
 def list_not_ranked(study: Study) -> Rows:
     """Yield a row for each method that is not ranked (:func:`.standings`), with the reason.
 
-    The row also has the gap on each task that is not random. If the method solved all tasks, but
+    The row also has the gap on each individual task. If the method solved all tasks, but
     with another number of trials, the row has its gap over tasks, too.
     """
     return _standing_rows(study, ranked=False)
 
 
 @table(
-    "Gaps of methods less the gap of the method against which they are compared, on the tasks that "
-    "this method solved (positive: this method is better)",
+    "Gap of each method less the gap of the one that it is compared with, on the tasks that the "
+    "latter solved (positive: the latter is better)",
     """
     method       | method                   |   | tex
     against      | compared with            |   | tex
@@ -897,14 +897,14 @@ def list_saved(study: Study) -> Rows:
 def list_runtimes(study: Study) -> Rows:
     """Yield what it costs each method to reach a quarter and half of the targets (:data:`COSTS`).
 
-    Methods whose numbers of trials are unknown are left out. The row also has the share of targets
-    reached. For methods that use the reward of each trial, ``half on *`` is the median number of
-    trials to the target halfway to the optimum on a task. It is infinite if most runs do not reach
-    this target.
+    Methods without a solution, or with an unknown number of trials, are left out. The row also has
+    the share of targets reached. For methods that use the reward of each trial, ``half on *`` is
+    the median number of trials to the target halfway to the optimum on a task. It is infinite if
+    most runs do not reach this target.
     """
     for method, runs in runs_with_targets(study).items():
         times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
-        if not all(map(len, times["trials"])):
+        if runs.reward.isna().all() or not all(map(len, times["trials"])):
             continue
         reached = share_reached(times["trials"])
         row: Row = {"method": method, "reached": reached, "trials": runs.trials.max()}

@@ -166,7 +166,12 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     ]
     if wrong := [name for name in names if name not in tasks]:
         hint = " Instances are a range, such as long/v1/i000..i009."
-        words = (f"{unknown('task', name, tasks)}{hint * ('/' in name)}" for name in wrong)
+        words = (
+            f"task {name!r} is not in suite {suite.name!r}: choose a suite that has it"
+            if name in builtin_tasks()
+            else f"{unknown('task', name, tasks)}{hint * ('/' in name)}"
+            for name in wrong
+        )
         raise CoarticError("\n".join(words))
     jobs = [planned for planned in jobs if not names or planned.cell.task.name in names]
     chosen = [planned for planned in jobs if planned.cell.method.name in ids]
@@ -343,8 +348,8 @@ def _job_of(
     numbers = asked if isinstance(asked, range) else range(asked)
     numbers = numbers if method.stochastic else range(numbers.start, 1)
     limit_s = request.time_limit_s or suite.time_limit_s
-    by_suite = suite.trials if request.trials else None
-    return Job(cell, request.seed, numbers, limit_s, suite.name, by_suite)
+    due = min(filter(None, (trials, request.trial_budget)), default=None)
+    return Job(cell, request.seed, numbers, limit_s, suite.name, due)
 
 
 def _why_nothing_runs(

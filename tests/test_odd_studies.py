@@ -1,13 +1,17 @@
 """Results that users can have: methods that fail, settings without their method, odd names."""
 
 import math
+from pathlib import Path
 
 import pandas as pd
 
+from coartic import load_task
 from coartic.analysis import TABLES
-from coartic.analysis.control import with_control
+from coartic.analysis.control import signature_by_hands, with_control
 from coartic.analysis.optima import BestKnown
+from coartic.analysis.report.sections import SECTIONS, finding
 from coartic.analysis.tables import is_setting
+from coartic.cli.read import say_ranking
 from tests.support.made_up import runs_of, study_of
 
 ONE, TWO, THREE = "ascending", "two-armed-1", "two-armed-2"
@@ -61,3 +65,52 @@ def test_hands_of_many_runs_are_shares_of_those_that_are_executed():
     values = pd.Series([1.0] * 500 + [math.nan] * 1500, study.runs.index)
     object.__setattr__(study, "signature", lambda *_: values)
     assert [*with_control(study, "first", TWO, "hill-climbing")] == ["LRLR", "RRRR"]
+
+
+def test_failed_runs_have_no_signature():
+    """Their hands are missing."""
+    runs = pd.DataFrame(runs_of(ONE, "mine", [-300, None, -301], hands=["RRR", None, "LRL"]))
+    study = study_of(runs.astype({"hands": "string"}))
+    values = pd.Series([1.0, math.nan, 2.0])
+    object.__setattr__(study, "signature", lambda *_: values)
+    by_hands = signature_by_hands(study, "first", ONE, "mine")
+    assert {hands: of.tolist() for hands, of in by_hands.items()} == {"RRR": [1.0], "LRL": [2.0]}
+
+
+def said(study, capsys):
+    """What commands print below the ranking, as one line."""
+    study.runs["commit"] = ""
+    say_ranking(study, Path("out"))
+    return " ".join(capsys.readouterr().out.split())
+
+
+def test_nothing_is_ranked_if_everything_failed(capsys):
+    rows = behind([ONE], "mine", None, None) + behind([ONE], "hill-climbing", None, None)
+    study = planted([row | {"trials": pd.NA} for row in rows])
+    text = said(study, capsys)
+    assert "No method is ranked." in text
+    assert "--runs" not in text
+    assert finding(study, SECTIONS[0]) == ["No method is ranked."]
+    assert not len(TABLES["runtimes"](study))
+
+
+def test_the_advice_on_runs_keeps_all_runs(capsys):
+    few = behind([ONE], "hill-climbing", 1, 2)
+    assert "--runs 5" in said(planted(few, behind([ONE], "random-search", 1, 2, 3)), capsys)
+    assert "--runs 9" in said(planted(few, behind([ONE], "random-search", *range(9))), capsys)
+
+
+def test_the_advice_on_the_search_keeps_all_methods(capsys):
+    rows = behind([ONE], "hill-climbing", 1, 2) + behind([ONE], "mine", 3, 4)
+    own = load_task(ONE).model_copy(update={"radius": 0.11})
+    text = said(study_of(rows, [own]), capsys)
+    assert "--methods hill-climbing,mine,optimum/search" in text
+    assert text.index("Reference") < text.index("optimum/search") < text.index("Intervals")
+
+
+def test_an_instance_beside_a_task_has_its_own_gap():
+    instance = "one-armed/v1/i003"
+    rows = behind([ONE], "hill-climbing", 10) + runs_of(instance, "hill-climbing", [-400])
+    best = {ONE: BestKnown(-292, -292), instance: BestKnown(-320, -320)}
+    table = TABLES["ranking"](study_of(rows, optima=best))
+    assert table[f"on {instance}"].tolist() == [80 / 320]

@@ -102,7 +102,16 @@ def test_the_command_outranks_a_grid_and_a_block(tmp_path):
     trials = [job.cell.parameters["trials"] for job in plan_suite(tmp_path / "own.toml")]
     assert trials == [5, 50, 500]
     (job,) = plan_suite(tmp_path / "own.toml", trials=7)
-    assert job.cell.parameters["trials"] == 7
+    assert (job.cell.parameters["trials"], job.cell.trials, job.trials) == (7, 7, 7)
+
+
+def test_a_trial_budget_limits_the_trials_that_are_asked_for(tmp_path):
+    block = 'tasks = ["ascending"]\nmethods = ["hill-climbing", "corrective-alone/given"]\n'
+    suite_of(tmp_path, block)  # of 30 trials
+    for options, due in (({}, 30), ({"trial_budget": 20}, 20), ({"trial_budget": 40}, 30),
+                         ({"trials": 50, "trial_budget": 40}, 40)):  # fmt: skip
+        search, alone = plan_suite(tmp_path / "own.toml", **options)
+        assert (search.trials, search.cell.trials, alone.cell.trials) == (due, due, None)
 
 
 @pytest.mark.parametrize(

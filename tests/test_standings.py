@@ -157,14 +157,14 @@ def test_ranked_is_who_solved_all_tasks():
     assert ranked.why[ranked.why != ""].to_dict() == why
 
 
-def with_trials(seen, by_method, suite_trials=None):
+def with_trials(seen, by_method, of_command=None):
     """The study, its methods asked for numbers of trials, 10 for others than are named."""
     plan = []
     for job in seen.plan:
         asked = {"trials": by_method.get(job.cell.method.name, 10)}
         method = replace(job.cell.method, defaults=asked)
         cell = replace(job.cell, method=method, parameters=asked)
-        plan.append(replace(job, cell=cell, suite_trials=suite_trials))
+        plan.append(replace(job, cell=cell, trials=of_command))
     optima = made_up_optima("ascending", "two-armed-1")
     parts = {"optima": optima, "rewards": lambda: iter(())}
     runs = seen.stored.assign(trials=seen.stored.method.map(by_method).fillna(10).astype(int))
@@ -175,19 +175,19 @@ BEST = {("ascending", "mine"): [-292] * 3, ("two-armed-1", "mine"): [-465] * 3}
 
 
 @pytest.mark.parametrize(
-    ("trials", "by_suite", "budget", "why"),
+    ("trials", "of_command", "budget", "why"),
     [
         ({"mine": 40}, None, 10, "40 trials, not 10"),
         ({"mine": 40}, 10, 10, "40 trials, not 10"),
-        ({"mine": 40}, 40, 40, ""),  # which the suite asks for
+        ({"mine": 40}, 40, 40, ""),  # which the command asks for
         ({"mine": 40, "cma-es/bandit": 40}, 99, 40, ""),  # most algorithms have it
         ({"mine": 4}, None, 10, "4 trials, not 10"),
         ({"mine": 0}, None, 10, ""),  # without trials
         ({}, None, 10, ""),
     ],
 )
-def test_methods_are_ranked_with_equal_trials(trials, by_suite, budget, why):
-    seen = with_trials(study(LEARNER | CMA | BEST), trials, by_suite)
+def test_methods_are_ranked_with_equal_trials(trials, of_command, budget, why):
+    seen = with_trials(study(LEARNER | CMA | BEST), trials, of_command)
     assert standings.ranking_budget(seen) == budget
     rows = standings.standings(seen)
     assert rows.why["mine"] == why
@@ -196,6 +196,16 @@ def test_methods_are_ranked_with_equal_trials(trials, by_suite, budget, why):
     assert {*TABLES["not-ranked"](seen).index} == unlike
     lines = [line for line in said(seen, "ranking") if "percentage points" not in line]
     assert any("mine" in line for line in lines) == (not why)
+
+
+def test_a_method_of_a_file_that_stops_early_has_a_note():
+    seen = with_trials(study(LEARNER | BEST), {})
+    assert standings.standings(seen).note["mine"] == ""
+    early = seen.stored.run.eq(1) & seen.stored.method.eq("mine")
+    runs = seen.stored.assign(trials=seen.stored.trials.mask(early, 4))
+    some = Study(seen.folder, seen.plan, seen.made_with, runs)
+    some = MadeUp(some, optima=seen.optima, rewards=seen.rewards)
+    assert standings.standings(some).note["mine"] == "made 4 to 10 of 10 trials"
 
 
 def test_two_budgets_are_refused_in_a_frame():
@@ -243,7 +253,7 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert (rows.tasks == 1).all()
     texts = shown_columns(table, seen, rows)["difference"].texts
     assert texts[0] == number(100 * rows.difference.iloc[0], 1)  # per cent, as the gaps
-    assert "positive: this method is better" in table.caption
+    assert "positive: the latter is better" in table.caption
     better = TABLES["differences"](study(TEN | strangers(("mine", 2), runs=10)))
     assert (better.difference_low > 0).all()
     same = TABLES["differences"](study(TEN | {("ascending", "mine"): list(SPREAD - 303)}))

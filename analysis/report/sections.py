@@ -78,7 +78,7 @@ from coartic.learner.learning import TRIALS
 Made = TypeVar("Made")
 RUNS = 20
 """Number of runs of each experiment of the paper."""
-TOO_FEW = f" (too few runs to test: make {FEWEST})"
+TOO_FEW = f" (too few runs to test, which needs {FEWEST})"
 _WITHOUT_ARTICLE = ("CMA-ES", "random search", "hill climbing", "posture planning")
 """Algorithms whose names have no article in a sentence."""
 NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer runs as points."
@@ -188,8 +188,8 @@ methods, by so many percentage points (negative: a larger gap): \
         "that of the paper's learner (EC1 with one arm, EC4 with two), by two-tailed tests, "
         "corrected over the tasks of the method; empty if the runs are too few, or too alike, for "
         f"a test. {NEEDS_RUNS} A method is ranked if it solved all tasks in as many trials as were "
-        "asked for; planners have no trials. The author of an own method declares how it uses the "
-        "reward; own methods are bold.",
+        "asked for, or in any number if one method was asked for several; planners have no "
+        "trials. The author of an own method declares how it uses the reward; own methods are bold.",
         unfolded=(list_not_ranked, list_differences),
         single=False,
     ),
@@ -330,10 +330,10 @@ def finding(study: Study, section: Section) -> list[str]:
     """Return the finding of a section in words, as a list of lines.
 
     The template ``sentence`` is filled in from the section's tables. The list is empty if the
-    section has no sentence, or its first table has no rows.
+    section has no sentence, or if its first table has no rows and is not the ranking.
     """
     if not section.sentence or not len(section.tables[0](study)):
-        return []
+        return ["No method is ranked."] * (section.id == "ranking")
     methods = study.methods
     built_in = methods.index[methods.built_in.astype(bool)]
     subjects = methods.apply(subject_of, axis=1)

@@ -84,12 +84,13 @@ def report(
 def say_ranking(study: Study, folder: Path) -> None:
     """Print the ranking of a study, with these notes:
 
-    - the answer in words, if the study varies parameters;
+    - the answer in words, if the study varies parameters or no method is ranked;
     - which methods are not ranked, and why;
     - the reference of the gaps;
     - how many runs failed, and why;
     - the command that writes the report of ``folder``.
     """
+    from coartic.analysis.methods import SEARCHES
     from coartic.analysis.report.sections import SECTIONS, finding, limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
@@ -112,28 +113,30 @@ def say_ranking(study: Study, folder: Path) -> None:
         for row in ranked.to_dict("records")
     ]  # fmt: skip
     say_table(headings, cells)
-    answer = finding(study, SECTIONS[0])[:1] if not study.varied.empty else []
+    has_answer = not (len(ranked) and study.varied.empty)
+    answer = finding(study, SECTIONS[0])[:1] if has_answer else []
     pairs = [("Answer", sentence) for sentence in answer]
+    brief = unranked.title.where(unranked.built_in.astype(bool), unranked.index)
     pairs += [
-        ("Not ranked", f"{why}: {'; '.join(of_reason['name'])}")
+        ("Not ranked", f"{why}: {'; '.join(brief[of_reason.index])}")
         for why, of_reason in unranked.groupby("why", sort=False)
     ]
     if len(ranked):
         known = f"gaps are to the {reference(study, ranked_tasks(study))}"
         noise = f"noisy gaps, too, of solutions executed with motor noise {MOTOR_NOISE}"
         pairs.append(("Reference", f"{known}; {noise}"))
-    fewest = min(
-        (len(of) for (_, label), of in study.cells.items() if study.methods.stochastic[label]),
-        default=FEWEST,
-    )
-    if fewest < FEWEST:
-        pairs.append(("Intervals", f"too few runs to test: make {FEWEST} (--runs {FEWEST})"))
     if notes["own"]:
         known = f"for {listed(notes['own'])} only the best reward of this folder is known"
-        search = "repeat the command with optimum/search in its --methods"
+        all_methods = ",".join(dict.fromkeys([*study.declared, *SEARCHES]))
+        search = f"repeat the command with --methods {quote(all_methods)}"
         pairs.append(("", f"{known}; to search for the optimum, {search}"))
     if notes["unknown"]:
         pairs.append(("", f"for {listed(notes['unknown'])} no reward is known"))
+    stochastic = study.methods.stochastic
+    counts = [len(of) for (_, label), of in study.cells.items() if stochastic[label]]
+    if notes["failed"] < notes["runs"] and min(counts, default=FEWEST) < FEWEST:
+        enough = max(FEWEST, *counts)  # fewer would leave out runs of this folder
+        pairs.append(("Intervals", f"too few runs to test: make {enough} (--runs {enough})"))
     if notes["failed"]:
         reasons = "; ".join(notes["reasons"])
         pairs.append(("Failed", f"{notes['failed']} of {counted(notes['runs'], 'run')}: {reasons}"))

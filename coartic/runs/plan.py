@@ -45,6 +45,12 @@ class Cell:
         )
 
     @property
+    def trials(self) -> int | None:
+        """Trials that are asked for: parameter ``trials``, at most :attr:`trial_budget`."""
+        trials = trials_in(self.parameters)
+        return min(trials, self.trial_budget or trials) or None
+
+    @property
     def label(self) -> str:
         """Id of the method and its setting, such as ``cma-es/bandit sigma=0.1``."""
         return label_of(self.method.name, self.setting)
@@ -93,9 +99,9 @@ class Job:
     """Limit of the CPU time of all runs of the job together (in s); None for no limit."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
-    suite_trials: int | None = None
-    """Number of trials of a run in the suite's file if the command asks for another number;
-    otherwise None."""
+    trials: int | None = None
+    """Number of trials of a run that the command asks for, or else the suite's file; at most the
+    trial budget."""
     question: tuple[str, str] | None = None
     """Title and description of a suite of the user's own on its own tasks; otherwise None."""
 

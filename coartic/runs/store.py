@@ -130,7 +130,7 @@ class Store:
         """
         first = plan[0]
         content = dict(made_with) | {"time_limit_s": first.time_limit_s}
-        content |= {"suite_trials": first.suite_trials} if first.suite_trials else {}
+        content |= {"trials": first.trials} if first.trials else {}
         content |= {"question": first.question} if first.question else {}
         with self.transaction():
             for (name,) in self._rows("SELECT name FROM suite"):
@@ -153,7 +153,7 @@ class Store:
         CoarticError if no plan is stored yet.
         """
         made_with = self.made_with()
-        limits = made_with.get("time_limit_s"), made_with.get("suite_trials")
+        limits = made_with.get("time_limit_s"), made_with.get("trials")
         query = """SELECT cells.id, cells.content, seed, runs, name FROM suite
             JOIN cells ON runs IS NOT NULL ORDER BY position"""
         plan = list[Job]()
