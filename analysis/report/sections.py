@@ -189,7 +189,8 @@ methods, by so many percentage points (negative: a larger gap): \
         "corrected over the tasks of the method; empty if the runs are too few, or too alike, for "
         f"a test. {NEEDS_RUNS} A method is ranked if it solved all tasks in as many trials as were "
         "asked for, or in any number if one method was asked for several; planners have no "
-        "trials. The author of an own method declares how it uses the reward; own methods are bold.",
+        "trials. The author of an own method declares how it uses the reward; own methods are "
+        "bold.",
         unfolded=(list_not_ranked, list_differences),
         single=False,
     ),
