@@ -4,6 +4,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from coartic import CoarticError, Movement, Task, corrective_trial, movements_of, trajectory
+from coartic.pictures import film
 from coartic.pictures.film import stage, write_film
 from tests.support.strategies import tiny_task
 
@@ -29,12 +30,13 @@ def test_the_table_has_each_tick(mine):
         assert places == pytest.approx(TASK.robot.forward_kinematics(joints, hand))
 
 
-def test_a_film_and_a_picture(tmp_path):
+def test_a_film_and_a_picture(tmp_path, monkeypatch):
+    monkeypatch.setattr(film, "HOLD", film.PAUSE)  # each frame takes long to draw
     near = Task(goals=[(4.65, 0.1), (4.75, 0.1)])  # 5 steps along the base, then 10
     mine = trajectory(near, corrective_trial(near, "RR").movements)
     mine.animate(tmp_path / "mine.gif", width=200)
-    with Image.open(tmp_path / "mine.gif") as film:
-        lasts = [frame.info["duration"] for frame in ImageSequence.Iterator(film)]
+    with Image.open(tmp_path / "mine.gif") as made:
+        lasts = [frame.info["duration"] for frame in ImageSequence.Iterator(made)]
         assert sum(ms > 400 for ms in lasts) == len(mine.hits)  # it stands where a goal is hit
     figure, show = stage([("Mine", mine)], 200)
     for row, words in ((0, "1 tick"), (1, "2 ticks")):
