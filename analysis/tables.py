@@ -575,7 +575,7 @@ def list_not_ranked(study: Study) -> Rows:
 
 @table(
     "Gap of each method less the gap of the one that it is compared with, on the tasks that the "
-    "latter solved (positive: the latter is better)",
+    "latter solved (positive: the method in the first column is worse)",
     """
     method       | method                   |   | tex
     against      | compared with            |   | tex

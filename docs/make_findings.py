@@ -188,6 +188,20 @@ def shipped_gaps(method: str) -> dict[str, float]:
     return gaps | mean(100 * drawn.gap).columns("random")
 
 
+def parts_of_posture_difference() -> dict[str, float]:
+    """Return by how much the learner's mean postures at goal 1 of ascending and descending differ:
+    ``base`` (length units) and ``joints`` (rad), with the number of ``runs`` of each task."""
+    rows = pd.read_csv(STUDIES / "memory" / "runs.csv.xz").query("label == 'dual-process/EC1'")
+    postures = rows.filter(like="at_").groupby(rows.task).mean()
+    apart = postures.loc["ascending"] - postures.loc["descending"]
+    base, joints = apart[["at_x", "at_y"]], apart.drop(["at_x", "at_y"])
+    return {
+        "base": float((base**2).sum() ** 0.5),
+        "joints": float((joints**2).sum() ** 0.5),
+        "runs": int(rows.groupby("task").size().min()),
+    }
+
+
 def filled_pages() -> dict[str, str]:
     """Return every page that is made from a template, by its path below ``docs``."""
     replication = STUDIES / "replication"
@@ -203,6 +217,7 @@ def filled_pages() -> dict[str, str]:
         "p_of_shares": p_of_shares,
         "gain_of_best_hands": gain_of_best_hands,
         "early_less_late": early_less_late,
+        "parts_of_posture_difference": parts_of_posture_difference,
         "foreign_gaps": foreign_gaps,
         "shipped_gaps": shipped_gaps,
         "published": published["general"],

@@ -85,7 +85,7 @@ def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
 
 @figure(
     "Gap by setting",
-    "Gap from the mean reward to the {reference}, as a share of it, by the values that vary. "
+    "Ticks of the mean beyond the {reference}, in per cent of it, by the values that vary. "
     "n = {n} runs of a setting.",
 )
 def _draw_settings(study: Study) -> Parts | None:
@@ -210,7 +210,7 @@ def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
 
 @figure(
     "Gap to the best reward",
-    "Gap from the mean reward to the {reference}, as a share of it, with its "
+    "Ticks of the mean beyond the {reference}, in per cent of it: less is better. With its "
     f"{style.COVERAGE} bootstrap interval over runs.",
 )
 def _draw_gaps(study: Study) -> Parts | None:
