@@ -180,8 +180,8 @@ methods, by so many percentage points (negative: a larger gap): \
 
 {% endfor %}""",
         note="The gap is the ticks of the mean reward beyond the {reference}, in per cent of it. "
-        "The share of the gain is 0 % for the corrective process alone with its best hands (with the "
-        "task's initial hands if there are more than 4096 hand sequences), and 100 % for the "
+        "The share of the gain is 0 % for the corrective process alone with its best hands (with "
+        "the task's initial hands if there are more than 4096 hand sequences), and 100 % for the "
         "{reference}; tasks on which both are equal have none. Intervals "
         "describe new runs on the same tasks. "
         "Better and worse: the number of tasks on which the mean reward differs significantly from "
