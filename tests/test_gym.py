@@ -268,6 +268,36 @@ def test_an_agent_is_scored_as_it_was_trained(tmp_path):
     assert (norm.training, norm.obs_rms.count) == (True, count)
 
 
+def test_an_agent_sees_observations_as_its_own_normalisation_makes_them():
+    """The normalisation of an agent, unless another one is given: here without a library."""
+
+    class Normal:
+        def __init__(self, factor):
+            self.factor, self.training = factor, False
+
+        def normalize_obs(self, seen):
+            return self.factor * np.asarray(seen)
+
+    class Agent:
+        def __init__(self):
+            self.seen = []
+
+        def get_vec_normalize_env(self):
+            return Normal(2.0)
+
+        def predict(self, seen, deterministic):
+            self.seen.append(float(np.abs(seen).sum()))
+            return np.zeros((len(seen), 10)), None
+
+    plain, own, given = [], Agent(), Agent()
+    score(TWO, lambda seen: plain.append(float(np.abs(seen).sum())) or np.zeros((len(seen), 10)),
+          episodes=1)  # fmt: skip
+    score(TWO, own, episodes=1)
+    score(TWO, given, episodes=1, vec_normalize=Normal(3.0))
+    np.testing.assert_allclose(own.seen, 2 * np.array(plain), rtol=1e-5)
+    np.testing.assert_allclose(given.seen, 3 * np.array(plain), rtol=1e-5)
+
+
 def test_what_is_not_installed_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.env_util", None)
     with pytest.raises(coartic.CoarticError, match=r"needs: pip install 'coartic\[rl\]'"):
