@@ -88,11 +88,13 @@ def check_method(
             cell = cell_of(task, info, parameters, trial_budget=budget)
             jobs[kind, task.name] = Job(cell, seed, (0,), _LIMIT_S)
     performed = perform_in_order([*jobs.values()], verbose=verbose)
-    for (kind, name), run in zip(jobs, performed, strict=True):
-        runs.setdefault(kind, {})[name] = run
+    run_of = {id(job): run for job, run in performed}  # runs may finish in another order
+    for (kind, name), job in jobs.items():
+        runs.setdefault(kind, {})[name] = run_of[id(job)]
     if tasks:
         last_task = tasks[-1].name
-        runs["elsewhere"] = {last_task: next(perform_in_order([jobs["first", last_task]]))}
+        _, run = next(perform_in_order([jobs["first", last_task]]))
+        runs["elsewhere"] = {last_task: run}
     results, is_solved = list[CheckResult](), True
     for name, (problems, finding) in CHECKS.items():
         if not is_solved:

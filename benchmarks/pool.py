@@ -33,7 +33,7 @@ from typing import Any
 from pebble import ProcessExpired, ProcessPool
 
 from coartic.benchmarks.method_files import check_code
-from coartic.benchmarks.processes import CONTEXT, signal_name
+from coartic.benchmarks.processes import CONTEXT, PROGRAM_CONTEXT, signal_name
 from coartic.benchmarks.worker import answer_of, fail, outcomes_from, perform_job
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
@@ -52,16 +52,19 @@ _REPEATED = (-signal.SIGKILL, 255)  # exit codes of a process that was killed or
 
 
 @contextlib.contextmanager
-def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+def process_pool(processes: int, context: Any = PROGRAM_CONTEXT) -> Iterator[ProcessPoolExecutor]:
     """Open a pool of processes that round as the workers of suites do.
 
     It is for programs that run methods or proofs themselves. The processes have the environment
-    variables of workers. With these variables, all x86-64 processors with AVX2 round alike.
+    variables of workers. With these variables, all x86-64 processors with AVX2 round alike. They
+    import the main program, so call this function behind ``if __name__ == "__main__":``.
 
     Parameters
     ----------
     processes : int
         Number of processes.
+    context : multiprocessing context
+        Context of the processes: ``CONTEXT`` for processes that do not import the main program.
 
     Yields
     ------
@@ -72,7 +75,7 @@ def process_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     >>> with process_pool(2) as pool:  # doctest: +SKIP
     ...     rows = list(pool.map(solve_task, names))
     """
-    with ProcessPoolExecutor(processes, CONTEXT, initializer=_begin_plainly) as pool:
+    with ProcessPoolExecutor(processes, context, initializer=_begin_plainly) as pool:
         yield pool
 
 
@@ -172,7 +175,8 @@ class Local:
                 ):
                     number, job = group.waiting.popleft()
                     running[group.give(number, job)] = group, number, job
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            done = wait(running, return_when=FIRST_COMPLETED).done
+            for future in sorted(done, key=lambda future: running[future][1]):
                 group, number, job = running.pop(future)
                 group.running -= 1
                 error = future.exception()

@@ -34,14 +34,27 @@ class WorkerProcess(_BASE.Process):  # type: ignore[misc]
 
     @staticmethod
     def _Popen(process: Any) -> Any:  # noqa: N802
-        path = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        with _starting, environment(worker_variables() | path), blocked_signals():
-            multiprocessing.set_forkserver_preload(list(_PRELOADED))
-            main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
-            try:
-                return _BASE.Process._Popen(process)
-            finally:
-                sys.modules["__main__"] = main
+        return _start(process, ModuleType("__main__"))
+
+
+class ProgramProcess(_BASE.Process):  # type: ignore[misc]
+    """Worker process that imports the main program, whose functions it performs."""
+
+    @staticmethod
+    def _Popen(process: Any) -> Any:  # noqa: N802
+        return _start(process, sys.modules["__main__"])
+
+
+def _start(process: Any, main: ModuleType) -> Any:
+    """Start a process in which ``main`` stands for the main program."""
+    path = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    with _starting, environment(worker_variables() | path), blocked_signals():
+        multiprocessing.set_forkserver_preload(list(_PRELOADED))
+        here, sys.modules["__main__"] = sys.modules["__main__"], main
+        try:
+            return _BASE.Process._Popen(process)
+        finally:
+            sys.modules["__main__"] = here
 
 
 class _WorkerContext(type(_BASE)):  # type: ignore[misc]
@@ -67,8 +80,14 @@ def _start_tracker() -> None:
         resource_tracker.ensure_running()
 
 
+class _ProgramContext(_WorkerContext):
+    Process = ProgramProcess
+
+
 CONTEXT: Any = _WorkerContext()
 """Context of ``multiprocessing`` whose processes are :class:`WorkerProcess`."""
+PROGRAM_CONTEXT: Any = _ProgramContext()
+"""Context of ``multiprocessing`` whose processes are :class:`ProgramProcess`."""
 
 
 def signal_name(number: int) -> str:

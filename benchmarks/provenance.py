@@ -20,6 +20,7 @@ import numpy as np
 
 import coartic
 from coartic.benchmarks.pool import process_pool
+from coartic.benchmarks.processes import CONTEXT
 from coartic.internal.text import LONGEST_LINE, plain
 from coartic.internal.threads import threads_for, worker_variables
 from coartic.motion.compile import FINGERPRINT, PACKAGE
@@ -115,7 +116,7 @@ def arithmetic() -> str:
     environment variables of a worker. On machines with the same hash the library rounds these
     results alike.
     """
-    with process_pool(1) as pool:
+    with process_pool(1, CONTEXT) as pool:
         return pool.submit(_arithmetic).result()
 
 

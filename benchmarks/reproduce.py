@@ -65,11 +65,11 @@ def trajectory_of(run: Run) -> Trajectory:
 
 def perform_in_order(
     jobs: Sequence[Job], workers: int = 1, *, verbose: bool = False
-) -> Iterator[Run]:
+) -> Iterator[tuple[Job, Run]]:
     """Perform the jobs of each method in order in one process, and yield the scored runs.
 
-    Runs are yielded as they finish, and are not stored. If a process ends, a new one performs the
-    remaining jobs of its method.
+    Runs are yielded as they finish, each with its job, and are not stored. If a process ends, a new
+    one performs the remaining jobs of its method.
 
     Parameters
     ----------
@@ -81,11 +81,13 @@ def perform_in_order(
 
     Yields
     ------
+    Job
+        One of ``jobs`` (the same object).
     Run
     """
     with closing(Local(workers, verbose=verbose).perform(jobs, in_order=True)) as answers:
         for job, outcomes in answers:
-            yield from score(job, outcomes)
+            yield from ((job, run) for run in score(job, outcomes))
 
 
 def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tuple[Run, Run]]:

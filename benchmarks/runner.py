@@ -296,7 +296,7 @@ def _repeat_runs(
     progress.repeats = len(quickest)
     for run in list(quickest.values())[:1]:
         tell(run.cell)
-    for repeated in perform_in_order([run.job for run in quickest.values()], workers):
+    for _, repeated in perform_in_order([run.job for run in quickest.values()], workers):
         run = quickest[repeated.cell.method.name]
         if changes := compare_runs(run, repeated)[:1]:
             details = run.outcome.details | {UNREPEATED: changes[0]}

@@ -277,6 +277,18 @@ def test_a_script_needs_no_guard(script):
     assert load(folder / "test" / "does").runs.reward.tolist() == [HONEST]
 
 
+def test_a_program_performs_its_own_functions_in_other_processes(tmp_path):
+    program = tmp_path / "squares.py"
+    program.write_text(
+        "from coartic.benchmarks.pool import process_pool\n"
+        "def square(x):\n    return x * x\n"
+        "if __name__ == '__main__':\n"
+        "    with process_pool(1) as pool:\n        print(*pool.map(square, [1, 2, 3]))\n"
+    )
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=600)
+    assert (done.stdout, done.returncode) == ("1 4 9\n", 0), done.stderr
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="the test finds the workers in /proc")
 def test_workers_end_with_their_parent(script):
     _, process = script
