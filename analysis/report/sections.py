@@ -170,8 +170,8 @@ Among methods {{ use }}, the smallest gap to the {{ reference }} is {{ gap }} ({
 {% endfor %}
 {% endif %}
 {% for against, group in others[1].groupby("against", sort=False) if not parameters %}
-On the tasks that it solved, {{ subjects[against] }} has a smaller gap than these {{ rivals }} \
-methods, by so many percentage points (negative: a larger gap): \
+On the tasks that it solved, {{ subjects[against] }} has a gap that these {{ rivals }} methods \
+exceed by so many percentage points (negative: their gap is smaller): \
 {% for row in leading(group) %}
 {{ row.title }} {{ interval(row, "difference", scale=100) }}\
 {{ " (%s)" % p_value(row.p_holm) if row.p_holm >= 0 else few(row) }}\
