@@ -253,7 +253,7 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert (rows.tasks == 1).all()
     texts = shown_columns(table, seen, rows)["difference"].texts
     assert texts[0] == number(100 * rows.difference.iloc[0], 1)  # per cent, as the gaps
-    assert "positive: the latter is better" in table.caption
+    assert "positive: the method in the first column is worse" in table.caption
     better = TABLES["differences"](study(TEN | strangers(("mine", 2), runs=10)))
     assert (better.difference_low > 0).all()
     same = TABLES["differences"](study(TEN | {("ascending", "mine"): list(SPREAD - 303)}))
