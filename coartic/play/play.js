@@ -718,8 +718,7 @@ class Play {
       event.preventDefault();
       const by = (event.shiftKey ? 0.02 : 0.1) * this.unit;
       this.showMeeting();
-      // Rounded as postures are, so that a key along a locked axis leaves the posture as it is.
-      handle.at = handle.at.map((value, axis) => Math.round(1e4 * (value + by * way[axis])) / 1e4);
+      handle.at = [handle.at[0] + by * way[0], handle.at[1] + by * way[1]];
       handle.move(handle.at);
       this.keep();
     });
