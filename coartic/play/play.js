@@ -774,6 +774,7 @@ class Play {
       return bring_within(problem, posture, problem.goals[goal], hand, some, 0.9 * problem.radius) && Object.assign(q, posture);
     });
     if (part === "base") {
+      if (free.every((axis) => Math.round(1e4 * to[axis]) === Math.round(1e4 * q[axis]))) return; // moved along a locked axis
       free.forEach((axis) => { q[axis] = to[axis]; });
       settle(0);
     } else {
