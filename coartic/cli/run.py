@@ -137,9 +137,9 @@ def run(
         asked = plan(chosen, request, registered)
         if include:
             only = {job.cell.task.name for job in asked} if tasks else None
-            display.show(f"Including the runs of {' and '.join(include)}")
+            display.show(f"Adding the runs of {' and '.join(include)}")
             asked = include_folders(asked, include, out, only, registered)
-            display.line(f"Included the runs of {' and '.join(include)}.")
+            display.line(f"Added the runs of {' and '.join(include)}.")
         executor = Local(jobs or -1) if scheduler is None else Dask(scheduler, say=display.line)
         progress = perform(asked, out, executor=executor, watch=display.update)
     say(str(progress))
