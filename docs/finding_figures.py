@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -50,14 +51,17 @@ def draw(
     names: Sequence[str],
     quantities: dict[str, Sequence[tuple[float, float, float]]],
     looks: Sequence[tuple[str, str]] = (),
-    **lines: Any,
+    dashed: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> Figure:
-    """Draw a dot plot with a panel for each quantity, and an estimate in it for each name."""
+    """Draw a dot plot with a panel for each quantity, and an estimate in it for each name.
+
+    ``dashed`` has the positions of dashed lines by quantity.
+    """
     rows = pd.DataFrame({"name": names, "bold": False})
     rows[["color", "marker"]] = looks or [(BLUE, "D")] * len(rows)
     for label, estimates in quantities.items():
         rows[[label, f"{label}_low", f"{label}_high"]] = estimates
-    return dots(rows, {label: label for label in quantities}, lines.get("at", {}))
+    return dots(rows, {label: label for label in quantities}, dashed)
 
 
 @styled
@@ -123,7 +127,7 @@ def rewards(table: Table) -> Figure:
     label = "our mean reward less the published one (% of it; dashed: ± 1 %)"
     values = [estimate(row, "difference", -100 / row.published) for _, row in cells.iterrows()]
     names = [f"{name} †" if "two-armed" in name else name for name in cells.index]
-    return draw(names, {label: values}, at={label: (-1, 1)})
+    return draw(names, {label: values}, dashed={label: (-1, 1)})
 
 
 @styled
