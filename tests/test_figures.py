@@ -20,9 +20,9 @@ from tests.support.suites import KNOWN
 
 @pytest.fixture(scope="module")
 def few(shipped):
-    """The shipped results with five runs of each method on each task, on which figures and
-    sentences name the same methods as on all runs."""
-    return replace(shipped, stored=shipped.stored[shipped.stored.run < 5])
+    """The shipped results with two runs of each method on each task, on which figures name the
+    same methods as on all runs."""
+    return replace(shipped, stored=shipped.stored[shipped.stored.run < 2])
 
 
 def test_robots_and_goals_are_drawn_where_they_are():
@@ -38,8 +38,9 @@ def test_robots_and_goals_are_drawn_where_they_are():
         np.testing.assert_array_equal(line.get_xydata(), due)
 
 
-@pytest.mark.parametrize("name", sorted({*FIGURES} - {"gaps-by-family"}))
+@pytest.mark.parametrize("name", ["ranking", "runtimes", "learning-curves", "tasks"])
 def test_no_text_leaves_a_narrow_figure_or_lies_on_another(name, few):
+    """Names beside rows, names at the ends of lines, a legend below panels, numbers in pictures."""
     plot = FIGURES[name](few, width=3.4)
     texts = texts_of(plot.figure)
     assert misplaced(plot.figure) == ([], [])
@@ -51,11 +52,12 @@ def test_no_text_leaves_a_narrow_figure_or_lies_on_another(name, few):
     assert all(map(len, (plot.alt, plot.caption, plot.data)))
 
 
-def test_a_figure_has_chosen_style(few, tmp_path):
-    plot = FIGURES["ranking"](few, style={"axes.labelsize": 20.0})
+def test_a_figure_has_chosen_style(tmp_path):
+    study = study_of([row("mine", -300, task="ascending")])
+    plot = FIGURES["ranking"](study, style={"axes.labelsize": 20.0})
     assert plot.figure.axes[0].xaxis.label.get_fontsize() == 20.0
-    plot.save(tmp_path / "mine.pdf")
-    assert (tmp_path / "mine.pdf").read_bytes().startswith(b"%PDF")
+    plot.save(tmp_path / "mine.svg")
+    assert "<svg" in (tmp_path / "mine.svg").read_text("utf-8")
     with pytest.raises(CoarticError, match=r"\.svg, \.pdf, \.png, not in '\.doc'"):
         plot.save(tmp_path / "mine.doc")
 
@@ -85,8 +87,10 @@ def lightness(color):
 
 def test_a_picture_leaves_its_figure_as_it_was_and_has_no_date(monkeypatch):
     figure = Figure(layout="constrained")
-    figure.add_subplot()
-    plot = Plot("empty", "", "", "", figure, pd.DataFrame())
+    axes = figure.add_subplot()
+    axes.plot([1, 2], "o")
+    axes.set_axis_off()  # letters and ticks take long to draw
+    plot = Plot("dots", "", "", "", figure, pd.DataFrame())
 
     def pictures():
         return [*(picture(figure, ending) for ending in FORMATS), for_page(plot)]
