@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, StrictUndefined, Template
 
 from coartic.analysis.figures.drawings import (
     draw_gaps_by_family,
@@ -360,9 +360,7 @@ def finding(study: Study, section: Section) -> list[str]:
         return rows.assign(**of_method, subject=subject, own=~rows.method.isin(built_in))
 
     rows, *others = map(named, section.tables)
-    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": number, "listed": listed, "capital": capital}
-    environment.globals |= {
+    names = {
         "interval": interval, "number": number, "p_value": p_value, "leading": leading, "few": few,
         "infinite": math.inf,
         "uses": GROUPS, "first": next(iter(standings(study).index), ""),
@@ -373,8 +371,16 @@ def finding(study: Study, section: Section) -> list[str]:
         "papers": methods.index[methods.is_learner & (methods.setting == "")],
         "rivals": "other" if study.against else "built-in",
     }  # fmt: skip
-    text = environment.from_string(section.sentence).render(rows=rows, others=others)
+    text = _template_of(section.sentence).render(rows=rows, others=others, **names)
     return [capital(shown(line.strip())) for line in text.split("\n") if line.strip()]
+
+
+@lru_cache  # compiling takes longer than rendering
+def _template_of(sentence: str) -> Template:
+    """Return the template of :attr:`Section.sentence`."""
+    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"number": number, "listed": listed, "capital": capital}
+    return environment.from_string(sentence)
 
 
 def subject_of(method: Mapping[str, Any]) -> str:
