@@ -47,18 +47,6 @@ def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
     assert 0 < is_setting(study, table).sum() == len(table) / 2
 
 
-def test_a_task_without_a_solution_of_every_run_is_not_solved():
-    study = planted(
-        *(behind([ONE], method, 10, 11, 12) for method in ("mine", "hill-climbing")),
-        *(behind([TWO, THREE], method, 10, 11, None) for method in ("mine", "hill-climbing")),
-        behind([ONE, TWO, THREE], "random-search", 15, 14, 13),
-    )
-    assert [*TABLES["ranking"](study).index] == ["random-search"]
-    others = TABLES["not-ranked"](study)
-    assert others.tasks.to_dict() == {"hill-climbing": 1, "mine": 1}
-    assert (others.why == "2 of 9 runs failed").all()
-
-
 def test_hands_of_many_runs_are_shares_of_those_that_are_executed():
     hands = ["RRRR", "LRLR", "LRLR", "LRLR"] * 500
     study = study_of(runs_of(TWO, "hill-climbing", [-470] * 2000, hands=hands))
