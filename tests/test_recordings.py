@@ -3,8 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as some
+from hypothesis.extra.numpy import arrays
 from matplotlib.colors import to_hex
 
 from coartic import CONDITIONS, CoarticError, correct, load_task
@@ -27,8 +28,8 @@ JOINTS = [*BOTH.robot.joint_names]
 
 @pytest.fixture(scope="module")
 def people():
-    """Ten trials of the plain learner of the tests, each of two subjects."""
-    options = {"condition": CONDITIONS["EC4"], "trials": 10}
+    """Five trials of the plain learner of the tests, each of two subjects."""
+    options = {"condition": CONDITIONS["EC4"], "trials": 5}
     both = (reference.hits_of(BOTH, seed=ord(who), subject=who, **options) for who in "ba")
     return pd.concat(both, ignore_index=True)
 
@@ -56,7 +57,6 @@ def put(column, row, value):
 
 
 FORMS = {
-    "as written": lambda text: text,
     "comments": lambda text: "# by hand\n" + text.replace("\na,1,2", "\n# second\na,1,2"),
     "byte order mark": lambda text: "\ufeff" + text,
     "initials NA": lambda text: text.replace("\na,", "\nNA,"),
@@ -65,15 +65,17 @@ FORMS = {
 
 @pytest.mark.parametrize("form", FORMS)
 def test_other_forms_of_a_table_have_the_same_hits(people, read, form):
-    shuffled = people.sample(frac=1, random_state=1)
     expected = check_hits(people, BOTH)
     hits = read(FORMS[form](people.to_csv(index=False)))
     same = hits.subject.replace("NA", "a")
     pd.testing.assert_frame_equal(hits.assign(subject=same), expected)
-    assert expected.subject.unique().tolist() == ["b", "a"]
-    again = check_hits(shuffled, BOTH).sort_values(["subject", "trial"], kind="stable")
-    ordered = expected.sort_values(["subject", "trial"], kind="stable")
-    pd.testing.assert_frame_equal(again.reset_index(drop=True), ordered.reset_index(drop=True))
+
+
+def test_hits_in_any_order_are_sorted_by_subject_trial_and_goal(people):
+    shuffled = pd.concat([people[:20].sample(frac=1, random_state=1), people[20:]])
+    hits = check_hits(shuffled, BOTH)
+    pd.testing.assert_frame_equal(hits, check_hits(people, BOTH))
+    assert hits.subject.unique().tolist() == ["b", "a"]
 
 
 UNREADABLE = {
@@ -82,12 +84,10 @@ UNREADABLE = {
     "row 2: goal is .*9.*; it must be an integer from 1 to 4": put("goal", 1, 9),
     "row 2: ticks is .*-5.*; it must be more than 0": put("ticks", 1, -5),
     "has no rows": lambda t: t[:0],
-    r"goal is .*another goal than in the rows above.*\(80 such rows\)": lambda t: pd.concat([t, t]),
-    "row 1: left_2 is '?inf": put("left_2", 0, np.inf),
+    r"goal is .*another goal than in the rows above.*\(40 such rows\)": lambda t: pd.concat([t, t]),
     "left_2 is .*True": put("left_2", 0, True),
-    r"left_2 is .*\(1\+2j\)": put("left_2", 0, 1 + 2j),
     "left_2 is '\u22120.3'": put("left_2", 0, "\u22120.3"),
-    "40 of 40 hits of b .*must be in rad, anticlockwise": lambda t: t.assign(
+    "20 of 20 hits of b .*must be in rad, anticlockwise": lambda t: t.assign(
         **np.degrees(t[JOINTS[2:]])
     ),
 }
@@ -95,11 +95,8 @@ UNREADABLE = {
 
 @pytest.mark.parametrize("sentence", UNREADABLE)
 def test_what_cannot_be_read_is_refused_with_its_row(people, read, sentence):
-    frame = UNREADABLE[sentence](people)
     with pytest.raises(CoarticError, match=sentence):
-        read(frame)
-    with pytest.raises(CoarticError, match="the frame"):
-        check_hits(frame, BOTH)
+        read(UNREADABLE[sentence](people))
 
 
 NO_TABLE = {
@@ -124,34 +121,28 @@ def test_durations_are_ticks_of_their_unit(people, read):
     assert {warning.filename for warning in warned} == {__file__}
     hits = read(seconds, ticks_per_unit=100)
     pd.testing.assert_frame_equal(hits, check_hits(people, BOTH))
-    for frame in (people, people.assign(duration=1)):
-        with pytest.raises(CoarticError, match="ticks_per_unit has no effect"):
-            read(frame, ticks_per_unit=100)
-    for wrong in (0.0, -1.0, np.nan):
-        with pytest.raises(ValueError, match="ticks_per_unit is"):
-            read(seconds, ticks_per_unit=wrong)
+    with pytest.raises(CoarticError, match="ticks_per_unit has no effect"):
+        read(people, ticks_per_unit=100)
+    with pytest.raises(ValueError, match="ticks_per_unit is"):
+        read(seconds, ticks_per_unit=0.0)
 
 
-@given(turns=some.lists(some.integers(-2, 2), min_size=160, max_size=160))
-def test_whole_turns_of_recorded_angles_change_nothing(turns):
-    hits = check_hits(pd.read_csv(EXAMPLES / "example.csv")[:40], BOTH)
+@settings(max_examples=5)
+@given(turns=arrays(int, (20, 4), elements=some.integers(-2, 2)))
+def test_whole_turns_of_recorded_angles_change_nothing(turns, people):
+    hits = check_hits(people[:20], BOTH)
     wound = hits.copy()
-    wound[JOINTS[6:]] += 2 * np.pi * np.array(turns).reshape(40, 4)
+    wound[JOINTS[6:]] += 2 * np.pi * turns
     pd.testing.assert_frame_equal(check_hits(wound, BOTH), hits, atol=1e-9)
 
 
-def test_hits_beyond_two_radii_are_said_once_and_most_of_them_refused(people):
-    hits = check_hits(people, BOTH)
-    with pytest.warns(UserWarning, match="1 of 40 hits of a are more than 2 radii off"):
-        check_hits(hits.assign(right_2=hits.right_2 + 3.0 * (hits.index == 41)), BOTH)
-    one = people.assign(subject="b", trial=np.repeat(np.arange(20), 4) + 1)
-    odd = one.assign(left_1=one.left_1 + 3.0, right_1=one.right_1 + 3.0)
-    mixed = pd.concat([odd[:36], one[36:]])
-    with pytest.warns(UserWarning, match="36 of 80 hits of b are more than 2 radii off"):
-        check_hits(mixed, BOTH)
-    mixed = pd.concat([odd[:44], one[44:]])
-    with pytest.raises(CoarticError, match="44 of 80 hits of b are more than 2 radii off"):
-        check_hits(mixed, BOTH)
+def test_hits_beyond_two_radii_are_said_and_more_than_half_of_them_refused(people):
+    odd = people.assign(left_1=people.left_1 + 3.0, right_1=people.right_1 + 3.0)
+    with pytest.warns(UserWarning, match="8 of 20 hits of b are more than 2 radii off") as warned:
+        check_hits(pd.concat([odd[:8], people[8:]]), BOTH)
+    assert len(warned) == 1
+    with pytest.raises(CoarticError, match="12 of 20 hits of b are more than 2 radii off"):
+        check_hits(pd.concat([odd[:12], people[12:]]), BOTH)
 
 
 # --------------------------------------------------------------------------------- consistency
@@ -205,7 +196,7 @@ def postures(knots, rate):
     return clock, qs[leg] + (10 * s**3 - 15 * s**4 + 6 * s**5) * np.diff(qs, axis=0)[leg]
 
 
-def recorded(task, trials=4, rate=100):
+def recorded(task, trials=2, rate=100):
     """Positions of markers, a frame."""
     frames = []
     for trial, knots in enumerate(knots_of(task, trials), 1):
@@ -219,7 +210,7 @@ def recorded(task, trials=4, rate=100):
     return pd.concat(frames, ignore_index=True)
 
 
-def true_hits(task, trials=4):
+def true_hits(task, trials=2):
     """First entries into goals, found by looking at 20,000 postures a second."""
     rows = []
     for trial, knots in enumerate(knots_of(task, trials), 1):
@@ -236,8 +227,7 @@ def true_hits(task, trials=4):
     return pd.DataFrame(rows, columns=["trial", "goal", "hand", "ticks", *task.robot.joint_names])
 
 
-@pytest.mark.parametrize("rate", [60, 100, 200])
-@pytest.mark.parametrize("task", [BOTH, RIGHT], ids=["both", "right"])
+@pytest.mark.parametrize(("task", "rate"), [(BOTH, 60), (RIGHT, 200)], ids=["both", "right"])
 def test_hits_are_found_at_any_rate_of_sampling(task, rate):
     hits, truth = hits_from_markers(recorded(task, rate=rate), task), true_hits(task)
     assert hits.attrs == {"unfinished": {"p": 0}}
@@ -245,7 +235,7 @@ def test_hits_are_found_at_any_rate_of_sampling(task, rate):
     assert np.abs(hits.ticks - truth.ticks).max() < 100 / rate  # a sample
     joints = [*task.robot.joint_names]
     assert np.abs(hits[joints] - truth[joints]).max(axis=None) < 0.02
-    assert len(solutions_of(task, hits).runs) == 4
+    assert len(solutions_of(task, hits).runs) == 2
 
 
 def test_a_file_is_read_as_a_frame_and_sides_are_chosen(tmp_path):
@@ -258,7 +248,7 @@ def test_a_file_is_read_as_a_frame_and_sides_are_chosen(tmp_path):
     hits.to_csv(tmp_path / "hits.csv", index=False)
     pd.testing.assert_frame_equal(read_hits(tmp_path / "hits.csv", RIGHT), hits)
     one_of_two = BOTH.model_copy(update={"hands": ("right",)})
-    without_left = hits_from_markers(recorded(one_of_two), BOTH)
+    without_left = hits_from_markers(recorded(one_of_two, trials=1), BOTH)
     assert (without_left[JOINTS[2:6]] == BOTH.q0[2:6]).all(axis=None)
     with pytest.raises(CoarticError, match="side is 'left', but task 'metres' has the right hand"):
         hits_from_markers(markers, RIGHT, "left")
@@ -277,7 +267,7 @@ def lost(samples, column="right_2", first=40):
 
 
 def test_gaps_are_bridged_up_to_fifty_ms():
-    markers = recorded(RIGHT, trials=2)
+    markers = recorded(RIGHT)
     whole, bridged = (hits_from_markers(change(markers), RIGHT) for change in (lost(0), lost(5)))
     assert np.abs(whole.ticks - bridged.ticks).max() < 1
     last = markers.index[markers.trial == 1][-1]
@@ -304,7 +294,7 @@ REFUSED = {
 @pytest.mark.parametrize("sentence", REFUSED)
 def test_recordings_from_which_hits_would_be_wrong_are_refused(sentence):
     with pytest.raises(CoarticError, match=sentence):
-        hits_from_markers(REFUSED[sentence](recorded(RIGHT, trials=2)), RIGHT)
+        hits_from_markers(REFUSED[sentence](recorded(RIGHT)), RIGHT)
 
 
 def test_unfinished_trials_are_counted():
@@ -362,8 +352,7 @@ def test_a_recording_that_is_refused_can_be_drawn(people, tmp_path):
     degrees = people.assign(**np.degrees(people[JOINTS[2:]]))
     degrees.to_csv(tmp_path / "hits.csv", index=False)
     assert draw_recording(tmp_path / "hits.csv", BOTH).subfigs
-    mirrored = REFUSED["no trial hits all goals in their order"](recorded(RIGHT, trials=2))
-    assert draw_recording(None, RIGHT, mirrored).subfigs
-    assert draw_recording(None, RIGHT, lost(20)(recorded(RIGHT, trials=2))).subfigs
+    mirrored = REFUSED["no trial hits all goals in their order"](recorded(RIGHT, trials=1))
+    assert draw_recording(None, RIGHT, lost(20)(mirrored)).subfigs
     with pytest.raises(CoarticError, match="needs one of them"):
         draw_recording(None, RIGHT)
