@@ -38,40 +38,41 @@ def three_suffice(monkeypatch):
         monkeypatch.setattr(module, "FEWEST", 3)
 
 
+ALTERNATIVES = "greater", "less", "two-sided"
+
+
 @pytest.mark.parametrize(("a", "bound"), [([1, 2, 6, 6], 3.5), ([-3, -2, -7], -5)])
-@pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
-def test_bootstrap_test_against_all_resamples(a, bound, alternative):
+def test_bootstrap_test_against_all_resamples(a, bound):
     null = [studentised(x) for x in itertools.product(np.array(a) - np.mean(a), repeat=len(a))]
-    expected = share_as_extreme(null, studentised(np.array(a) - bound), alternative)
-    test = hypotheses.bootstrap_test(a, bound, alternative)
-    assert test.p == pytest.approx(expected, abs=4 * math.sqrt(0.25 / 9_999))
+    for alternative in ALTERNATIVES:
+        expected = share_as_extreme(null, studentised(np.array(a) - bound), alternative)
+        test = hypotheses.bootstrap_test(a, bound, alternative)
+        assert test.p == pytest.approx(expected, abs=4 * math.sqrt(0.25 / 9_999))
 
 
 @pytest.mark.parametrize(
     ("a", "b"),
     [
         ([1, 2, 6], [0, 1, 3]), ([-3, -2, -2], [-2, -5, -9, -9, 1]), ([0, 0, 9, 9, 9], [0, 0, 9]),
-        ([5.1] * 3, [5.2] * 4), ([1, 2, 3, 4, 5, 6, 7], [1, 1, 1, 1, 1, 1, 20]),
+        ([5.1] * 3, [5.2] * 4), ([1, 2, 3, 4, 5], [1, 1, 1, 1, 20]),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("alternative", ["greater", "less", "two-sided"])
-@pytest.mark.parametrize("resamples", [9_999, 15])
 @pytest.mark.usefixtures("three_suffice")
-def test_exchange_test_against_all_exchanges(a, b, alternative, resamples):
+def test_exchange_test_against_all_exchanges(a, b):
     """With fewer resamples than exchanges, some of these are drawn."""
     pool, null = np.array([*a, *b], float), []
     for chosen in itertools.combinations(range(len(pool)), len(a)):
         others = np.delete(np.arange(len(pool)), chosen)
         null.append(studentised(pool[[*chosen]], pool[others]))
-    expected = share_as_extreme(null, studentised(a, b), alternative)
-    test = hypotheses.exchange_test(a, b, alternative, resamples=resamples)
-    assert test.value == pytest.approx(np.mean(a) - np.mean(b))
-    if resamples == 15:
-        assert test.p == pytest.approx((1 + 15 * expected) / 16, abs=4 * math.sqrt(0.25 / 15))
-        assert test.p >= 1 / 16
-    else:
+    for alternative in ALTERNATIVES:
+        expected = share_as_extreme(null, studentised(a, b), alternative)
+        test = hypotheses.exchange_test(a, b, alternative)
+        assert test.value == pytest.approx(np.mean(a) - np.mean(b))
         assert test.p == pytest.approx(expected)
         assert test.resamples == 0
+        drawn = hypotheses.exchange_test(a, b, alternative, resamples=15)
+        assert drawn.p == pytest.approx((1 + 15 * expected) / 16, abs=4 * math.sqrt(0.25 / 15))
+        assert drawn.p >= 1 / 16
 
 
 @pytest.mark.usefixtures("three_suffice")
@@ -153,22 +154,20 @@ def test_bca_interval_against_all_resamples(samples, weights):
     assert (interval.low, interval.high) == pytest.approx((low, high), abs=0.25)
 
 
-def test_degenerate_samples():
+def test_without_spread_an_interval_is_its_value_and_without_difference_there_is_no_p():
     interval = statistics.difference_of_means(np.full(6, 4.0), np.full(5, 3.0))
     assert interval.columns("gap") == {"gap": 1.0, "gap_low": 1.0, "gap_high": 1.0}
-
-
-def test_tests_that_cannot_be_made():
     assert math.isnan(hypotheses.bootstrap_test([2.0, 2.0], 2.0).p)
     assert math.isnan(hypotheses.exchange_test([0.1] * 6, [0.1] * 7).p)  # no mean of 0.1 is 0.1
 
 
-@pytest.mark.parametrize(("alternative", "share"), [("greater", 1), ("two-sided", 2)])
-def test_without_spread_it_is_an_exact_test(alternative, share):
+def test_without_spread_it_is_an_exact_test():
     """By signs of three values, all alike; by exchange of five and five."""
-    assert hypotheses.bootstrap_test([2.0] * 3, 1.0, alternative).p == share / 8
-    assert hypotheses.exchange_test([2.0] * 5, [1.0] * 5, alternative).p == share / 252
-    assert hypotheses.exchange_test([2.0] * 5, [1.0] * 5, "less").p == 1
+    for alternative, by_sign, by_exchange in (
+        ("greater", 1 / 8, 1 / 252), ("two-sided", 2 / 8, 2 / 252), ("less", 1, 1)
+    ):  # fmt: skip
+        assert hypotheses.bootstrap_test([2.0] * 3, 1.0, alternative).p == by_sign
+        assert hypotheses.exchange_test([2.0] * 5, [1.0] * 5, alternative).p == by_exchange
 
 
 @pytest.mark.parametrize("values", [[], [[1.0]], [1.0, math.nan], [math.inf]])
@@ -232,28 +231,22 @@ def test_the_least_number_of_values_on_both_sides():
 def test_the_page_has_the_calibration_that_is_stored():
     docs = Path(__file__).parents[1] / "docs"
     stored = pd.read_csv(docs / "stored" / "two-samples" / "candidates.csv", index_col=0)
+    stored = stored.sort_values("too often")[["too often", "largest at 5 %", "largest at 1 %"]]
     page = (docs / "statistics.md").read_text("utf-8")
-    rows = re.findall(r"\| (\d+) \| ([\d.]+) % \| ([\d.]+) % \|", page)
-    taken = [(int(n), float(five), float(one)) for n, five, one in rows]
-    columns = stored.sort_values("too often")[["too often", "largest at 5 %", "largest at 1 %"]]
-    for (n, five, one), row in zip(taken, columns.to_numpy(), strict=True):
-        assert (n, five, one) == (
-            row[0],
-            *(pytest.approx(100 * each, abs=0.051) for each in row[1:]),
-        )
-    assert stored["too often"].idxmin() == "exchange"
+    rows = np.array(re.findall(r"\| (\d+) \| ([\d.]+) % \| ([\d.]+) % \|", page), float)
+    np.testing.assert_allclose(rows, stored.to_numpy() * [1, 100, 100], rtol=0, atol=0.051)
+    assert stored.index[0] == "exchange"
 
 
-@pytest.mark.parametrize("population", ["normal", "exponential"])
-def test_the_interaction_of_two_factors_has_its_level_and_is_found(population):
-    """With effects of both factors and unequal spread, on two tasks."""
-    rng, p, planted = np.random.default_rng(4), [], []
-    for _ in range(60):
-        draws = [[[getattr(rng, population)(size=5) * (1 + i) + i + 2 * j for _ in range(2)]
+def test_the_interaction_of_two_factors_has_its_level_and_is_found():
+    """With effects of both factors, unequal spread and skew, on two tasks."""
+    rng, p, planted, studies = np.random.default_rng(4), [], [], 40
+    for _ in range(studies):
+        draws = [[[rng.exponential(1 + i, size=5) + i + 2 * j for _ in range(2)]
                   for j in range(2)] for i in range(3)]  # fmt: skip
         p.append(hypotheses.interaction_test(draws))
         draws[0][0] = [runs + 8 for runs in draws[0][0]]
         planted.append(hypotheses.interaction_test(draws))
-    assert np.mean(np.array(p) < 0.05) < 0.05 + 3 * math.sqrt(0.05 * 0.95 / 60)
+    assert np.sum(np.array(p) < 0.05) <= stats.binom.ppf(0.999, studies, 0.05)
     assert np.mean(np.array(planted) < 0.05) > 0.9
     assert math.isnan(hypotheses.interaction_test([[[np.arange(4.0)]] * 2] * 2))
