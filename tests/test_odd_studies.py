@@ -49,18 +49,17 @@ def test_a_setting_of_an_own_method_is_left_out_with_all_its_rows():
 
 def test_hands_of_many_runs_are_shares_of_those_that_are_executed():
     hands = ["RRRR", "LRLR", "LRLR", "LRLR"] * 500
-    study = study_of(runs_of(TWO, "hill-climbing", [-470] * 2000, hands=hands))
-    values = pd.Series([1.0] * 500 + [math.nan] * 1500, study.runs.index)
-    object.__setattr__(study, "signature", lambda *_: values)
+    values = pd.Series([1.0] * 500 + [math.nan] * 1500)
+    rows = runs_of(TWO, "hill-climbing", [-470] * 2000, hands=hands)
+    study = study_of(rows, signature=lambda *_: values)
     assert [*with_control(study, "first", TWO, "hill-climbing")] == ["LRLR", "RRRR"]
 
 
 def test_failed_runs_have_no_signature():
     """Their hands are missing."""
     runs = pd.DataFrame(runs_of(ONE, "mine", [-300, None, -301], hands=["RRR", None, "LRL"]))
-    study = study_of(runs.astype({"hands": "string"}))
     values = pd.Series([1.0, math.nan, 2.0])
-    object.__setattr__(study, "signature", lambda *_: values)
+    study = study_of(runs.astype({"hands": "string"}), signature=lambda *_: values)
     by_hands = signature_by_hands(study, "first", ONE, "mine")
     assert {hands: of.tolist() for hands, of in by_hands.items()} == {"RRR": [1.0], "LRL": [2.0]}
 

@@ -19,26 +19,29 @@ pytestmark = pytest.mark.browser
 TRIALS = 30  # of 10,000 that the page makes, as tests see the same in fewer
 
 
+def written(folder, trials):
+    """The address of a page that makes so many trials."""
+    file = folder / "play.html"
+    html = pages.play_page().replace("TRIALS = 10000;", f"TRIALS = {trials};")
+    file.write_text(html, encoding="utf-8")
+    return f"{file.as_uri()}#open=1"
+
+
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    file = tmp_path_factory.mktemp("play") / "play.html"
-    html = pages.play_page().replace("TRIALS = 10000;", f"TRIALS = {TRIALS};")
-    file.write_text(html, encoding="utf-8")
-    return file.as_uri()
+    return written(tmp_path_factory.mktemp("play"), TRIALS)
 
 
 @pytest.fixture
 def opened(visited, address):
     """The page in a state; it is loaded once, and stays."""
 
-    def open_page(state="", width=1280, **options):
-        options = {"reduced_motion": "reduce", "stays": True, **options}
-        return visited(f"{address}#open=1&{state}", width, **options)
+    def open_page(state=""):
+        return settled(visited(f"{address}&{state}", reduced_motion="reduce", stays=True))
 
     return open_page
 
 
-SIDES = (("x", "width"), ("y", "height"))
 DRAWN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
@@ -52,29 +55,9 @@ def ticks(page, who, where="score"):
     return int(found)
 
 
-def press(page, name):
-    page.get_by_role("button", name=name).click()
-    page.evaluate(DRAWN)
-
-
-def choose(page, name):
-    page.get_by_role("radio", name=name).check()
-    return settled(page)
-
-
 def slide(page, name, value):
     page.get_by_role("slider", name=name).fill(str(value))
     page.evaluate(DRAWN)
-
-
-def drag(page, handle, across, down):
-    """By the pointer, from its middle by so many pixels."""
-    box = handle.bounding_box()
-    x, y = (box[axis] + box[size] / 2 for axis, size in SIDES)
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + across, y + down, steps=2)
-    page.mouse.up()
 
 
 def settled(page):
@@ -125,28 +108,23 @@ def test_it_is_one_small_file_without_addresses():
         assert f'"presets":[{{"label":"{label}"' in own.replace("\\u2020", "†")
 
 
-def median_of(runs):
-    """Reward of the run that the page shows."""
-    return sorted(run.reward for run in runs)[len(runs) // 2]
-
-
-def learned(task, condition, trials=TRIALS):
-    """Ticks that the learner needs, as the page should say."""
-    return -median_of([learn(task, condition, seed=seed, trials=trials) for seed in range(5)])
+def practised(task, condition, trials=TRIALS):
+    """Runs of the learner, and the ticks that the page should say: of the median run."""
+    runs = [learn(task, condition, seed=seed, trials=trials) for seed in range(5)]
+    return runs, -sorted(run.reward for run in runs)[2]
 
 
 def test_coarticulation_appears_with_practice(visited, tmp_path):
-    file, trials = tmp_path / "play.html", 600  # on every machine
-    file.write_text(pages.play_page().replace("TRIALS = 10000;", f"TRIALS = {trials};"), "utf-8")
-    page = settled(visited(f"{file.as_uri()}#open=1", reduced_motion="reduce"))
+    trials = 600  # on every machine
+    page = settled(visited(written(tmp_path, trials), reduced_motion="reduce"))
     assert trials_made(page) == trials
     postures, before, after = [], [], []  # postures at the goal that they share
     for role, name in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
-        runs = [learn(name, "EC1", seed=seed, trials=trials) for seed in range(5)]
+        runs, due = practised(name, "EC1", trials)
         before.append(ticks(page, role, "before"))
         after.append(ticks(page, role))
         assert before[-1] == -learn(name, "EC1", seed=0, trials=1).reward
-        assert after[-1] == -median_of(runs)
+        assert after[-1] == due
         postures.append(np.array([run.execute().configurations[0] for run in runs]))
     learned = distance_of_means(*postures)
     assert learned > 0.1
@@ -167,11 +145,15 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
 
 
 def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
-    page = settled(opened("preset=3&who=you"))
+    page = opened("preset=3&who=you")
     assert ticks(page, "You") == ticks(page, "Corrective process alone")
     assert "Optimum" not in text(page, "score")  # it is not proven
-    handle = page.get_by_role("button", name="left arm, elbow 2")
-    drag(page, handle, 20, 30)
+    elbow = page.get_by_role("button", name="left arm, elbow 2")
+    box = elbow.bounding_box()
+    elbow.hover()
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2 + 20, box["y"] + box["height"] / 2 + 30, steps=2)
+    page.mouse.up()
     page.get_by_label("Place it at").select_option("2")
     page.get_by_label("hit by the").select_option("0")
     page.get_by_role("button", name="Box").focus()
@@ -189,7 +171,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     assert done.hands == "LLLR"
     assert ticks(page, "You") == done.ticks
     with page.expect_download() as download:
-        press(page, "Save your trials")
+        page.get_by_role("button", name="Save your trials").click()
     trials = pd.read_csv(download.value.path())
     assert trials.trial.max() == 3  # a drag, a hand, a key; the other key moves nothing
     task = load_task("two-armed-1")
@@ -200,10 +182,10 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
 
 
 def test_the_link_holds_the_whole_state(opened):
-    page = settled(opened())
+    page = opened()
     assert "posture difference" in text(page, "finding")
-    choose(page, "each movement")
-    assert "same posture" in text(page, "finding")  # no coarticulation by such a reward
+    page.get_by_role("radio", name="each movement").check()
+    assert "same posture" in text(settled(page), "finding")  # no coarticulation by such a reward
     page.get_by_label("Task").select_option("3")
     page.get_by_label("It explores").select_option("EC3")
     page.get_by_role("button", name="Goal 2").focus()
@@ -217,21 +199,17 @@ def test_the_link_holds_the_whole_state(opened):
     changed_to(page, "open=1&preset=3&explores=EC3&reward=movement")
     slide(page, "It leans towards the next goal", 4)
     settled(page)
-    condition = shown_condition(page)
+    # The learner's condition, by the Python that the page shows for it.
+    code = page.locator("[data-is=python]").text_content()
+    condition = eval(code, {"CONDITIONS": CONDITIONS, "replace": replace})
     assert (condition.drift, condition.credit) == (1.0, "subtask")
-    assert ticks(page, "The learner") == learned("two-armed-1", condition)
+    assert ticks(page, "The learner") == practised("two-armed-1", condition)[1]
     # Entries that are no state are left out, and goals and joints far out lie nearer.
     changed_to(page, "preset=3&who=constructor&mate=__proto__&explores=constructor&__proto__=1")
     assert ticks(page, "The learner") > 0
     changed_to(page, "who=alone&preset=1&goals=60,0;6,-70,1;6,-70")
     assert page.get_by_role("button", name="Goal 1, at 12, 0.").count() == 1
     assert page.get_by_role("button", name="Goal 2, at 6, -12.").count() == 1
-
-
-def shown_condition(page):
-    """The learner's condition, by the Python that the page shows for it."""
-    code = page.locator("[data-is=python]").text_content()
-    return eval(code, {"CONDITIONS": CONDITIONS, "replace": replace})
 
 
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened):

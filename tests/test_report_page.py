@@ -1,6 +1,7 @@
 """The page in a real browser: Chromium, driven by Playwright."""
 
 import itertools
+from functools import partial
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -12,55 +13,41 @@ from coartic.analysis.study import solved, typical_run
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture(scope="module")
-def address(report):
-    """Of the page."""
-    return (report / "report.html").as_uri()
-
-
 @pytest.fixture
-def opened(visited, address):
+def opened(visited, report):
     """Opens the page; what it logs, throws or asks the network for fails the test."""
-
-    def open_page(width=1280, link=address, **options):
-        return visited(link, width, **options)
-
-    return open_page
+    return partial(visited, (report / "report.html").as_uri())
 
 
-IN_SIGHT = """rows => rows.filter(row => row.checkVisibility())
-    .map(row => [row.textContent.toLowerCase(), row.children[1].innerText])"""
+OPEN_ALL = """document.querySelectorAll("details").forEach((each) => { each.open = true; })"""
 
 
-def rows_in_sight(page):
-    """All text of each row of the table of methods, and its second cell."""
-    return page.eval_on_selector_all("#T_methods tbody tr", IN_SIGHT)
-
-
-def test_tables_are_searched_sorted_and_unfolded(opened, address):
+def test_tables_are_searched_sorted_and_unfolded(opened):
     page = opened()
     # A table that is folded opens for a link to a cell, and is sorted by its headers.
-    assert not page.locator("#T_methods").is_visible()
-    page.goto(f"{address}#T_methods")
-    assert page.locator("#T_methods").is_visible()
-    head = page.locator("#T_methods thead button", has_text="reward").first
-    column = page.locator("#T_methods thead th").all_inner_texts()
-    place = next(k for k, text in enumerate(column) if text.startswith("reward"))
+    table = page.locator("#T_methods")
+    assert not table.is_visible()
+    page.goto(f"{page.url}#T_methods")
+    assert table.is_visible()
 
-    def values():
-        cells = page.locator(f"#T_methods tbody tr td:nth-child({place + 1})")
-        return [float(text.split()[0].replace("−", "-")) for text in cells.all_inner_texts()]
+    def rows():
+        """Cells of each row in sight."""
+        rows = table.locator("tbody tr:visible").all()
+        return [row.locator("td").all_inner_texts() for row in rows]
 
-    for ordered in (sorted(values()), sorted(values(), reverse=True)):
-        head.click()
-        assert values() == ordered
-    before = rows_in_sight(page)
+    place = table.locator("thead th").all_inner_texts().index("reward ± SD")
+    rewards = [float(row[place].split()[0].replace("−", "-")) for row in rows()]
+    for ordered in (sorted(rewards), sorted(rewards, reverse=True)):
+        table.locator("thead button", has_text="reward").first.click()
+        shown = [float(row[place].split()[0].replace("−", "-")) for row in rows()]
+        assert shown == ordered
+    before = rows()
     page.fill("#methods-search", "learner ascending")
-    after = rows_in_sight(page)
+    after = rows()
     assert 0 < len(after) < len(before)
-    assert all(word in text for text, _ in after for word in ("learner", "ascending"))
+    assert all("Ascending" in row and "learner" in " ".join(row) for row in after)
     page.fill("#methods-search", "")
-    assert rows_in_sight(page) == before
+    assert rows() == before
 
 
 def part(page, name):
@@ -71,28 +58,21 @@ def part(page, name):
 def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, traced):
     page = opened(reduced_motion="reduce")
     shared = shared_goal(traced)
+    difference = f"{float(f'{shared.posture_difference:.2f}'):g}"
     said = page.locator(".play .beside")
-    said.get_by_text(
-        f"posture difference is {float(f'{shared.posture_difference:.2f}'):g} "
-    ).first.wait_for()
+    said.get_by_text(f"posture difference is {difference} ").first.wait_for()
     page.get_by_text("Try more").click()
     tasks = {task.label: name for name, task in traced.tasks.items()}
-    options = part(page, "preset").locator("option").all_inner_texts()
-    seen = 0
-    for preset, text in enumerate(options[1:], 1):
+    options = part(page, "preset").locator("option").all_inner_texts()[1:]
+    assert len(options) == 3
+    for preset, text in enumerate(options, 1):
         part(page, "preset").select_option(str(preset))
-        task = tasks[text.removesuffix(" †")]
         stored = part(page, "stored").locator("option:not([value=''])")
-        for label in stored.evaluate_all("all => all.map(o => o.value)")[:1]:
-            part(page, "stored").select_option(label)
-            good = solved(traced.cells[task, label])
-            median = good.set_index("run_id").reward[typical_run(good)]
-            page.wait_for_function(
-                "ticks => document.querySelector('[data-is=score]').innerText.includes(ticks)",
-                arg=f" {-median:.0f} ticks",
-            )
-            seen += 1
-    assert seen >= 3
+        label = stored.first.get_attribute("value")
+        part(page, "stored").select_option(label)
+        good = solved(traced.cells[tasks[text.removesuffix(" †")], label])
+        median = good.set_index("run_id").reward[typical_run(good)]
+        expect(part(page, "score")).to_contain_text(f" {-median:.0f} ticks")
     page.get_by_role("button", name="Goal 2").focus()
     page.keyboard.press("ArrowUp")
     expect(page.get_by_role("radio", name="A learner")).to_be_checked()
@@ -103,7 +83,7 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
 
 def test_a_phone_shows_the_panels_of_a_figure_one_below_the_other(opened):
     page = opened(width=390)
-    page.eval_on_selector_all("details", "all => all.forEach((each) => { each.open = true; })")
+    page.evaluate(OPEN_ALL)
     panels = page.eval_on_selector_all(
         ".drawn.narrow svg",
         """all => all.map((panel) => {
@@ -127,7 +107,7 @@ def test_a_phone_shows_the_panels_of_a_figure_one_below_the_other(opened):
 
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
     page = opened(reduced_motion="reduce")
-    page.eval_on_selector_all("details", "all => all.forEach((each) => { each.open = true; })")
+    page.evaluate(OPEN_ALL)
     for width in (1280, 390):
         page.set_viewport_size({"width": width, "height": 900})
         assert page.evaluate("document.documentElement.scrollWidth") <= width

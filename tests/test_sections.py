@@ -160,6 +160,15 @@ def test_learning(study):
     assert dict(zip(curve.index, curve.to_numpy().tolist(), strict=True)) == ends
 
 
+def test_learning_is_shown_of_individual_tasks_and_of_no_search():
+    instances = [f"one-armed/v1/i{number:03}" for number in range(9)]  # fewer are individual
+    rows = [run for task in (ONE, *instances) for run in runs_of(task, EC1, [-300], trials=100)]
+    rows += runs_of(ONE, "optimum/search", [-300], trials=100)
+    rewards = {run["run_id"]: np.full(100, -300.0) for run in rows}
+    study = study_of(rows, optima={}, rewards=lambda: iter(rewards.items()))
+    assert [*TABLES["learning"](study).index] == [f"{ONE} {EC1}"]
+
+
 def test_tasks(study):
     """The corrective process alone as the paper has it: -319; -675 initially and -532 at best."""
     table = TABLES["tasks"](study)
@@ -181,13 +190,12 @@ def test_ticks_saved_are_those_of_the_movements_less_those_of_the_corrective_pro
     assert row["sum"] == pytest.approx(expected.sum())
     drawn = FIGURES["saved"](traced).data.set_index(["task", "method"])
     assert drawn.by_goal_1["ascending", "dual-process/EC1"] == row.by_goal_1
-    learners = dict(zip(LEARNERS, itertools.repeat("learner")))
+    learners = dict.fromkeys(LEARNERS, "learner")
     orders = [[learners.get(method, method) for _, method in of_task.index]
               for _, of_task in drawn.groupby("task", sort=False)]  # fmt: skip
     methods = [*dict.fromkeys(itertools.chain(*orders))]
     assert all(order == [method for method in methods if method in order] for order in orders)
-    without = traced.methods.information == WITHOUT_REWARD
-    plans = traced.runs[traced.runs.label.map(without)]
+    plans = traced.runs[traced.runs.label.map(traced.methods.information) == WITHOUT_REWARD]
     assert len(plans) > 0
     alone = Study(traced.folder, traced.plan, traced.made_with, plans)
     assert FIGURES["saved"](alone) is None

@@ -1,9 +1,7 @@
 """Signatures on constructed cases whose right answer is known."""
 
 import itertools
-import json
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -437,43 +435,42 @@ def test_verdicts_on_postures_at_a_shared_goal(method, difference, runs, verdict
         assert contexts_of_control(study, compared) is None
 
 
-def shifted(task, label, first, *, others=-20, shift=0.0, hands="RRR"):
-    """Runs, mostly three, whose first movement takes so many ticks more than the corrective
-    process's."""
-    first = [first] * 3 if np.ndim(first) == 0 else first
-    alone, runs = corrective_trial(task, hands).ticks_by_goal(), []
-    for each, noise in zip(first, 0.1 * np.arange(len(first)), strict=True):
-        ticks = np.add(alone, [each, others, *[0] * (len(alone) - 2)])
-        runs += posed(task, label, [posture(shift + noise)], ticks, hands).runs
-    return Solutions(task, label, tuple(runs))
+def study_of_first(task, *cells):
+    """A study of methods with their settings, ticks that the first movement of each run takes more
+    than the corrective process's, hands of each run, and more of their rows."""
+    solutions, rows = [], []
+    for method, setting, first, hands, more in cells:
+        runs = []
+        for number, (ticks, of_run) in enumerate(zip(first, hands, strict=True)):
+            alone = corrective_trial(task, of_run).ticks_by_goal()
+            q = [posture(0.1 * number)]
+            runs += posed(task, "", q, (alone[0] + ticks, *alone[1:]), of_run).runs
+        solutions.append(Solutions(task, f"{method} {setting}".strip(), tuple(runs)))
+        rows += runs_of(
+            task.name, method, [-300] * len(first), setting=setting, hands=hands, **more
+        )
+    return study_of_solutions(solutions, rows)
 
 
 def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs(tmp_path):
     """Hands of fewer than a tenth of the runs are not compared."""
-    task = load_task("two-armed-2")
-    learned = [shifted(task, EC4, 5, hands="RRRR"), shifted(task, EC4, 9, hands="RLRR"),
-               shifted(task, EC4, 7, hands="LRRR")]  # fmt: skip
-    runs = (*learned[0].runs * 6, *learned[1].runs, *learned[2].runs[:1])
-    cells = [replace(learned[0], runs=runs)]
-    rows = runs_of(task.name, EC4, [-300] * len(runs), hands=[run.hands for run in runs])
-    # One of the runs is no faster than the corrective process alone, and counts.
-    for setting, first, hands, trials in (
-        ("", [2, 3, 400, 130, 140], "RRRR", 10), ("trials=100", [9] * 5, "RRRR", 100),
-        ("hands=RLLR", [1] * 5, "RLLR", 10),
-    ):  # fmt: skip
-        label = f"{RANDOM_SEARCH} {setting}".strip()
-        cells.append(shifted(task, label, first, hands=hands))
-        rows += runs_of(task.name, RANDOM_SEARCH, [-300] * 5, setting=setting, trials=trials,
-                        hands=hands)  # fmt: skip
-    study = study_of_solutions(cells, rows)
+    task, searched = load_task("two-armed-2"), [2, 3, 400, 130, 140]
+    study = study_of_first(
+        task,
+        (EC4, "", [5] * 18 + [9] * 3 + [7], ["RRRR"] * 18 + ["RLRR"] * 3 + ["LRRR"], {}),
+        # One of the runs is no faster than the corrective process alone, and counts.
+        (RANDOM_SEARCH, "", searched, ["RRRR"] * 5, {}),
+        (RANDOM_SEARCH, "trials=100", [9] * 5, ["RRRR"] * 5, {"trials": 100}),
+        (RANDOM_SEARCH, "hands=RLLR", [1] * 5, ["RLLR"] * 5, {}),
+    )
     compared = with_control(study, "first", task.name, EC4)
     assert {each: [v.tolist() for v in pair] for each, pair in compared.items()} == {
-        "RRRR": [[5] * 18, [2, 3, 400, 130, 140]],
+        "RRRR": [[5] * 18, searched],
         "RLRR": [[9] * 3, []],
     }
     assert mean_excess(study, "first", task.name, EC4) == 5 - 135
     table = TABLES["signatures"](study).loc[f"{task.name} {EC4} RRRR"]
-    test = exchange_test([5.0] * 18, [2.0, 3.0, 400.0, 130.0, 140.0])
+    test = exchange_test([5.0] * 18, searched)
     assert (table["first"], table.first_control, table.first_p) == (5, 135, test.p)
     assert (table.runs, table.control_runs) == (18, 5)
     (tmp_path / "control.toml").write_text(control_suite(study), "utf-8")
@@ -486,30 +483,18 @@ def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs(tmp_p
 @pytest.mark.parametrize("has_its_own", [True, False])
 def test_the_control_of_ec3_has_an_idle_arm_that_keeps_still(has_its_own):
     """Where a folder has it; or else the control that it has, and the table says which it was."""
-    task = load_task("two-armed-2")
-    searches = {"": [2, 3, 4], "stages=10": [6, 6, 6]}
-    searches |= {"idle_arm=False": [1, 1, 1]} if has_its_own else {}
-    cells = [shifted(task, label, 5, hands="RRRR") for label in (EC3, EC4)]
-    rows = [
-        run for label in (EC3, EC4) for run in runs_of(task.name, label, [-300] * 3, hands="RRRR")
-    ]
-    for setting, first in searches.items():
-        cells.append(shifted(task, f"{RANDOM_SEARCH} {setting}".strip(), first, hands="RRRR"))
-        values = {"stages": 1, "idle_arm": True} | {
-            name: json.loads(value.lower())
-            for name, _, value in [setting.partition("=")] if value
-        }  # fmt: skip
-        rows += runs_of(task.name, RANDOM_SEARCH, [-300] * 3, setting=setting, hands="RRRR",
-                        parameters=json.dumps(values))  # fmt: skip
-    study = study_of_solutions(cells, rows)
+    cells = [(EC3, "", [5] * 3), (EC4, "", [5] * 3), (RANDOM_SEARCH, "", [2, 3, 4]),
+             (RANDOM_SEARCH, "stages=10", [6] * 3)]  # fmt: skip
+    cells += [(RANDOM_SEARCH, "idle_arm=False", [1] * 3)] * has_its_own
+    name = "two-armed-2"
+    study = study_of_first(load_task(name), *((*cell, ["RRRR"] * 3, {}) for cell in cells))
     of_ec3 = [1, 1, 1] if has_its_own else [2, 3, 4]
     for label, expected in ((EC3, of_ec3), (EC4, [2, 3, 4])):
-        ((_, control),) = with_control(study, "first", task.name, label).values()
+        ((_, control),) = with_control(study, "first", name, label).values()
         assert control.tolist() == expected
-    table = TABLES["signatures"](study).control_idle_arm
-    idle = "still" if has_its_own else "with noise"
-    assert table[f"{task.name} {EC3} RRRR"] == idle
-    assert table[f"{task.name} {EC4} RRRR"] == "with noise"
+    idle = TABLES["signatures"](study).control_idle_arm
+    assert idle[f"{name} {EC3} RRRR"] == ("still" if has_its_own else "with noise")
+    assert idle[f"{name} {EC4} RRRR"] == "with noise"
     missing = control_suite(study)
     assert missing.count("idle_arm = false") == missing.count("[[blocks]]") == (not has_its_own)
 
