@@ -176,17 +176,17 @@ def test_runs_are_tidy(traced):
 
 def planted_scores():
     """Rewards of three methods on three tasks, of which the last leaves nothing to gain."""
-    zero_and_best = {"near": (-320, -300), "far": (-600, -500), "nothing": (-40, -40)}
-    rewards = {
-        "best": {"near": [-300] * 6, "far": [-500] * 6, "nothing": [-40] * 6},
-        "middle": {"near": range(-313, -307), "far": range(-553, -547), "nothing": [-42] * 6},
-        "planner": {"near": [-320], "far": [-630], "nothing": [-40]},
-    }
-    return pd.DataFrame([
-        {"method": method, "task": task, "reward": reward,
-         "corrective_best": zero_and_best[task][0], "best_known": zero_and_best[task][1]}
-        for method, of_tasks in rewards.items() for task, of in of_tasks.items() for reward in of
-    ])  # fmt: skip
+    tasks = {"near": (-320, -300), "far": (-600, -500), "nothing": (-40, -40)}
+    spread = np.array([-2.5, -1.5, -0.5, 0.5, 1.5, 2.5])
+    parts = [
+        pd.DataFrame({"method": method, "task": task, "reward": np.add(reward, noise),
+                      "corrective_best": zero, "best_known": best})
+        for method, rewards, noise in (("best", (-300, -500, -40), 0 * spread),
+                                       ("middle", (-310.5, -550.5, -43), spread),
+                                       ("planner", (-320, -630, -40), [0]))
+        for reward, (task, (zero, best)) in zip(rewards, tasks.items(), strict=True)
+    ]  # fmt: skip
+    return pd.concat(parts, ignore_index=True)
 
 
 def test_the_share_of_the_possible_gain_by_hand():
@@ -195,7 +195,7 @@ def test_the_share_of_the_possible_gain_by_hand():
     assert ranked.share.tolist() == pytest.approx([1.0, 0.485, -0.15])  # of two tasks
     assert ranked.without_gain.tolist() == [1, 1, 1]
     assert ranked.share_low["middle"] < 0.485 < ranked.share_high["middle"]
-    assert ranked.gap["middle"] == pytest.approx((10.5 / 300 + 50.5 / 500 + 2 / 40) / 3, abs=1e-3)
+    assert ranked.gap["middle"] == pytest.approx((10.5 / 300 + 50.5 / 500 + 3 / 40) / 3, abs=1e-3)
     planted = planted_scores()
     assert frames.shares(planted)[planted.task == "nothing"].isna().all()
     with pytest.raises(CoarticError, match="corrective_best has -290.* above best_known"):

@@ -92,7 +92,6 @@ def test_the_advice_on_the_search_keeps_all_methods(capsys):
     own = load_task(ONE).model_copy(update={"radius": 0.11})
     text = said(study_of(rows, [own]), capsys)
     assert "--methods hill-climbing,mine,optimum/search" in text
-    assert text.index("Reference") < text.index("optimum/search") < text.index("Intervals")
 
 
 def test_an_instance_beside_a_task_has_its_own_gap():

@@ -155,19 +155,6 @@ def test_lean_by_hand():
     assert degrees.more.value == pytest.approx(found.more.value)
 
 
-def test_lean_takes_both_postures_from_different_runs():
-    """Two runs each: p of the first with n of the second, and the other way round."""
-    zero = [0.0]
-    up = np.array([[zero, [0.2], [2.0]], [zero, [0.6], [4.0]]])
-    down = np.zeros((2, 3, 1))
-    down[:, 2] = [[-0.001], [0.001]]
-    found = signatures.lean(up, down, rng(), resamples=9)
-    assert math.isnan(found.more.value)  # the next postures spread too much
-    wide = np.tile(up + np.array([[0.0], [0.0], [100.0]]), (2, 1, 1))
-    value = (0.2 / 104 + 0.6 / 102) / 2
-    assert signatures.lean(wide, np.zeros((4, 3, 1)), rng()).more.value == pytest.approx(value)
-
-
 def test_lean_needs_two_runs_and_its_interval_five():
     for runs in (1, 2, 4, 5):
         two = [postures([0.0, 0.0], [side / 4, 0.0], [side, 0.0], runs=runs) for side in (1, -1)]
@@ -210,13 +197,16 @@ def test_lean_is_found_through_noise_that_is_carried_on(planted):
 
 
 def test_lean_refuses_other_arrays():
-    for wrong in (np.zeros((2, 2, 4)), np.zeros((0, 3, 4)), np.full((2, 3, 4), np.nan)):
-        with pytest.raises(ValueError, match="postures of a context have"):
-            signatures.lean(wrong, np.zeros((2, 3, 4)), rng())
-    with pytest.raises(ValueError, match="coordinates"):
-        signatures.lean(np.zeros((2, 3, 4)), np.zeros((2, 3, 5)), rng())
+    good = np.zeros((2, 3, 4))
+    for words, *given in (
+        ("postures of a context have", np.full((2, 3, 4), np.nan), good),
+        ("postures of a context have", good[:, :2], good),
+        ("coordinates", good, good[..., :3]),
+    ):
+        with pytest.raises(ValueError, match=words):
+            signatures.lean(*given, rng())
     with pytest.raises(ValueError, match="toward"):
-        signatures.lean(*[np.zeros((2, 3, 4))] * 2, rng(), toward=np.zeros(4))
+        signatures.lean(good, good, rng(), toward=np.zeros(4))
 
 
 def solutions_with(task, hits, hands):
