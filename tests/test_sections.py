@@ -17,20 +17,12 @@ from coartic.analysis import FIGURES, TABLES, runtimes
 from coartic.analysis.figures.drawings import learning_curves
 from coartic.analysis.methods import BY_FORMULA, BY_TRIAL, LEARNERS, WITHOUT_REWARD
 from coartic.analysis.study import Study, solved
-from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of, study_of_trials
+from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
 
 ONE, TWO = "ascending", "two-armed-1"
 EC1, EC4, CMA = "dual-process/EC1", "dual-process/EC4", "cma-es/bandit"
 PLAN, BOTH = "trajectory-optimisation/path-length", "dual-process (EC1, EC4)"
 NONE = math.nan
-
-
-def trials_of(steps, trials):
-    """Reward of each trial: below all others but in those of ``steps``, numbered from 1."""
-    rewards = np.full(trials, -700.0)
-    for trial, reward in steps.items():
-        rewards[trial - 1] = reward
-    return rewards
 
 
 STEPS = {
@@ -44,14 +36,22 @@ STEPS = {
 
 @pytest.fixture(scope="module")
 def study():
-    trials = {cell: [trials_of(steps, max(steps)) for steps in runs]
-              for cell, runs in STEPS.items()}  # fmt: skip
-    plans = [
+    """Runs whose trials are below all others but in those of ``STEPS``; each trial takes 1,000
+    evaluations."""
+    rows, rewards = [], {}
+    for (task, method), runs in STEPS.items():
+        for run, steps in enumerate(runs):
+            of_trials = np.full(max(steps), -700.0)
+            of_trials[np.array([*steps]) - 1] = [*steps.values()]
+            more = {"trials": len(of_trials), "forward_kinematics": 1_000 * len(of_trials)}
+            rows.append(row(method, int(np.nanmax(of_trials)), task=task, run=run, **more))
+            rewards[rows[-1]["run_id"]] = of_trials
+    rows += [
         row(PLAN, reward, task=task, information="kinematic model, reward as a formula", trials=0,
             forward_kinematics=500, movement_ticks=ticks)
         for task, reward, ticks in ((ONE, -296, 0), (TWO, -500, 100))
     ]  # fmt: skip
-    return study_of_trials(trials, plans, forward_kinematics=1_000)
+    return study_of(rows, optima=made_up_optima(ONE, TWO), rewards=lambda: iter(rewards.items()))
 
 
 def same(table, names, cells):

@@ -16,12 +16,27 @@ from coartic import estimates as statistics
 from coartic.analysis import statistics as hypotheses
 
 
-def studentised(x, y=(0.0,)):
-    """The difference of means over its standard error, exact for a known number; infinite without
-    spread, 0 without difference."""
-    d = np.mean(x) - np.mean(y)
-    error = math.sqrt(sum(np.var(of, ddof=1) / len(of) for of in (x, y) if len(of) > 1))
+def studentised(*pairs):
+    """The sum of differences of means over its standard error, exact for known numbers; infinite
+    without spread, 0 without difference."""
+    d = sum(np.mean(a) - np.mean(b) for a, b in pairs)
+    samples = [of for pair in pairs for of in pair if len(of) > 1]
+    error = math.sqrt(sum(np.var(of, ddof=1) / len(of) for of in samples))
     return 0.0 if abs(d) < 1e-12 else math.copysign(1e9, d) if error < 1e-9 else d / error
+
+
+def against(number, values):
+    """The statistic of each resample of values, and that of the values against a number."""
+    around = np.array(values) - np.mean(values)
+    null = [studentised((x, [0.0])) for x in itertools.product(around, repeat=len(values))]
+    return null, studentised((values, [number]))
+
+
+def exchanges(a, b):
+    """Yield each division of two samples into samples as large."""
+    pool = np.array([*a, *b], float)
+    for chosen in itertools.combinations(range(len(pool)), len(a)):
+        yield pool[[*chosen]], np.delete(pool, chosen)
 
 
 def share_as_extreme(null, observed, alternative):
@@ -43,9 +58,8 @@ ALTERNATIVES = "greater", "less", "two-sided"
 
 @pytest.mark.parametrize(("a", "bound"), [([1, 2, 6, 6], 3.5), ([-3, -2, -7], -5)])
 def test_bootstrap_test_against_all_resamples(a, bound):
-    null = [studentised(x) for x in itertools.product(np.array(a) - np.mean(a), repeat=len(a))]
     for alternative in ALTERNATIVES:
-        expected = share_as_extreme(null, studentised(np.array(a) - bound), alternative)
+        expected = share_as_extreme(*against(bound, a), alternative)
         test = hypotheses.bootstrap_test(a, bound, alternative)
         assert test.p == pytest.approx(expected, abs=4 * math.sqrt(0.25 / 9_999))
 
@@ -60,12 +74,9 @@ def test_bootstrap_test_against_all_resamples(a, bound):
 @pytest.mark.usefixtures("three_suffice")
 def test_exchange_test_against_all_exchanges(a, b):
     """With fewer resamples than exchanges, some of these are drawn."""
-    pool, null = np.array([*a, *b], float), []
-    for chosen in itertools.combinations(range(len(pool)), len(a)):
-        others = np.delete(np.arange(len(pool)), chosen)
-        null.append(studentised(pool[[*chosen]], pool[others]))
+    null = [*map(studentised, exchanges(a, b))]
     for alternative in ALTERNATIVES:
-        expected = share_as_extreme(null, studentised(a, b), alternative)
+        expected = share_as_extreme(null, studentised((a, b)), alternative)
         test = hypotheses.exchange_test(a, b, alternative)
         assert test.value == pytest.approx(np.mean(a) - np.mean(b))
         assert test.p == pytest.approx(expected)
@@ -78,35 +89,19 @@ def test_exchange_test_against_all_exchanges(a, b):
 @pytest.mark.usefixtures("three_suffice")
 def test_a_test_over_strata_against_all_exchanges():
     """In each of two strata; and in one, where values stand beside an exact number."""
-    first, second = [[1, 2, 6], [0, 4, 5, 5]], [[0, 1, 3], [2, 3, 9]]
-    null = []
-    for chosen in itertools.product(*(itertools.combinations(range(len(a) + len(b)), len(a))
-                                      for a, b in zip(first, second, strict=True))):  # fmt: skip
-        pairs = []
-        for a, b, places in zip(first, second, chosen, strict=True):
-            pool = np.array([*a, *b], float)
-            pairs.append((pool[[*places]], np.delete(pool, places)))
-        null.append(of_strata(pairs))
-    pairs = [tuple(map(np.array, pair)) for pair in zip(first, second, strict=True)]
-    expected = share_as_extreme(null, of_strata(pairs), "two-sided")
-    strata = [tuple(np.array(each, float) for each in pair) for pair in pairs]
+    samples = [([1, 2, 6], [0, 1, 3]), ([0, 4, 5, 5], [2, 3, 9])]
+    strata = [tuple(np.array(each, float) for each in pair) for pair in samples]
+    null = itertools.starmap(studentised, itertools.product(*itertools.starmap(exchanges, strata)))
+    expected = share_as_extreme([*null], studentised(*strata), "two-sided")
     assert hypotheses.stratified_test(strata) == pytest.approx(expected, abs=0.02)
     values = np.array([1.0, 2.0, 6.0, 6.0])
-    null = [studentised(x) for x in itertools.product(values - values.mean(), repeat=4)]
-    expected = share_as_extreme(null, studentised(values - 5.0), "two-sided")
+    expected = share_as_extreme(*against(5.0, values), "two-sided")
     assert 0.3 < expected < 0.4  # a sum in place of the difference has the smallest p of all
     for pair in ((values, 5.0), (5.0, values)):
         assert hypotheses.stratified_test([pair]) == pytest.approx(expected, abs=0.02)
     assert math.isnan(hypotheses.stratified_test([(1.0, 2.0)]))
     assert math.isnan(hypotheses.stratified_test([(values, 2.0), (values[:2], values)]))
     assert hypotheses.stratified_test([(values, values), (1.0, 1.0)]) == 1.0
-
-
-def of_strata(pairs):
-    """The sum of differences of means over the root of the sum of their variances."""
-    differences = sum(np.mean(a) - np.mean(b) for a, b in pairs)
-    error = sum(np.var(of, ddof=1) / len(of) for pair in pairs for of in pair)
-    return 0.0 if abs(differences) < 1e-12 else differences / math.sqrt(error)
 
 
 @pytest.mark.usefixtures("three_suffice")

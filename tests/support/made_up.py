@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from coartic import load_task
@@ -128,24 +127,6 @@ def study_of_rewards(rewards, **parts):
     rows = [run for cell, of in rewards.items() for run in runs_of(*cell, of)]
     optima = made_up_optima(*{task for task, _ in rewards})
     return study_of(rows, **{"optima": optima, **parts})
-
-
-def study_of_trials(trials, plans, **more):
-    """Return a study of rewards of trials, ``{(task, method): [rewards of a run, ...]}``.
-
-    ``plans`` are rows of runs without trials. Each trial takes ``more["forward_kinematics"]``
-    evaluations.
-    """
-    rows, by_run = [], {}
-    evaluations = more.pop("forward_kinematics")
-    for cell, runs in trials.items():
-        sizes, best = [*map(len, runs)], [int(np.nanmax(rewards)) for rewards in runs]
-        more["forward_kinematics"] = [evaluations * size for size in sizes]
-        rows += (of_cell := runs_of(*cell, best, trials=sizes, **more))
-        names = (each["run_id"] for each in of_cell)
-        by_run |= {name: np.array(r, float) for name, r in zip(names, runs, strict=True)}
-    optima = made_up_optima(*{task for task, _ in trials})
-    return study_of([*rows, *plans], optima=optima, rewards=lambda: iter(by_run.items()))
 
 
 def study_of_solutions(cells, rows=None, replays=(), **parts):
