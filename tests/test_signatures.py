@@ -473,8 +473,8 @@ def test_random_search_is_compared_at_equal_hands_and_trials_over_all_runs(tmp_p
 @pytest.mark.parametrize("has_its_own", [True, False])
 def test_the_control_of_ec3_has_an_idle_arm_that_keeps_still(has_its_own):
     """Where a folder has it; or else the control that it has, and the table says which it was."""
-    cells = [(EC3, "", [5] * 3), (EC4, "", [5] * 3), (RANDOM_SEARCH, "", [2, 3, 4]),
-             (RANDOM_SEARCH, "stages=10", [6] * 3)]  # fmt: skip
+    cells = [(EC3, "", [5] * 3), (EC4, "", [5] * 3), (RANDOM_SEARCH, "stages=10", [6] * 3),
+             (RANDOM_SEARCH, "", [2, 3, 4])]  # fmt: skip
     cells += [(RANDOM_SEARCH, "idle_arm=False", [1] * 3)] * has_its_own
     name = "two-armed-2"
     study = study_of_first(load_task(name), *((*cell, ["RRRR"] * 3, {}) for cell in cells))
