@@ -190,13 +190,13 @@ def planted_scores():
 
 
 def test_the_share_of_the_possible_gain_by_hand():
-    ranked = frames.ranking(planted_scores())
+    planted = planted_scores()
+    ranked = frames.ranking(planted)
     assert list(ranked.index) == ["best", "middle", "planner"]
     assert ranked.share.tolist() == pytest.approx([1.0, 0.485, -0.15])  # of two tasks
     assert ranked.without_gain.tolist() == [1, 1, 1]
     assert ranked.share_low["middle"] < 0.485 < ranked.share_high["middle"]
     assert ranked.gap["middle"] == pytest.approx((10.5 / 300 + 50.5 / 500 + 3 / 40) / 3, abs=1e-3)
-    planted = planted_scores()
     assert frames.shares(planted)[planted.task == "nothing"].isna().all()
     with pytest.raises(CoarticError, match="corrective_best has -290.* above best_known"):
         frames.shares(planted.assign(corrective_best=-290))
