@@ -12,6 +12,7 @@ from coartic.analysis import TABLES
 from coartic.analysis.study import load
 from coartic.analysis.verify import check_runs
 from coartic.benchmarks.include import include_folders
+from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.runner import perform
 from coartic.runs import shipped
 from coartic.runs.plan import size_of
@@ -181,8 +182,11 @@ def test_shipped_results(monkeypatch, tmp_path):
             assert {job.suite for job in plan} == {suite}
             assert len(store.ids()) == size_of(plan)
             tasks = {job.cell.task.name: job.cell.task for job in plan}
-            some = [name for name in tasks if "/" not in name or name.endswith("7")]
+            some = [name for name in tasks if "/" not in name or name.endswith("/i007")]
             assert all(load_task(name) == tasks[name] for name in some)  # as shipped today
+            if suite == "comparison":
+                now = {job.cell.digest for job in plan_suite(suite)}
+                assert {job.cell.digest for job in plan} == now
             learned = (run for run in map(store.run, store.ids()) if run.outcome.rewards)
             assert next(learned).is_downsampled
     with pytest.raises(CoarticError, match="of suite 'quick' are shipped; those of comparison, "):
