@@ -6,7 +6,7 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 
 from coartic import corrective_trial, load_task
-from coartic.benchmarks import conformance, reproduce
+from coartic.benchmarks import conformance, reproduce, scoring
 from coartic.benchmarks.conformance import check_method, check_task_file
 from coartic.benchmarks.processes import CONTEXT
 from coartic.benchmarks.registry import registry
@@ -64,8 +64,9 @@ def another_process(methods):
 
 @pytest.fixture(autouse=True)
 def quick_checks(monkeypatch, another_process):
-    """Of few trials; all runs of a check are there but the one that is to be in another process,
-    for methods that draw nothing: tests/test_versions.py has a run of each other one."""
+    """Of few trials, not executed with noise, which no law is about; all runs of a check are here
+    but the one that is to be in another process, for methods that draw nothing:
+    tests/test_versions.py has a run of each other one."""
 
     class HereAndThere(InProcess):
         def perform(self, jobs, **options):
@@ -75,6 +76,7 @@ def quick_checks(monkeypatch, another_process):
 
     monkeypatch.setattr(conformance, "CHECK_TRIALS", TRIALS)
     monkeypatch.setattr(reproduce, "Local", HereAndThere)
+    monkeypatch.setattr(scoring, "with_noise", list)
 
 
 @pytest.mark.parametrize("name", [*BUILT_IN, "test/good"])
