@@ -1,7 +1,6 @@
 """Imports point one way only, kinematics has one home, and studies use the public interface."""
 
 import ast
-import graphlib
 import re
 import sys
 from functools import cache
@@ -68,33 +67,6 @@ def test_imports_point_one_way():
         if not relative.startswith(COMMAND_LINE):
             assert others <= ALLOWED[package], path
             assert not any(name.startswith("coartic.cli") for name in imported(path)), path
-
-
-def module_of(path):
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    parts = parts if parts[0] == "coartic" else ("coartic", *parts)
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def statements(tree):
-    """All of a tree that is run at some time."""
-    for node in ast.iter_child_nodes(tree):
-        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
-            yield node
-            yield from statements(node)
-
-
-def test_no_imports_go_round_in_circles():
-    modules = {module_of(path): path for path in sources()}
-    imports = {}
-    for module, path in modules.items():
-        names = names_in(statements(tree_of(path)))
-        homes = {name if name in modules else name.rpartition(".")[0] for name in names}
-        imports[module] = homes & {*modules} - {module}
-    try:
-        graphlib.TopologicalSorter(imports).prepare()
-    except graphlib.CycleError as error:
-        raise AssertionError(" <- ".join(error.args[1])) from None
 
 
 def test_studies_import_documented_modules():

@@ -141,7 +141,6 @@ def test_splits_share_no_instance():
         ("long/v1/i003..i001", "goes backwards"),
         (f"long/v1/i000..i{MOST_CELLS}", "names more than 10,000 instances"),
         ("long/v1/i000..d003", "is not a range of instances"),
-        ("long/v1/i000..", "is not a range of instances"),
     ],
 )
 def test_ranges(text, words):
@@ -178,9 +177,3 @@ def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic,
     asked = ("--tasks", f"{path}/i000..i001", "--methods", "EC4", "--runs", 1, "--trials", 5)
     code, text, _ = coartic("run", "paper", *asked, "--out", "out")
     assert (code, text[:5]) == (0, "2 run")
-    for short, words in (
-        ("i0", "three digits: .*/i000"),
-        ("x000", "is not an instance of a family"),
-    ):
-        with pytest.raises(TaskError, match=words):
-            load_task(f"{path}/{short}")

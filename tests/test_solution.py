@@ -46,15 +46,12 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
     ("movements", "words"),
     [
         (planned(posture(1.0)), "movements for goals [1]; it must"),
-        (planned([0.0] * 9, posture(1.0)), "goal 1: configuration has shape (9,)"),
         (
             planned(posture(0.0, 1.0), posture(1.0)),
             "goal 1: a target moves the base in y, which is locked, by 1: entry 1 must be 0",
         ),
         (planned(posture(1.0), posture(2.0), hand="left"), "has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
-        ([Movement(1, "right", "jump", np.zeros(10))], "kind of a movement is 'jump'"),
-        ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),
         ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "or its last waypoint"),
     ],
 )

@@ -86,6 +86,7 @@ RUNS = {
     "dual-process/EC1-uncorrected": ("two-armed-2", -357, "RRRR", 384_054),
     "dual-process/EC4-uncorrected": ("two-armed-2", -357, "RRRR", 406_895),
     "dual-process/custom": ("two-armed-2", -357, "RRRR", 821_009),
+    "trajectory-optimisation/path-length": ("descending", -304, "RRR", 306),
     "trajectory-optimisation/squared-displacement": ("ascending", -298, "RRR", 94),
     "trajectory-optimisation/acceleration": ("descending", -319, "RRR", 128),
     "trajectory-optimisation/jerk": ("ascending", -323, "RRR", 23),
