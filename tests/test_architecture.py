@@ -69,18 +69,6 @@ def test_imports_point_one_way():
             assert not any(name.startswith("coartic.cli") for name in imported(path)), path
 
 
-def test_studies_import_documented_modules():
-    """Or packages above them: what a reference page does not have may change."""
-    pages = [*(ROOT / "docs" / "reference" / "python").glob("*.md")]
-    documented = re.findall(r"automodule:: (\S+)", "".join(page.read_text() for page in pages))
-    paths = sorted((ROOT / "studies").rglob("*.py"))
-    used = {name for path in paths for name in imported(path) if package_of(name) in PACKAGES}
-    assert len(used) > 30
-    for name in used:
-        module = name.rpartition(".")[0] or name
-        assert any(f"{each}.".startswith((f"{name}.", f"{module}.")) for each in documented), name
-
-
 FRESH = """
 import sys
 import coartic

@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +14,12 @@ import pytest
 from coartic import CoarticError, builtin_tasks, load_task
 from coartic.analysis.report import build
 from coartic.analysis.study import load
-from coartic.benchmarks import pool, template
+from coartic.benchmarks import template
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import suites
 from coartic.cli import completion
 from coartic.cli.arguments import methods_meant
 from coartic.cli.terminal import say
-from coartic.gym import TaskEnv
 from coartic.pictures import film
 from coartic.runs.store import lock, open_store
 from coartic.tasks.task import TASK_FOLDER
@@ -31,7 +29,6 @@ from tests.support.strategies import metres_task
 from tests.support.suites import (
     KNOWN,
     ROOT,
-    Failing,
     cell_on,
     edit,
     edit_movement,
@@ -60,29 +57,10 @@ def test_run_resumes(coartic, tmp_path):
     assert coartic(*SMALL, "--runs", 3, "--out", out)[1].startswith("3 runs (2 reused) in ")
 
 
-def test_a_folder_without_any_count_of_trials_is_printed_and_reported(
-    coartic, tmp_path, monkeypatch
-):
-    """All workers died, of a method that makes no trials."""
-    monkeypatch.setattr(pool, "Local", lambda _: Failing(0))
-    alone = ("run", "paper", "--tasks", "ascending", "--methods", "corrective-alone/given")
-    code, text, error = coartic(*alone, "--out", tmp_path)
-    assert (code, "Traceback" in error) == (1, False)
-    assert "1 failed" in text
-    assert "1 × exit code 9" in text
-    code, text, error = coartic("report", tmp_path)
-    assert (code, "fault" in text + error) == (0, False)
-    assert coartic("verify", tmp_path)[0] == 0
-
-
-@pytest.mark.parametrize(
-    ("encoding", "printed"),
-    [("ascii", "-3 ? 1 -"), ("latin-1", "-3 ± 1 -")],
-)
-def test_a_terminal_without_a_sign_shows_one_like_it(encoding, printed):
-    terminal = io.TextIOWrapper(io.BytesIO(), encoding, "replaced")
+def test_a_terminal_without_a_sign_shows_one_like_it():
+    terminal = io.TextIOWrapper(io.BytesIO(), "latin-1", "replaced")
     say("−3 ± 1 –", stream=terminal)
-    assert terminal.buffer.getvalue().decode(encoding) == f"{printed}{os.linesep}"
+    assert terminal.buffer.getvalue().decode("latin-1") == f"-3 ± 1 -{os.linesep}"
 
 
 def test_a_broken_law_makes_the_exit_code_of_check(coartic, tmp_path):
@@ -114,12 +92,6 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     assert code == 1
     assert f"Run {second}, performed again: movement_ticks: " in text
     assert f"Run {second}, performed again: replay: " in text
-    cells = [cell_on(load_task("ascending"), replace(KNOWN["dual-process/EC1"], code="other"))]
-    run_and_write(tmp_path / "other", cells, runs=1, trials=3)
-    out = tmp_path / "other"
-    code, _, error = coartic("verify", out, "--again", 1)
-    assert code == 2
-    assert "no run of" in error
 
 
 INTERRUPTED = """
@@ -188,10 +160,11 @@ def test_a_new_file_can_be_imported_and_hides_no_module(coartic, tmp_path, monke
 
 PROGRAM = """
 from coartic.__main__ import main
-from coartic.benchmarks import runner
+from coartic.benchmarks import provenance, runner
 from coartic.cli import run
 
-run.say_ranking = runner.perform_in_order = lambda *_, **__: ()  # take long
+provenance.arithmetic = lambda: ""  # it and these take long
+run.say_ranking = runner.perform_in_order = lambda *_, **__: ()
 main()
 """
 
@@ -264,10 +237,6 @@ def test_draw(coartic, tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text('title = "$x^$"\n' + GOOD, encoding="utf-8")
     assert coartic("draw", "ascending", "--out", tmp_path / "one.pdf")[0] == 0
     assert (tmp_path / "one.pdf").stat().st_size > 5000
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / "mine.toml").write_text(GOOD.replace("[5.0, 2.0]", "[5.0, 2.1]"), "utf-8")
-    files = [tmp_path / "mine.toml", tmp_path / "other" / "mine.toml"]
-    assert "two tasks have the name 'mine'" in coartic("draw", *files, "--out", tmp_path / "two")[2]
     assert coartic("draw", tmp_path / "mine.toml", "--out", tmp_path / "own.svg")[0] == 0
 
 
@@ -351,9 +320,6 @@ def test_a_task_of_a_small_radius_passes_every_door(coartic, tmp_path):
     ):
         assert coartic(*command)[0] == 0, command
     assert (load(out).runs.status == "ok").all()
-    env = TaskEnv(task)
-    env.reset(seed=0)
-    assert env.step(env.action_space.sample())[1] < 0
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from functools import partial
 from inspect import getmembers, isfunction
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import coartic
@@ -15,21 +14,17 @@ from coartic import (
     Movement,
     Robot,
     Task,
-    analysis,
     correct,
     corrective_trial,
     load_task,
-    trajectory,
 )
 from coartic.analysis import interval, mean
-from coartic.analysis.signatures import Solutions
 from coartic.analysis.statistics import holm
 from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import run_suite
 from coartic.method import Information, Session
-from coartic.motion.trial import reach_goals
-from coartic.tasks.families import instance_names, read_family
+from coartic.tasks.families import read_family
 from coartic.tasks.task import TASK_FOLDER
 from tests.support.bad_inputs import GOOD
 from tests.support.strategies import make_trials
@@ -139,31 +134,14 @@ def test_an_argument(wrong, words, tmp_path, monkeypatch):
 
 
 MASKED = np.ma.array(np.zeros(10), mask=[False] * 9 + [True])
-Trials = coartic.Optimiser.Parameters
 TASK, ROBOT = load_task("ascending"), Robot()
 TRIAL = corrective_trial(TASK, "RRR")
-PATH = trajectory(TASK, TRIAL.movements)
-SOLUTIONS = Solutions(TASK, "x", (TRIAL, TRIAL))
 SESSION = Session(TASK, 0, frozenset(Information), model=PAPER)
-GROUPS = [np.eye(3, 10), np.eye(4, 10)]
-FRAME = pd.DataFrame({"method": "a", "task": "t", "reward": [-300.0], "best_known": -292,
-                      "run": 0, "trials": 5})  # fmt: skip
 USUAL = {
     "task": TASK, "robot": ROBOT, "q": TASK.q0, "target": TASK.q0, "hand": "right",
-    "goal": (3.0, 2.0), "hands": "RRR", "radius": 0.1, "left_links": (0.5, 0.5),
-    "right_links": (0.5, 0.5), "solution": TRIAL.movements, "movements": TRIAL.movements,
-    "condition": "EC1", "seed": 0, "seeds": [0], "trials": 3, "jobs": 1, "half_width": 1.0,
-    "budget": 5, "runs": SOLUTIONS, "name_or_path": "ascending", "family": "long/v1",
-    "split": "test", "count": 2, "year": None, "content": {"goals": [[3.0, 2.0]]}, "source": "x",
-    "reach": True, "width": 200, "replace": True, "frame": FRAME, "hits": FRAME, "by": ["method"],
-    "columns": ["reward"], "values": [1.0, 2.0, 3.0], "resamples": 99, "bound": 0.0, "value": 1.5,
-    "digits": 2, "row": {"a": 1.0, "a_low": 0.0, "a_high": 2.0}, "column": "a", "scale": 1.0,
-    "unit": "",
-    "scores": {"a": [np.array([1.0, 2.0])]}, "method": GROUPS, "other": GROUPS,
-    "rng": np.random.default_rng(0), "alternative": "less", "p_values": [0.1, 0.2],
-    "total": 5, "share": 0.5, "folder": "nowhere", "ticks_per_unit": 1.0,
-    "difference": np.ones(10), "jacobian": ROBOT.jacobian(TASK.q0, "right"),
-    "rewards": [-300.0, None], "locked_base": ["y"],
+    "goal": (3.0, 2.0), "hands": "RRR", "radius": 0.1, "solution": TRIAL.movements,
+    "movements": TRIAL.movements, "condition": "EC1", "seed": 0, "seeds": [0], "trials": 3,
+    "jobs": 1, "half_width": 1.0, "budget": 5, "name_or_path": "ascending",
 }  # fmt: skip
 """Arguments by the names of parameters, for all functions that take no others of these names."""
 
@@ -177,34 +155,26 @@ def with_arguments(function, **own):
 RIGHT = {"hands": ["right"]}
 OWN = {
     "movements_of": {"targets": TRIAL.configurations},
-    "ecdf": {"targets": [0.1]},
     "execute_noisy": {"solutions": [TRIAL.movements], "motor_noise": 0.01, "repeats": 2,
                       "seed": [0], "signal_dependent": False},
     "hand_sequences": RIGHT,
     "initial_hands": RIGHT,
-    "read_hits": {"path": "nowhere.csv"},
 }  # fmt: skip
-PUBLIC = {name: each for package in (coartic, analysis)
-          for name, each in getmembers(package, isfunction)
-          if name in package.__all__}  # fmt: skip
 CALLS = (
-    *(with_arguments(call, **OWN.get(name, {})) for name, call in PUBLIC.items()),
+    *(with_arguments(call, **OWN.get(name, {})) for name, call in getmembers(coartic, isfunction)),
     *map(with_arguments, (
-        Robot, ROBOT.forward_kinematics, ROBOT.jacobian, ROBOT.base_outline, ROBOT.arm,
-        ROBOT.joints, ROBOT.reach, ROBOT.joint_positions, ROBOT.linearised, PATH.hand_path,
-        instance_names, SESSION.trial,
+        ROBOT.forward_kinematics, ROBOT.jacobian, ROBOT.base_outline, ROBOT.joint_positions,
+        ROBOT.linearised,
     )),
     with_arguments(Task, goals=[(3.0, 2.0)], locked_base=["y"], **RIGHT),
     with_arguments(plan_suite, suite="quick", tasks=["ascending"], methods=["EC1"], runs=1,
                    seed=0, trials=5, time_limit_s=1.0, trial_budget=5),
-    with_arguments(PATH.animate, path=".gif"),
-    with_arguments(reach_goals, q=[TASK.q0], hands=[1], goals=[(3.0, 2.0)], targets=None,
-                   checks=True, locked_base=(), model=PAPER),
+    (interval, {"row": {"a": 1.0, "a_low": 0.0, "a_high": 2.0}, "column": "a", "scale": 1.0}),
     with_arguments(SESSION.correct, goal=1),
     with_arguments(SESSION.spend, solver_iterations=1),
     with_arguments(SESSION.trials, targets=TRIAL.configurations[None], until=None),
-    with_arguments(SESSION.find_initial_hands, **RIGHT),
 )  # fmt: skip
+"""Of functions whose decorator checks arguments one stands for all."""
 
 
 @pytest.mark.parametrize(("call", "usual"), CALLS)
