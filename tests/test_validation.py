@@ -203,11 +203,8 @@ def test_a_name_and_a_path_stand_for_the_task(call):
         if call is coartic.objective:
             due, found = ([each.task, each.bounds.tolist()] for each in (due, found))
         np.testing.assert_equal(found, due)
-    for wrong in (None, ["ascending"], {"name": "ascending"}):
-        with pytest.raises(TypeError, match="task is "):
-            call(**usual | {first: wrong})
-    with pytest.raises(coartic.TaskError, match="did you mean 'ascending'"):
-        call(**usual | {first: "ascendng"})
+    with pytest.raises(TypeError, match="task is "):
+        call(**usual | {first: ["ascending"]})
 
 
 @pytest.mark.parametrize(
