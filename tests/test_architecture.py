@@ -1,13 +1,14 @@
 """Imports point one way only, kinematics has one home, and studies use the public interface."""
 
 import ast
-import graphlib
 import re
 import sys
 from functools import cache
+from pkgutil import iter_modules
 
 import pytest
 
+import coartic
 from tests.support.processes import ROOT, python
 
 PACKAGES = ("coartic", "baselines", "benchmarks", "analysis")
@@ -68,47 +69,8 @@ def test_imports_point_one_way():
             assert not any(name.startswith("coartic.cli") for name in imported(path)), path
 
 
-def module_of(path):
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    parts = parts if parts[0] == "coartic" else ("coartic", *parts)
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def statements(tree):
-    """All of a tree that is run at some time."""
-    for node in ast.iter_child_nodes(tree):
-        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
-            yield node
-            yield from statements(node)
-
-
-def test_no_imports_go_round_in_circles():
-    modules = {module_of(path): path for path in sources()}
-    imports = {}
-    for module, path in modules.items():
-        names = names_in(statements(tree_of(path)))
-        homes = {name if name in modules else name.rpartition(".")[0] for name in names}
-        imports[module] = homes & {*modules} - {module}
-    try:
-        graphlib.TopologicalSorter(imports).prepare()
-    except graphlib.CycleError as error:
-        raise AssertionError(" <- ".join(error.args[1])) from None
-
-
-def test_studies_import_documented_modules():
-    """Or packages above them: what a reference page does not have may change."""
-    pages = [*(ROOT / "docs" / "reference" / "python").glob("*.md")]
-    documented = re.findall(r"automodule:: (\S+)", "".join(page.read_text() for page in pages))
-    paths = sorted((ROOT / "studies").rglob("*.py"))
-    used = {name for path in paths for name in imported(path) if package_of(name) in PACKAGES}
-    assert len(used) > 30
-    for name in used:
-        module = name.rpartition(".")[0] or name
-        assert any(f"{each}.".startswith((f"{name}.", f"{module}.")) for each in documented), name
-
-
 FRESH = """
-import importlib.util, sys
+import sys
 import coartic
 def absent(*names):
     there = set(names) & set(sys.modules)
@@ -129,15 +91,6 @@ import coartic.benchmarks.pool
 assert load_method("coartic.learner.method", "dual-process/EC1").name == "dual-process/EC1"
 absent("casadi", "pandas", "coartic.benchmarks.runner")
 end("list")
-if importlib.util.find_spec("gymnasium"):
-    import coartic.gym
-absent("numba", "matplotlib", "torch")
-import coartic.analysis.report.build
-absent("scipy.stats")  # before an interval is asked for
-from coartic import *
-from pkgutil import iter_modules
-modules = {module.name for module in iter_modules(coartic.__path__)}
-assert not modules & set(coartic.__all__), "a module would hide what has its name"
 """
 
 
@@ -146,6 +99,11 @@ def test_the_package_imports_what_is_asked_for():
     said = python("-c", FRESH).stdout
     assert "verify" in said
     assert "dual-process/" in said
+
+
+def test_no_module_has_a_name_of_the_package():
+    """It would hide what has its name."""
+    assert not {module.name for module in iter_modules(coartic.__path__)} & {*coartic.__all__}
 
 
 def test_one_kinematic_module():

@@ -28,29 +28,18 @@ def plain(text):
     return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
 
 
-def surnames(key):
-    return {name.partition(",")[0] for name in plain(BIB[key]["author"]).split(" and ")}
-
-
 def keys_in(text):
     return re.findall(r"^@\w+\{([^,]+),", text, re.MULTILINE)
 
 
 @pytest.mark.parametrize("method", BUILT_IN, ids=lambda method: method.name)
 def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
-    lacking = f"{method.name} has no row in analysis/methods.toml: give it one, at its place"
-    assert method.name in KNOWN_METHODS, lacking
+    """First authors and years."""
     keys, text = KNOWN_METHODS[method.name].works, plain(method.citation)
-    if not keys:
-        assert text.startswith("This package")
-    named = set(re.findall(r"(?:[A-Z]\.-?)+(?: [A-Z]\.)* ([A-Z][\w-]+)", text))
-    assert named <= set().union(*(surnames(key) for key in keys))
+    assert keys or text.startswith("This package")
     assert set(re.findall(r"\((\d{4})\)", text)) == {BIB[key]["year"] for key in keys}
     for key in keys:
-        # A multi-author work may be named in short; its first author is always named.
         assert plain(BIB[key]["author"]).partition(",")[0] in text
-        title = re.sub("[{}]", "", plain(BIB[key]["title"])).lower().split(":")[0]
-        assert title in text.lower() or key in ("kanoun2011", THE_PAPER)
 
 
 def test_every_method_has_a_row_and_every_entry_is_used():

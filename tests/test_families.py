@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coartic import TaskError, corrective_trial, load_task, objective
+from coartic import TaskError, corrective_trial, load_task
 from coartic.benchmarks.runner import run_suite
 from coartic.internal.limits import MOST_CELLS
 from coartic.tasks import families
@@ -141,7 +141,6 @@ def test_splits_share_no_instance():
         ("long/v1/i003..i001", "goes backwards"),
         (f"long/v1/i000..i{MOST_CELLS}", "names more than 10,000 instances"),
         ("long/v1/i000..d003", "is not a range of instances"),
-        ("long/v1/i000..", "is not a range of instances"),
     ],
 )
 def test_ranges(text, words):
@@ -170,7 +169,6 @@ def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic,
     assert task.goals != load_task("two-armed/v1/i001").goals  # numbers come from its name
     with pytest.raises(TaskError, match="rename the file"):
         run_suite("quick", "out", family_files=[FAMILY_FOLDER / "one-armed.v1.toml"])
-    assert objective(f"{path}/i001").task == task
     assert named_by(f"{path}/i000..i001") == [f"{path}/i000", f"{path}/i001"]
     for name in (path, Path(path)):
         with pytest.raises(TaskError, match="is a family: name an instance, such as .*toml/i000"):
@@ -178,9 +176,3 @@ def test_a_family_of_a_file_is_named_by_its_path(tmp_path, monkeypatch, coartic,
     asked = ("--tasks", f"{path}/i000..i001", "--methods", "EC4", "--runs", 1, "--trials", 5)
     code, text, _ = coartic("run", "paper", *asked, "--out", "out")
     assert (code, text[:5]) == (0, "2 run")
-    for short, words in (
-        ("i0", "three digits: .*/i000"),
-        ("x000", "is not an instance of a family"),
-    ):
-        with pytest.raises(TaskError, match=words):
-            load_task(f"{path}/{short}")

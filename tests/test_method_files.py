@@ -43,9 +43,7 @@ import signal; signal.signal(signal.SIGINT, signal.SIG_DFL)
 AT_IMPORT = {
     HARMLESS: "",
     "class Odd(BaseException): pass\nraise Odd('odd')": "cannot be imported: Odd: odd",
-    "sys.exit(0)": "cannot be imported: SystemExit: 0",
     "os.kill(os.getpid(), 9)": "the process that reads it ended: SIGKILL ended it",
-    "def f(): f()\nf()": "cannot be imported: RecursionError",
     f"{TEXT}\nclass Data(NearestHand): name, files = 'data', ['w.npy']": "w.npy cannot be read: ",
     f"{TEXT}\nclass Twice(NearestHand): pass": "'nearest-hand' exists already",
 }

@@ -3,7 +3,7 @@
 import pytest
 
 from coartic.analysis.study import load
-from coartic.benchmarks.registry import built_in, registry
+from coartic.benchmarks.registry import registry
 
 METHOD = """
 import numpy as np
@@ -139,23 +139,3 @@ def test_runs_with_another_version_of_an_imported_package_are_marked(coartic, tm
     ]
     assert study.methods.title["mine"] == "Mine ‡"
     assert not any(each.startswith("json") for each in study.imports["mine"])
-
-
-def test_words_in_built_in_code_count_nowhere():
-    """A built-in method is known by its versions alone, and they are stated."""
-    assert {info.code for info in built_in().values()} == {"1.1", "1.2"}
-    assert all(isinstance(info.load().version, int) for info in built_in().values())
-
-
-@pytest.mark.process
-def test_a_file_that_imports_no_package_is_ranked(coartic, tmp_path):
-    (tmp_path / "bare.py").write_text(
-        "from coartic import Optimiser\n\n\nclass Bare(Optimiser):\n"
-        "    name, title, citation = 'bare', 'Bare', 'Ours.'\n\n"
-        "    def optimise(self, objective, rng):\n        objective(objective.x0)\n"
-    )
-    of_suite = ("run", "paper", "--tasks", "ascending", "--methods", "bare", "--runs", 1)
-    own = ("--trials", 5, "--method-file", tmp_path / "bare.py", "--out", tmp_path / "out")
-    status, text, error = coartic(*of_suite, *own)
-    assert (status, load(tmp_path / "out").imports) == (0, {}), error
-    assert "bare: Bare" in text

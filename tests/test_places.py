@@ -1,16 +1,21 @@
 """Places that may not be read or written, or that cannot be: each command says a sentence."""
 
-import json
+import contextlib
+import ctypes
+import io
 import os
 import shutil
-import subprocess
 import sys
 
 import pytest
+from typer.main import get_command
 
+from coartic import cli
+from coartic.analysis.figures import plot
 from coartic.runs import store
 from tests.support.bad_inputs import GOOD
-from tests.support.suites import ROOT, paper_cells, run_and_write
+from tests.support.processes import apart
+from tests.support.suites import paper_cells, run_and_write
 
 LONG = "/".join(["long" * 30] * 5)  # SQLite takes no path of more than 512 letters
 COMMANDS = {
@@ -36,35 +41,32 @@ PLACES = {
     "missing": (*READ, "draw"),
 }
 """Places, and the commands that cannot use them."""
-CALL = """
-import contextlib, io, json, os, sys
-from typer.main import get_command
-from coartic import cli
-from coartic.analysis.figures import plot
-plot.picture = lambda *_: b""  # takes long
-cli.app = get_command(cli.app)  # put together once
-said = {}
-for key, words in json.load(sys.stdin).items():
-    out, sys.argv = io.StringIO(), ["coartic", *words]
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
-        try:
-            code = cli.main() or 0
-        except SystemExit as stop:
-            code = stop.code or 0
-        except BaseException as error:
-            code = repr(error)
-    said[key] = code, out.getvalue()
-json.dump(said, sys.stdout)
-"""
 
 
-def without_rights():
-    """A command that takes root's rights over files away, empty if there are none."""
-    if os.geteuid():
-        return []
-    if not shutil.which("setpriv"):
-        pytest.skip("root may read and write everything")
-    return ["setpriv", "--bounding-set=-dac_override,-dac_read_search", "--inh-caps=-all"]
+def give_up_rights():
+    """Root may read and write everything: give that up, which no process gets back."""
+    if not os.geteuid():
+        version_3, nothing = (ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 * 6)()
+        assert ctypes.CDLL(None).capset(version_3, nothing) == 0
+
+
+def answers(here, calls):
+    """What commands say in a process of their own: exit code and output, by key."""
+    os.chdir(here)
+    give_up_rights()
+    cli.app, plot.picture = get_command(cli.app), lambda *_: b""  # put together once; takes long
+    said = {}
+    for key, words in calls.items():
+        out, sys.argv = io.StringIO(), ["coartic", *words]
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+            try:
+                code = cli.main() or 0
+            except SystemExit as stop:
+                code = stop.code or 0
+            except BaseException as error:
+                code = repr(error)
+        said[key] = code, out.getvalue()
+    return said
 
 
 @pytest.fixture(scope="module")
@@ -93,15 +95,10 @@ def said(tmp_path_factory):
         for place, chosen in PLACES.items()
         for command in chosen
     }
-    done = subprocess.run(
-        [*without_rights(), sys.executable, "-c", CALL], cwd=here, input=json.dumps(calls),
-        capture_output=True, text=True, check=False,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+    said = apart(answers, here, calls)
     for path in (here / "over", here / "locked", here / "closed", here / "empty"):
         path.chmod(0o755)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return said
 
 
 @pytest.mark.process

@@ -117,17 +117,11 @@ def test_a_trial_budget_limits_the_trials_that_are_asked_for(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (
-            {"methods": ["corrective-alone/given"], "trials": 5},
-            "trials has no effect",
-        ),
         ({"methods": ["corrective-alone/given"], "runs": 2}, "runs has no effect"),
-        ({"methods": ["EC1", "EC4"]}, "EC4 uses the left and right hand"),
         (
             {"methods": ["EC4"], "tasks": ["ascending", "two-armed-1"]},
             "no method runs on task 'ascending': EC4 uses the left",
         ),
-        ({"runs": range(3, 3)}, r"runs is range\(3, 3\); it must be .*, or a range, such as"),
         ({"runs": range(0, 9, 2)}, r"runs is range\(0, 9, 2\); it must be"),
         ({"runs": range(-1, 9)}, "its first run is -1"),
     ],

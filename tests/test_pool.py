@@ -200,19 +200,6 @@ def test_the_last_words_of_a_run_are_kept(tmp_path):
     assert runs.reason[2].endswith("exit code 3): one | two | the end")
 
 
-def test_a_working_folder_that_is_gone(tmp_path, monkeypatch):
-    (tmp_path / "gone").mkdir()
-    monkeypatch.chdir(tmp_path / "gone")
-    (tmp_path / "gone").rmdir()
-    with pytest.raises(CoarticError, match="mine.py: a process .* cannot start .*No such file"):
-        entries(tmp_path, honest="pass")
-    with pytest.raises(
-        CoarticError, match="cannot start .*No such file.* Finished runs are stored"
-    ):
-        list(Local(1).perform(PLAN))
-    monkeypatch.chdir(tmp_path)
-
-
 def test_jobs_of_many_methods_are_at_work_side_by_side(tmp_path):
     """Each waits until the other has begun; two processes at once are all that there are."""
     body = """open(__file__ + "." + self.name[5:], "w").close()

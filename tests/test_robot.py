@@ -51,16 +51,6 @@ def test_the_jerk_of_a_hand_is_its_third_derivative(hand):
     np.testing.assert_allclose(np.array(casadi.evalf(jerk)), np.array(due), rtol=1e-10)
 
 
-def test_base_outline():
-    outline = PAPER_ROBOT.base_outline(np.array([1.0, 2.0, *np.zeros(8)]))
-    np.testing.assert_allclose(outline, [[0.5, 1.9], [1.5, 1.9], [1.5, 2.1], [0.5, 2.1]])
-    # The shoulders sit on its top corners.
-    q = np.zeros(10)
-    np.testing.assert_allclose(
-        PAPER_ROBOT.base_outline(q)[2], PAPER_ROBOT.joint_positions(q, "right")[0]
-    )
-
-
 def test_names_and_shapes():
     assert UNEVEN.joint_names == (
         *("base_x", "base_y", "left_1"),

@@ -16,7 +16,6 @@ from coartic import (
     learn,
     load_task,
     movements_of,
-    trajectory,
 )
 from coartic.runs.record import MOST_STEPS, execute_all
 from tests.support.strategies import make_trials, posture, tiny_task
@@ -46,15 +45,12 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
     ("movements", "words"),
     [
         (planned(posture(1.0)), "movements for goals [1]; it must"),
-        (planned([0.0] * 9, posture(1.0)), "goal 1: configuration has shape (9,)"),
         (
             planned(posture(0.0, 1.0), posture(1.0)),
             "goal 1: a target moves the base in y, which is locked, by 1: entry 1 must be 0",
         ),
         (planned(posture(1.0), posture(2.0), hand="left"), "has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
-        ([Movement(1, "right", "jump", np.zeros(10))], "kind of a movement is 'jump'"),
-        ([Movement(1, "right", "path", waypoints=WAY * np.nan)], "is not finite"),
         ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "or its last waypoint"),
     ],
 )
@@ -100,14 +96,9 @@ def test_equal_contents_are_equal_before_and_after_use():
         for _ in "ab"
     ]
     (task, execution, run), others = made
-    path = trajectory(task, execution.movements)
     assert (others[0].q0.shape, others[0].goal_array.shape) == ((10,), (2, 2))  # kept by one alone
     assert (task, execution, run) == others
-    assert path == trajectory(others[0], others[1].movements)
-    assert execution.movements == others[1].movements
     moved = replace(execution.movements[0], target=execution.movements[0].target + 1e-12)
     assert moved != execution.movements[0]
-    assert moved != replace(moved, target=None)
-    assert moved != "a movement"
     assert run != learn("ascending", CONDITIONS["EC1"], seed=1, trials=5)
     assert task != tiny_task(radius=0.2)

@@ -144,7 +144,7 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
         assert store.runs().commit.tolist() == ["c0de+"]
 
 
-MANY = {"runs": 30, "trials": 30}
+MANY = {"runs": 10, "trials": 30}
 SEARCH = cell_on(NEAR, KNOWN["optimum/search"], graphs=1, chains=1, nodes=60)
 SEARCHED = [SEARCH, *paper_cells()]
 
@@ -176,8 +176,8 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
 
     chance, there, folder = random.Random(3), [0], tmp_path / "killed"
     for _ in range(3):
-        enough = chance.randrange(1, 24)
-        process, done = started(perform_until_killed, folder, enough + 60)
+        enough = chance.randrange(1, 16)
+        process, done = started(perform_until_killed, folder, enough + 20)
         while done.recv() < enough:
             pass
         time.sleep(chance.uniform(0, 0.05))
@@ -187,9 +187,9 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
             assert plain_sql.execute("PRAGMA integrity_check").fetchone() == ("ok",)
             there += plain_sql.execute("SELECT count(*) FROM results").fetchone()
     assert there == sorted(there)
-    assert 0 < there[-1] < 211
+    assert 0 < there[-1] < 71
     resumed = run_and_write(folder, SEARCHED, executor=Counts(), **MANY)
-    assert len(begun) == 211 - there[-1]
+    assert len(begun) == 71 - there[-1]
     assert "optimum/search" not in begun
     same_results(resumed, whole)
 
@@ -233,13 +233,7 @@ def replace_by_a_copy(folder):
     folder.with_name("copy").rename(folder)
 
 
-@pytest.mark.parametrize(
-    "lose",
-    [
-        shutil.rmtree,
-        replace_by_a_copy,
-    ],
-)
+@pytest.mark.parametrize("lose", [shutil.rmtree, replace_by_a_copy])
 def test_a_folder_that_is_lost_during_a_run_ends_it_with_a_sentence(tmp_path, lose):
     def watch(progress, _):
         if progress.done == 8:
@@ -310,8 +304,8 @@ def test_what_is_no_results_folder_is_left_alone(copied, tmp_path, spoil, words)
 
 @pytest.mark.parametrize(
     "statement",
-    ["ANALYZE", "VACUUM", "CREATE INDEX i ON results (reward)", "CREATE VIEW mine AS SELECT 1"],
-)  # fmt: skip
+    ["VACUUM", "CREATE VIEW mine AS SELECT 1"],
+)
 def test_what_other_programs_add_does_no_harm(copied, undisturbed, tmp_path, statement):
     with closing(sqlite3.connect(copied, isolation_level=None)) as db:
         db.execute(statement)
@@ -345,13 +339,11 @@ def rewritten(*place):
 @pytest.mark.parametrize(
     "change",
     [
-        "cells SET content = '{'",
         "cells SET content = json_set(content, '$.task.radius', 0.2)",
         "suite SET content = 'x'",
         "results SET movements = '{'",
         "results SET rewards = substr(rewards, 1, 9)",
         rewritten(4, 6, 0.1),
-        rewritten(1, "both"),
         rewritten(2, "path"),
     ],
 )

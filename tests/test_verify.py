@@ -149,7 +149,7 @@ def test_it_stands_on_its_own():
     assert roots <= {"numpy", *sys.stdlib_module_names}
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(
     seed=st.integers(0, 2**32),
     hand=st.sampled_from(HANDS),

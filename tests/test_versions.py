@@ -9,7 +9,6 @@ from pydantic import create_model
 from coartic import CoarticError, execute, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.include import include_folders
-from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import compare_runs, perform_runs_again
 from coartic.benchmarks.runner import perform
@@ -17,9 +16,6 @@ from coartic.method import run_method
 from coartic.runs.method_info import BUILT_IN, answer, method_info
 from coartic.runs.plan import Cell, cell_of
 from coartic.runs.record import PARTS
-from coartic.runs.shipped import open_shipped
-from coartic.runs.store import open_store
-from tests.support.processes import python
 from tests.support.suites import InProcess, cell_on, planned, run_and_write
 
 TASK = load_task("two-armed-2")
@@ -60,19 +56,6 @@ def test_runs_of_another_version_are_included_as_they_are_or_not_at_all(old, tmp
         include_folders(asked(4), [old], tmp_path / "more")
 
 
-def runs_of(folder):
-    """The stored runs of a folder, by id."""
-    with open_store(folder) as store:
-        return [store.run(run_id) for run_id in sorted(store.ids())]
-
-
-def test_ids_are_those_of_the_shipped_runs():
-    with open_shipped("comparison") as store:
-        shipped = store.plan()
-    planned_now = {job.cell.digest for job in plan_suite("comparison")}
-    assert planned_now == {job.cell.digest for job in shipped}
-
-
 def digests(method, **parameters):
     """What cells of a class of methods are known by."""
     info = method_info(method, BUILT_IN, method.__module__, "1.1")
@@ -99,33 +82,36 @@ def built_in_digest(name):
     return cell_of(TASK, info, {}).digest
 
 
-SLOW = {"receding-horizon", "optimum/search"}
-"""Methods whose cheapest shipped run takes seconds, and which have exact tests of their own."""
 RUNS = {
-    "dual-process/EC1-uncorrected": (-357, "RRRR", 384_054),
-    "dual-process/EC4-uncorrected": (-357, "RRRR", 406_895),
-    "dual-process/custom": (-357, "RRRR", 821_009),
+    "dual-process/EC1-uncorrected": ("two-armed-2", -357, "RRRR", 384_054),
+    "dual-process/EC4-uncorrected": ("two-armed-2", -357, "RRRR", 406_895),
+    "dual-process/custom": ("two-armed-2", -357, "RRRR", 821_009),
+    "trajectory-optimisation/path-length": ("descending", -304, "RRR", 306),
+    "trajectory-optimisation/squared-displacement": ("ascending", -298, "RRR", 94),
+    "trajectory-optimisation/acceleration": ("descending", -319, "RRR", 128),
+    "trajectory-optimisation/jerk": ("ascending", -323, "RRR", 23),
+    "trajectory-optimisation/hand-jerk": ("descending", -409, "RRR", 44),
+    "receding-horizon": ("ascending", -299, "RRR", 74),
+    "optimum/search": ("ascending", -292, "RRR", 46),
 }
-"""Reward, hands and control ticks of all trials of methods without a shipped run, on two-armed 2
-with seed 1 and 2,000 trials."""
+"""Task, reward, hands, and control ticks of all trials or iterations of the solver, of methods
+without a shipped run, with seed 1 and 2,000 trials; and of planners whose cheapest shipped run
+takes seconds, with the parameters of a quick check."""
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_a_method_without_a_shipped_run_has_a_short_one(name):
-    info = built_in()[name]
+def test_a_method_without_a_quick_shipped_run_has_a_short_one(name):
+    info, (task, *due) = built_in()[name], RUNS[name]
     trials = {"trials": 2000} if "trials" in info.defaults else {}
-    result, session = run_method(info.configure(trials), TASK, seed=1)
-    due = execute(TASK, result.solution)
-    assert (due.reward, due.hands, session.meter.movement_ticks) == RUNS[name]
-
-
-@pytest.fixture(scope="module")
-def runs():
-    return check_shipped.shipped_runs()
+    parameters = info.configure(trials | info.load().quick)
+    result, session = run_method(parameters, load_task(task), seed=1)
+    execution, meter = execute(task, result.solution), session.meter
+    effort = meter.movement_ticks or meter.solver_iterations
+    assert [execution.reward, execution.hands, effort] == due
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_a_shipped_run_of_each_built_in_method_comes_back(runs, monkeypatch):
+def test_a_shipped_run_of_each_other_built_in_method_comes_back(monkeypatch):
     """To the tick and the hand, with rewards of all trials and all counts: this, not the text of
     the code, is what makes the numbers safe. Targets may differ in bits on other processors."""
     found = []
@@ -136,28 +122,10 @@ def test_a_shipped_run_of_each_built_in_method_comes_back(runs, monkeypatch):
             found.extend(each for each in words if not each.startswith(("details", *PARTS)))
             yield run, again
 
+    monkeypatch.setattr(check_shipped, "shipped_hashes", lambda: ["comparison"])
     monkeypatch.setattr(check_shipped, "perform_runs_again", watched)
+    runs = check_shipped.shipped_runs()
     assert {*runs.method} | {*RUNS} == {*built_in()}
-    rows = runs[runs.is_current & ~runs.method.isin(SLOW)].groupby("method", sort=False).head(1)
-    assert len(rows) >= 0.75 * runs.method.nunique()
+    rows = runs[runs.is_current & ~runs.method.isin({*RUNS})].groupby("method").head(1)
+    assert len(rows) >= 0.75 * (len(built_in()) - len(RUNS))
     assert [*check_shipped.differences(rows), *found] == []
-
-
-@pytest.mark.process
-def test_workers_round_alike_whatever_the_environment_says(tmp_path):
-    """The environment of these tests is that of workers (tests/conftest.py): this process rounds as
-    they should, and a command in another environment is a process of its own."""
-    solvers = ["cma-es/bandit", "posture-qp/current-goal"]
-    methods = ",".join(solvers)
-    plan = plan_suite("comparison", tasks=["descending"], methods=solvers, runs=1, trials=100)
-    perform(plan, tmp_path / "here", executor=InProcess())
-    python(
-        "-m", "coartic", "run", "comparison", "--tasks", "descending", "--methods", methods,
-        "--runs", "1", "--trials", "100", "--jobs", "1", "--out", str(tmp_path / "there"),
-        OPENBLAS_CORETYPE="Haswell", NPY_DISABLE_CPU_FEATURES="",
-    )  # fmt: skip
-    here, there = (runs_of(tmp_path / name) for name in ("here", "there"))
-    assert len(here) == 2
-    assert [run.id for run in here] == [run.id for run in there]
-    assert [run.result for run in here] == [run.result for run in there]
-    assert len({run.outcome.environment["arithmetic"] for run in (*here, *there)}) == 1

@@ -176,10 +176,3 @@ class Draws(Lucky):
 
     name = "test/draws"
     stochastic = True
-
-
-class Undrawn(Good):
-    """Is declared stochastic, but no seed changes it."""
-
-    name = "test/undrawn"
-    stochastic = True
