@@ -17,7 +17,7 @@ from coartic.analysis.study import load
 from coartic.benchmarks import template
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import suites
-from coartic.cli import completion
+from coartic.cli import COMMANDS, completion
 from coartic.cli.arguments import methods_meant
 from coartic.cli.terminal import say
 from coartic.pictures import film
@@ -263,6 +263,23 @@ def test_settings_of_matplotlib_and_numba_in_a_folder_are_not_read(tmp_path):
     command = ("-W", "error", "-c", SETTINGS, "--version")
     done = python(*command, cwd=tmp_path, NUMBA_CACHE_DIR="/ours")
     assert done.stdout.splitlines()[-1] == "False /ours 0"
+
+
+@pytest.mark.parametrize(("command", "example"), COMMANDS)
+def test_examples_have_options_that_there_are(commands, command, example):
+    name = command.__name__.removesuffix("_")
+    options = {opt for parameter in commands.commands[name].params for opt in parameter.opts}
+    assert {word for word in example.split() if word.startswith("--")} <= options
+
+
+def test_lines_of_the_help_are_whole_sentences(coartic, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    names = [command.__name__.removesuffix("_") for command, _ in COMMANDS]
+    for arguments in (["--help"], *([name, "--help"] for name in names)):
+        code, text, _ = coartic(*arguments)
+        lines = [line for line in text.splitlines() if not line.startswith("Usage:")]
+        assert (code, [line for line in lines if line.endswith(("...", "…"))]) == (0, [])
+        assert max(map(len, lines)) <= 80
 
 
 COMPLETED = """if True:
