@@ -1,0 +1,33 @@
+"""Shared by the tests of study replication."""
+
+import pytest
+
+from coartic import load_task
+from tests.support.processes import programs
+from tests.support.suites import KNOWN, InProcess, cell_on, run_and_write
+
+(STUDY,) = programs("replication", "study")
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory):
+    """The paper's cells as far as its claims need them, with random search."""
+    methods = {
+        "ascending": ["dual-process/EC1", "dual-process/EC1-subtask", "random-search"],
+        "descending": ["dual-process/EC1", "dual-process/EC1-subtask", "random-search"],
+        "two-armed-1": ["dual-process/EC2", "dual-process/EC3", "dual-process/EC4"],
+        "two-armed-2": ["dual-process/EC3", "dual-process/EC4"],
+    }
+    cells = [cell_on(load_task(task), KNOWN[name]) for task in methods for name in methods[task]]
+    folder = tmp_path_factory.mktemp("replication")
+    study = run_and_write(folder, cells, runs=5, trials=150, executor=InProcess())
+    study.runs["trials"] = study.runs.trials.replace(150, 10_000)  # as long as the paper's
+    return study
+
+
+@pytest.fixture(scope="session")
+def tables(study):
+    """Tables of these runs by name."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(STUDY, "load", lambda _: study)
+        return STUDY.measure([study.folder])
