@@ -127,10 +127,10 @@ PLANS = ("path-length", "squared-displacement", "acceleration", "jerk")
 
 
 def next_to_plans(**of_plans):
-    """The learner near -300 and plans at -300, or at the reward by cost, everywhere."""
+    """The learner just above -300 and plans at -300, or at the reward by cost, everywhere."""
     rows = []
     for task, condition in BEST:
-        rows += learner(task, condition, [-301, -300, -299, -300, -301, -299])
+        rows += learner(task, condition, [-301, -300, -299, -300, -301, -298])
         for cost in PLANS:
             planned = of_plans.get(cost.replace("-", "_"), -300)
             rows.append(row(f"trajectory-optimisation/{cost}", planned, task=task, trials=0))
