@@ -1,5 +1,7 @@
 """The rules of study noise on planted differences, and its executions of a small folder."""
 
+from itertools import product
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -166,22 +168,16 @@ def test_postures_and_centres_are_aimed_at():
     assert np.isnan(PROTOCOLS.off_centre(task, solution))
 
 
-def straight_rows(saved, cost=20.0):
+def straight_rows(saved, cost):
     """Executions of a method that aims, for which the centre saves a share of the cost of noise."""
-    rows, rng = [], np.random.default_rng(1)
-    for family in PROTOCOLS.FAMILIES:
-        for number in range(8):
-            for target in "TPC":
-                for level in (0.0, 0.01):
-                    saving = saved if target == "C" else 0.0
-                    ticks = 300 + 40 * number + (level > 0) * cost * (1 - saving)
-                    rows.append({
-                        "run_id": f"{family}{number}", "motor_noise": level, "target": target,
-                        "ticks": ticks + rng.normal(), "failures": 0, "off": 0.97,
-                        "task": f"{family}/v1/i{number:03d}", "method": "cma-es/bandit",
-                        "setting": np.nan,
-                    })  # fmt: skip
-    return pd.DataFrame(rows)
+    every = product(PROTOCOLS.FAMILIES, range(8), "TPC", (0.0, 0.01))
+    rows = pd.DataFrame(every, columns=["family", "number", "target", "motor_noise"])
+    of_noise = (rows.motor_noise > 0) * cost * (1 - saved * (rows.target == "C"))
+    noise = np.random.default_rng(1).normal(size=len(rows))
+    number = rows.number.astype(str)
+    return rows.assign(ticks=300 + 40 * rows.number + of_noise + noise, failures=0, off=0.97,
+                       run_id=rows.family + number, task=rows.family + "/v1/i00" + number,
+                       method="cma-es/bandit", setting=np.nan)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -229,19 +225,17 @@ def learning_rows(gaps):
         "random-search 1000": ("stages=1000", f"sigma={noisy}, stages=1000"),
         "cma-es/in-noise": ("motor_noise=0.0", ""),
     }  # fmt: skip
-    for family in PROTOCOLS.FAMILIES:
-        for number in range(10):
-            for key, texts in settings.items():
-                for practice, text in zip((0, 1), texts, strict=True):
-                    for level in (0, 1):
-                        gap = gaps.get(LEARNING.METHODS[key], (30.0, 45.0))[level]
-                        rows.append({
-                            "run_id": f"{len(rows)}", "motor_noise": 0.01 * level, "run": 0,
-                            "ticks": 300 * (1 + gap / 100) + rng.normal() - 2 * practice * level,
-                            "action": "next action", "failures": 0, "setting": text,
-                            "task": f"{family}/v1/i{160 + number}", "best_known": -250,
-                            "method": key.partition(" ")[0],
-                        })  # fmt: skip
+    for family, number, key, practice, level in product(
+        PROTOCOLS.FAMILIES, range(10), settings, (0, 1), (0, 1)
+    ):
+        gap = gaps.get(LEARNING.METHODS[key], (30.0, 45.0))[level]
+        rows.append({
+            "run_id": f"{len(rows)}", "motor_noise": 0.01 * level, "run": 0,
+            "ticks": 300 * (1 + gap / 100) + rng.normal() - 2 * practice * level,
+            "action": "next action", "failures": 0, "setting": settings[key][practice],
+            "task": f"{family}/v1/i{160 + number}", "best_known": -250,
+            "method": key.partition(" ")[0],
+        })  # fmt: skip
     return pd.DataFrame(rows)
 
 

@@ -93,8 +93,8 @@ FAILURES = (
 )
 
 
-def failing(rng, share):
-    """A class of solvers that fail in a share of their solutions, by a change of their numbers."""
+def failing(rng):
+    """A class of solvers that fail, by a change of their numbers."""
     solver, statuses = clarabel.DefaultSolver, clarabel.SolverStatus
 
     class Failing:
@@ -104,8 +104,6 @@ def failing(rng, share):
 
         def solve(self):
             right = self.solver.solve()
-            if rng.random() >= share:
-                return right
             change = FAILURES[rng.integers(len(FAILURES))]
             x, z = (change(np.array(each), rng) for each in (right.x, right.z))
             status = rng.choice([statuses.PrimalInfeasible, statuses.NumericalError])
@@ -125,7 +123,7 @@ def test_a_relaxation_never_exceeds_a_true_path(name, failure, monkeypatch):
     """
     rng, cuts = np.random.default_rng(7), []
     if failure:
-        monkeypatch.setattr(clarabel, "DefaultSolver", failing(rng, 1.0))
+        monkeypatch.setattr(clarabel, "DefaultSolver", failing(rng))
     for task, hands, q, steps in paths(name, 8):
         length = steps.sum()
         for chosen in (hands, undecided(hands, rng)):
@@ -157,13 +155,6 @@ def test_a_relaxation_never_exceeds_a_true_path(name, failure, monkeypatch):
                         box = half
     assert len(cuts) >= 8
     assert failure or any(cuts)
-
-
-def test_a_proof_with_a_solver_that_fails_is_loose(monkeypatch):
-    """The optimum is 125 ticks: no claim of more is ever proven."""
-    task, rng = load_task("two-armed/v1/i004"), np.random.default_rng(1)
-    monkeypatch.setattr(clarabel, "DefaultSolver", failing(rng, 0.3))
-    assert PROOF.certify(task, 140, 40).ticks <= 125
 
 
 def test_a_box_without_a_path_is_ruled_out():
