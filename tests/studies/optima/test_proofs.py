@@ -12,7 +12,6 @@ from scipy.spatial import KDTree
 
 from coartic import PAPER, corrective_trial, execute, load_task
 from coartic.motion.solution import Movement, hand_sequences
-from coartic.robot import directions
 from coartic.tasks.task import hands_of
 from tests.support.processes import programs
 from tests.support.strategies import (
@@ -26,19 +25,6 @@ from tests.support.strategies import (
 (PROOF,) = programs("optima", "certificate")
 RELAXED, LAGRANGIAN, SPEED = (sys.modules[n] for n in ("relaxation", "lagrangian", "speed"))
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]
-
-
-def test_offsets_are_exact_maxima():
-    rng = np.random.default_rng(6)
-    half, normals = rng.uniform(1e-6, 12.0, 20), rng.uniform(-2, 2, (20, 3))
-    offsets = [RELAXED.offset_of(*normal[:, None, None], np.array([each])).item()
-               for normal, each in zip(normals, half, strict=True)]  # fmt: skip
-    delta = np.linspace(-half, half, 4_001)
-    cosine, sine = np.moveaxis(directions(delta), -1, 0)
-    a, b, k = normals.T
-    true = (a * cosine + b * sine + k * delta).max(axis=0)
-    assert (offsets >= true - 1e-12).all()
-    assert offsets == pytest.approx(true, abs=1e-4)
 
 
 def paths(name, every):
