@@ -11,13 +11,14 @@ from tests.support.processes import ROOT, programs
 
 NAMES = "cells", "scales", "equal_gain", "study", "one_selection"
 CELLS, SCALES, EQUAL, STUDY, ONE = programs("memory", *NAMES)
+OF_OTHERS = importlib.import_module("scales")  # as the other programs import it
 STAGES = SCALES.STAGES
 
 
 @pytest.fixture(autouse=True)
 def _fewer_resamples(monkeypatch):
     """On which no mean and no verdict here depends."""
-    for module in (importlib.import_module("scales"), SCALES, ONE):
+    for module in (OF_OTHERS, SCALES, ONE):
         monkeypatch.setattr(module, "RESAMPLES", 499)
 
 

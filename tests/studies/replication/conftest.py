@@ -3,8 +3,9 @@
 import pytest
 
 from coartic import load_task
+from coartic.analysis import load
 from tests.support.processes import programs
-from tests.support.suites import KNOWN, InProcess, cell_on, run_and_write
+from tests.support.suites import KNOWN, InProcess, cell_on, made_once, run_and_write
 
 (STUDY,) = programs("replication", "study")
 
@@ -19,8 +20,11 @@ def study(tmp_path_factory):
     }
     cells = [cell_on(load_task(task), KNOWN[name]) for tasks, names in methods.items()
              for task in tasks.split() for name in names.split()]  # fmt: skip
-    folder = tmp_path_factory.mktemp("replication")
-    study = run_and_write(folder, cells, runs=5, trials=150, executor=InProcess())
+
+    def make(folder):
+        run_and_write(folder, cells, runs=5, trials=150, executor=InProcess())
+
+    study = load(made_once(tmp_path_factory, "replication", make))
     study.runs["trials"] = study.runs.trials.replace(150, 10_000)  # as long as the paper's
     return study
 
