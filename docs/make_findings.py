@@ -12,6 +12,7 @@ import argparse
 import re
 import shutil
 import tomllib
+from functools import cache
 from pathlib import Path
 from typing import Any, get_args
 
@@ -38,6 +39,7 @@ KEPT = {
 """Tables and figures of each suite's report that are stored."""
 
 
+@cache
 def table(suite: str, name: str) -> pd.DataFrame:
     """Return a stored table of a suite or a study, with its rows by name."""
     folder = STUDIES / suite if (STUDIES / suite).is_dir() else STORED / suite
@@ -114,6 +116,7 @@ def gain_of_best_hands() -> float:
     return float((-100 * share / (1 - share)).mean())
 
 
+@cache
 def early_less_late(family: str) -> dict[str, float]:
     """Return how much more 100 trials with drift gain than 10,000 trials of the paper's learner.
 

@@ -96,6 +96,12 @@ def shortest_reach(task, q, hand, goal, near):
         off = np.asarray(task.robot.forward_kinematics(reached, hand) - centre)
         return float(task.radius**2 - off @ off)
 
+    def slope(change):
+        reached = q.copy()
+        reached[joints] += change
+        at, jacobian = task.robot.linearised(reached, hand)
+        return -2 * (at - centre) @ jacobian[:, joints]
+
     first = (near - q)[joints]
     rng = np.random.default_rng(SEED)
     best = math.inf
@@ -105,7 +111,7 @@ def shortest_reach(task, q, hand, goal, near):
             start,
             jac=True,
             method="SLSQP",
-            constraints=[{"type": "ineq", "fun": inside}],
+            constraints=[{"type": "ineq", "fun": inside, "jac": slope}],
             options={"ftol": 1e-12, "maxiter": 300},
         )
         if inside(reach.x) >= -1e-8:

@@ -5,8 +5,17 @@ from functools import cache
 import pytest
 
 from coartic.analysis import load
+from common import judging
 from tests.support.processes import ROOT, program
 from tests.support.suites import unpacked
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _fewer_resamples_of_claims():
+    """On which no verdict of a test depends."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judging, "RESAMPLES_OF_CLAIMS", 1_999)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,7 @@
 """The rules of study noise on planted differences, and its executions of a small folder."""
 
+from itertools import product
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,7 +9,6 @@ import pytest
 from coartic import corrective_trial, execute, load_task
 from coartic.analysis import load
 from coartic.baselines.cma_es import CMAES
-from coartic.estimates import Estimate
 from tests.support.processes import ROOT, programs
 from tests.support.strategies import solve
 from tests.support.suites import unpacked
@@ -71,9 +72,7 @@ def test_a_verdict_that_hangs_on_a_task_is_open():
     ("verdicts", "due"),
     [
         (("new", "new"), "new"),
-        (("kept, smaller", "kept"), "kept"),
         (("kept, smaller", "kept, larger"), "kept"),
-        (("kept", "smaller"), "open"),
         (("reversed", "open"), "open"),
     ],
 )
@@ -85,20 +84,6 @@ def test_a_significant_change_that_enlarges_a_lead_does_not_make_it_smaller():
     assert RULES.verdict(1.0, 2.0, (True, False, True)) == "open"
     assert RULES.verdict(1.0, 0.2, (True, False, True)) == "smaller"
     assert RULES.verdict(1.0, -0.2, (True, False, True)) == "smaller"
-
-
-@pytest.mark.parametrize(
-    ("share", "cost", "due"),
-    [
-        ((0.8, 0.6, 0.9), (20.0, 15.0, 25.0), "aim"),
-        ((0.3, 0.1, 0.45), (20.0, 15.0, 25.0), "posture"),
-        ((0.6, 0.45, 0.7), (20.0, 15.0, 25.0), "undecided"),
-        ((0.8, 0.6, 0.9), (1.5, 1.0, 2.0), "not judged"),
-        ((0.8, 0.6, 0.9), (1.5, np.nan, np.nan), "not judged"),
-    ],
-)
-def test_what_is_fragile(share, cost, due):
-    assert RULES.fragile(Estimate(*share), Estimate(*cost)) == due
 
 
 def test_levels_of_noise_are_judged_together():
@@ -134,24 +119,18 @@ def tables_of(rows, folder):
     return ORDER.tabulate_gaps(read), ORDER.tabulate_pairs(read, FEWER)
 
 
-def test_planted_gaps_are_found_and_their_order_judged(tmp_path):
-    gaps, pairs = tables_of(rows_of({"CMA-ES": (10.0, 50.0), "learner": (20.0, 40.0)}), tmp_path)
-    of = gaps[(gaps.name == "CMA-ES") & ~gaps.signal_dependent].set_index("motor_noise")
-    assert of.gap.tolist() == pytest.approx([10, 50], abs=0.1)
-    assert (of.gap_low < of.gap).all()
-    assert len(pairs) == 28
-    assert pairs.verdict["learner, CMA-ES"] == "reversed"
-    assert pairs.verdict["hill climbing, random search"] == "open"
-    assert pairs.open_loop.sum() == 7
-
-
-def test_a_method_does_not_win_by_failing(tmp_path):
+def test_planted_gaps_are_found_and_a_method_does_not_win_by_failing(tmp_path):
     rows = rows_of({"CMA-ES": (10.0, 20.0), "learner": (20.0, 40.0)})
     fails = (rows.method == "cma-es/bandit") & (rows.motor_noise > 0)
     rows.loc[fails, "failures"] = 100
     rows.loc[fails, "ticks"] = np.nan
     gaps, pairs = tables_of(rows, tmp_path)
     assert pairs.verdict["learner, CMA-ES"] == "reversed"
+    assert pairs.verdict["hill climbing, random search"] == "open"
+    assert (len(pairs), pairs.open_loop.sum()) == (28, 7)
+    of = gaps[(gaps.name == "learner") & ~gaps.signal_dependent].set_index("motor_noise")
+    assert of.gap.tolist() == pytest.approx([20, 40], abs=0.1)
+    assert (of.gap_low < of.gap).all()
     failed = gaps[(gaps.name == "CMA-ES") & (gaps.motor_noise > 0)].failures
     assert failed.tolist() == [40 * 100] * 2
 
@@ -189,22 +168,16 @@ def test_postures_and_centres_are_aimed_at():
     assert np.isnan(PROTOCOLS.off_centre(task, solution))
 
 
-def straight_rows(saved, cost=20.0):
+def straight_rows(saved, cost):
     """Executions of a method that aims, for which the centre saves a share of the cost of noise."""
-    rows, rng = [], np.random.default_rng(1)
-    for family in PROTOCOLS.FAMILIES:
-        for number in range(8):
-            for target in "TPC":
-                for level in (0.0, 0.01):
-                    saving = saved if target == "C" else 0.0
-                    ticks = 300 + 40 * number + (level > 0) * cost * (1 - saving)
-                    rows.append({
-                        "run_id": f"{family}{number}", "motor_noise": level, "target": target,
-                        "ticks": ticks + rng.normal(), "failures": 0, "off": 0.97,
-                        "task": f"{family}/v1/i{number:03d}", "method": "cma-es/bandit",
-                        "setting": np.nan,
-                    })  # fmt: skip
-    return pd.DataFrame(rows)
+    every = product(PROTOCOLS.FAMILIES, range(8), "TPC", (0.0, 0.01))
+    rows = pd.DataFrame(every, columns=["family", "number", "target", "motor_noise"])
+    of_noise = (rows.motor_noise > 0) * cost * (1 - saved * (rows.target == "C"))
+    noise = np.random.default_rng(1).normal(size=len(rows))
+    number = rows.number.astype(str)
+    return rows.assign(ticks=300 + 40 * rows.number + of_noise + noise, failures=0, off=0.97,
+                       run_id=rows.family + number, task=rows.family + "/v1/i00" + number,
+                       method="cma-es/bandit", setting=np.nan)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -252,19 +225,17 @@ def learning_rows(gaps):
         "random-search 1000": ("stages=1000", f"sigma={noisy}, stages=1000"),
         "cma-es/in-noise": ("motor_noise=0.0", ""),
     }  # fmt: skip
-    for family in PROTOCOLS.FAMILIES:
-        for number in range(10):
-            for key, texts in settings.items():
-                for practice, text in zip((0, 1), texts, strict=True):
-                    for level in (0, 1):
-                        gap = gaps.get(LEARNING.METHODS[key], (30.0, 45.0))[level]
-                        rows.append({
-                            "run_id": f"{len(rows)}", "motor_noise": 0.01 * level, "run": 0,
-                            "ticks": 300 * (1 + gap / 100) + rng.normal() - 2 * practice * level,
-                            "action": "next action", "failures": 0, "setting": text,
-                            "task": f"{family}/v1/i{160 + number}", "best_known": -250,
-                            "method": key.partition(" ")[0],
-                        })  # fmt: skip
+    for family, number, key, practice, level in product(
+        PROTOCOLS.FAMILIES, range(10), settings, (0, 1), (0, 1)
+    ):
+        gap = gaps.get(LEARNING.METHODS[key], (30.0, 45.0))[level]
+        rows.append({
+            "run_id": f"{len(rows)}", "motor_noise": 0.01 * level, "run": 0,
+            "ticks": 300 * (1 + gap / 100) + rng.normal() - 2 * practice * level,
+            "action": "next action", "failures": 0, "setting": settings[key][practice],
+            "task": f"{family}/v1/i{160 + number}", "best_known": -250,
+            "method": key.partition(" ")[0],
+        })  # fmt: skip
     return pd.DataFrame(rows)
 
 

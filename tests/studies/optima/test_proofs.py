@@ -8,13 +8,10 @@ from types import SimpleNamespace
 import clarabel
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
 from coartic import PAPER, corrective_trial, execute, load_task
 from coartic.motion.solution import Movement, hand_sequences
-from coartic.robot import directions
 from coartic.tasks.task import hands_of
 from tests.support.processes import programs
 from tests.support.strategies import (
@@ -28,17 +25,6 @@ from tests.support.strategies import (
 (PROOF,) = programs("optima", "certificate")
 RELAXED, LAGRANGIAN, SPEED = (sys.modules[n] for n in ("relaxation", "lagrangian", "speed"))
 NAMES = ["ascending", "two-armed-1", "two-armed-2"]
-
-
-@given(st.floats(1e-6, 12.0), st.lists(st.floats(-2, 2), min_size=3, max_size=3))
-def test_offsets_are_exact_maxima(half, normal):
-    a, b, k = normal
-    offset = RELAXED.offset_of(*np.array(normal)[:, None, None], np.array([half])).item()
-    delta = np.linspace(-half, half, 4_001)
-    cosine, sine = directions(delta).T
-    true = (a * cosine + b * sine + k * delta).max()
-    assert offset >= true - 1e-12
-    assert offset == pytest.approx(true, abs=1e-4)
 
 
 def paths(name, every):
@@ -85,16 +71,16 @@ def test_the_disc_of_an_undecided_hand_holds_both_hands():
     assert radius - 1e-4 < max(far) <= radius + 1e-12
 
 
-FAILURES = {
-    "inexact": lambda each, rng: each + rng.choice([1e-3, 1.0]) * rng.standard_normal(each.shape),
-    "no number": lambda each, rng: np.where(rng.random(each.shape) < 0.3, np.nan, each),
-    "huge": lambda each, rng: 1e300 * rng.standard_normal(each.shape),
-    "of another box": lambda each, rng: rng.permutation(each),
-}  # fmt: skip
+FAILURES = (
+    lambda each, rng: each + rng.choice([1e-3, 1.0]) * rng.standard_normal(each.shape),
+    lambda each, rng: np.where(rng.random(each.shape) < 0.3, np.nan, each),
+    lambda each, rng: 1e300 * rng.standard_normal(each.shape),
+    lambda each, rng: rng.permutation(each),  # as of another box
+)
 
 
-def failing(change, rng, share):
-    """A class of solvers that fail in a share of their solutions, by a change of their numbers."""
+def failing(rng):
+    """A class of solvers that fail, by a change of their numbers."""
     solver, statuses = clarabel.DefaultSolver, clarabel.SolverStatus
 
     class Failing:
@@ -104,8 +90,7 @@ def failing(change, rng, share):
 
         def solve(self):
             right = self.solver.solve()
-            if rng.random() >= share:
-                return right
+            change = FAILURES[rng.integers(len(FAILURES))]
             x, z = (change(np.array(each), rng) for each in (right.x, right.z))
             status = rng.choice([statuses.PrimalInfeasible, statuses.NumericalError])
             return SimpleNamespace(x=x, z=z, status=status)
@@ -115,7 +100,7 @@ def failing(change, rng, share):
 
 @pytest.mark.parametrize(
     ("name", "failure"),
-    [*((name, None) for name in NAMES), *(("two-armed-1", each) for each in FAILURES)],
+    [("ascending", False), ("two-armed-2", False), ("two-armed-1", True)],
 )
 def test_a_relaxation_never_exceeds_a_true_path(name, failure, monkeypatch):
     """For any path, hands undecided, boxes around its link angles and parts of them, and whatever
@@ -124,8 +109,8 @@ def test_a_relaxation_never_exceeds_a_true_path(name, failure, monkeypatch):
     """
     rng, cuts = np.random.default_rng(7), []
     if failure:
-        monkeypatch.setattr(clarabel, "DefaultSolver", failing(FAILURES[failure], rng, 1.0))
-    for task, hands, q, steps in paths(name, 16 if failure else 8):
+        monkeypatch.setattr(clarabel, "DefaultSolver", failing(rng))
+    for task, hands, q, steps in paths(name, 8):
         length = steps.sum()
         for chosen in (hands, undecided(hands, rng)):
             root, angles = RELAXED.Relaxation(task, chosen, (), True), angles_of(task, chosen, q)
@@ -156,14 +141,6 @@ def test_a_relaxation_never_exceeds_a_true_path(name, failure, monkeypatch):
                         box = half
     assert len(cuts) >= 8
     assert failure or any(cuts)
-
-
-@pytest.mark.parametrize("failure", FAILURES)
-def test_a_proof_with_a_solver_that_fails_is_loose(failure, monkeypatch):
-    """The optimum is 125 ticks: no claim of more is ever proven."""
-    task, rng = load_task("two-armed/v1/i004"), np.random.default_rng(1)
-    monkeypatch.setattr(clarabel, "DefaultSolver", failing(FAILURES[failure], rng, 0.3))
-    assert PROOF.certify(task, 140, 40).ticks <= 125
 
 
 def test_a_box_without_a_path_is_ruled_out():
@@ -226,7 +203,7 @@ def test_the_least_of_a_term_is_exact():
         assert gone.any()
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 def test_the_proof_agrees_with_an_exhaustive_search(seed):
     """Two goals, one link an arm, the base on a rail: every path on a fine grid."""
     rng = np.random.default_rng(seed)
@@ -293,7 +270,7 @@ def test_two_goals_hit_at_once_count_once():
     assert PROOF.certify(task, 0, 50).ticks == 0
 
 
-@pytest.mark.parametrize("locked", [[], ["y"], ["x", "y"]])
+@pytest.mark.parametrize("locked", [[], ["y"]])
 def test_no_hand_is_faster_than_the_fastest(locked):
     """Of no configuration has the Jacobian a larger norm, and that of a straight arm has it."""
     goals = [[1.0, 0.3], [1.0, 0.6]]

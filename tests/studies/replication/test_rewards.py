@@ -10,25 +10,19 @@ from coartic import corrective_trial, initial_hands, load_task
 from coartic.analysis.study import solved
 from coartic.estimates import Estimate
 from tests.support.made_up import runs_of, study_of
-from tests.support.processes import ROOT, programs
+from tests.support.processes import programs
 
-FOLDER = ROOT / "studies" / "replication"
 REWARDS, STUDY = programs("replication", "rewards", "study")
 
 
-@pytest.fixture(scope="module")
-def tables(traced):
-    return STUDY.measure([traced.folder])
-
-
-def test_solutions_are_of_the_run_with_the_median_reward(traced, tables):
+def test_solutions_are_of_the_run_with_the_median_reward(study, tables):
     data = tables["solutions"]
     ticks = -data.groupby(["task", "condition"], sort=False).reward.sum()
     for (name, condition), of_run in ticks.items():
         if condition == "initial":
             assert of_run == corrective_trial(name, initial_hands(name)).ticks
         else:
-            rewards = solved(traced.cells[name, f"dual-process/{condition}"]).reward.astype(float)
+            rewards = solved(study.cells[name, f"dual-process/{condition}"]).reward.astype(float)
             assert -of_run in rewards.to_list()
             assert (rewards < -of_run).sum() <= len(rewards) / 2 >= (rewards > -of_run).sum()
     for hit in data.to_dict("records"):
