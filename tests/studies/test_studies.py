@@ -55,7 +55,7 @@ def test_tables_are_those_of_version_1_and_are_drawn(name, measured, tmp_path):
     for path in (SMALL / name).glob("*.csv"):
         ours, theirs = tables[path.stem], read(path)
         for name in {"p", "p_holm"} & {*ours}:
-            assert ours[name].tolist() == pytest.approx([*theirs[name]], abs=0.05, nan_ok=True)
+            assert ours[name].tolist() == pytest.approx([*theirs[name]], abs=0.03, nan_ok=True)
         ours, theirs = (comparable(each, tmp_path / "table.csv") for each in (ours, theirs))
         pd.testing.assert_frame_equal(ours, theirs, rtol=1e-4, atol=1e-9, check_dtype=False)
     tables["results"].to_csv(tmp_path / "results.csv")
