@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 
 import coartic
-from coartic import (
-    MotionModel,
-    execute,
-    load_task,
-    movements_of,
-    trajectory,
-)
+from coartic import MotionModel, execute, load_task, movements_of, trajectory
 from coartic.method import Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
 from coartic.motion.batch import SLOTS, robot_parameters
@@ -181,8 +175,10 @@ def test_kernels_end_whatever_they_get(bad, where):
     ("name", "wrong", "words"),
     [
         *(("hands", [0, hand], "must be 0 .left. or 1 .right.") for hand in (2, -1, 0.5)),
-        *(("q", q, "^q ") for q in ([BOTH.q0[:9]] * 2, [BOTH.q0 * np.nan] * 2)),
-        *(("goals", goals, "^goals ") for goals in ([[1.0, 2.0]], [[1.0, np.inf]] * 2)),
+        ("q", [BOTH.q0[:9]] * 2, "^q "),
+        ("q", [BOTH.q0 * np.nan] * 2, "^q "),
+        ("goals", [[1.0, 2.0]], "^goals "),
+        ("goals", [[1.0, np.inf]] * 2, "^goals "),
         ("targets", np.zeros((2, 9)), "^targets "),
         ("radius", 0.0, "radius"),
         ("locked_base", ("z",), "may only have 'x' and 'y'"),
