@@ -16,7 +16,7 @@ COSTS = {
     "a slope": (lambda x: x @ np.arange(1.0, x.shape[1] + 1.0), 2, 6),
     "a bent valley": (
         lambda x: (100.0 * (x[:, 1:] - x[:, :-1] ** 2) ** 2 + (1.0 - x[:, :-1]) ** 2).sum(axis=1),
-        8, 20,
+        4, 16,
     ),
     "a plain": (lambda x: np.zeros(len(x)), 5, 8),
     "noise": (lambda x: NOISE.standard_normal(len(x)), 3, 7),

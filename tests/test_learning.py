@@ -1,8 +1,8 @@
 """The learner against the paper's loop, the published results, and itself beside other runs."""
 
+import functools
 import itertools
 import math
-import re
 from dataclasses import replace
 from typing import Literal, get_args, get_origin, get_type_hints
 
@@ -31,7 +31,6 @@ from coartic.motion.batch import SLOTS
 from coartic.robot import HANDS, Robot
 from tests.support import reference
 from tests.support.strategies import (
-    PAPER_CELLS,
     STUCK,
     changed,
     failing_task,
@@ -110,7 +109,9 @@ SUBTASK = replace(ABLATIONS["EC4-subtask"], noise_sd=0.03)
 @pytest.mark.parametrize(
     ("task", "condition", "trials", "seed", "better"),
     [
-        *((task, CONDITIONS[condition], 4, 36, 0) for task, condition in PAPER_CELLS),
+        ("ascending", CONDITIONS["EC1"], 4, 36, 0),
+        ("two-armed-1", CONDITIONS["EC2"], 4, 36, 0),
+        ("two-armed-2", CONDITIONS["EC3"], 4, 36, 0),
         ("two-armed-1", CONDITIONS["EC4"], 15, 998, 5),
         ("two-armed-1", replace(SUBTASK, discount=0.4, counted="all"), 5, 162, 2),
         # One hand is always the closest: it draws no number to break a tie with itself.
@@ -132,10 +133,14 @@ def test_equals_the_slow_learner_trial_by_trial(task, condition, trials, seed, b
 
 @pytest.mark.parametrize(
     ("chosen", "other", "hands"),
-    list(itertools.product([True, False], [True, False], ["none", "closest", "random"])),
-)
+    [
+        (True, True, "none"), (False, False, "none"),
+        (True, False, "closest"), (False, True, "closest"),
+        (True, True, "random"), (False, False, "random"),
+    ],
+)  # fmt: skip
 def test_conditions_are_data(chosen, other, hands):
-    """Every combination of the condition's fields, on an uneven robot on a rail."""
+    """Every pair of values of these fields, on an uneven robot on a rail."""
     task = uneven_task(locked_base=["x"])
     condition = ExplorationCondition("own", ("left", "right"), chosen, other, hands, 0.4, 0.1)
     slow = assert_equals_reference(task, condition, 8 if hands == "random" else 6, seed=0)
@@ -150,7 +155,6 @@ def test_informed_conditions_equal_the_slow_learner_trial_by_trial():
     fields = {**one_hand, "hand_exploration": "nearest-posture"}
     for task, condition, own in [
         (uneven_task(locked_base=["x"]), "EC4", fields),
-        (load_task("two-armed-1"), "EC4", fields),
         (load_task("ascending"), "EC1", one_hand),
         # Hands alternate: where they do, an arm is idle at the next goal and prefers to stay.
         (load_task("two-armed-1"), "EC3", {**fields, "epsilon": 0.7}),
@@ -180,6 +184,13 @@ EACH_FIELD = [
 """Of each field of a condition each value, or several, with what it needs of other fields."""
 
 
+@functools.cache
+def plain_targets(condition):
+    """What the slow learner stores under a condition that changed ones are compared with."""
+    task = load_task("two-armed-1")
+    return repr(reference.learn(task, condition, seed=5, trials=6, model=SOON_FAILED).targets)
+
+
 @pytest.mark.parametrize(("base", "changes"), EACH_FIELD)
 def test_every_field_equals_the_slow_learner_and_makes_a_difference(base, changes):
     plain, task = EVERY_CONDITION[base], load_task("two-armed-1")
@@ -190,8 +201,7 @@ def test_every_field_equals_the_slow_learner_and_makes_a_difference(base, change
         assert -sum(slow.replay[1]) != slow.rewards.max()
         plain = replace(plain, learned="replay")
     if changed != plain:
-        other = reference.learn(task, plain, seed=5, trials=6, model=SOON_FAILED)
-        assert repr(slow.targets) != repr(other.targets)
+        assert repr(slow.targets) != plain_targets(plain)
 
 
 def test_no_field_of_a_condition_is_without_a_case():
@@ -302,7 +312,7 @@ LEFT_FIRST = load_task("two-armed-1").model_copy(update={"initial_hands": "LRLR"
         (ValueError, "seeds has more than 20,000 entries",
          {"seeds": itertools.count(), "trials": 10_000}),
         *((ValueError, f"model.{name}", {"model": MotionModel(**{name: value})})
-          for name, value in (("step", "x"), ("step", 1e-20), ("arrival_tolerance", -1.0),
+          for name, value in (("step", 1e-20), ("arrival_tolerance", -1.0),
                               ("correction_tolerance", 0.1), ("max_iterations", -1))),
     ],
 )  # fmt: skip
@@ -313,16 +323,20 @@ def test_runs_that_cannot_be_are_refused(error, words, options):
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
+    ("field", "value", "words"),
     [
-        ("epsilon", 1.5),
-        ("noise_sd", -1.0),
-        ("discount", 0.5),
-        ("hands", ("right", "right")),
+        ("epsilon", 1.5, "epsilon"),
+        ("noise_sd", -1.0, "noise_sd"),
+        ("discount", 0.5, "discount"),
+        ("hands", ("right", "right"), "hands"),
+        ("drift", -1, "drift is -1; it must be a number from 0 to 10"),
+        ("direction", "stay", "has no effect unless drift or pull is above 0"),
+        ("credit", "subtask", "set learned to 'replay'"),
+        ("counted", "all", "set credit to 'subtask'"),
     ],
 )
-def test_a_condition_keeps_its_limits(field, value):
-    with pytest.raises(ValueError, match=field):
+def test_a_condition_keeps_its_limits(field, value, words):
+    with pytest.raises(ValueError, match=words):
         replace(CONDITIONS["EC1"], **{field: value})
 
 
@@ -353,30 +367,14 @@ def test_a_goal_where_the_hand_is_already_takes_no_tick():
     assert run.execute().reward == 0
 
 
-CUSTOM = 'tasks = ["two-armed-1"]\nmethods = ["dual-process/custom"]\nparameters = '
-
-
 def test_any_condition_is_a_setting_of_a_method(tmp_path):
     fields = 'base = "EC3", modify_other = true, epsilon = 0.4, drift = [0, 0.3], pull = 0.01'
-    (cell,) = suite_of(tmp_path, f"{CUSTOM}{{ {fields} }}")
+    method = 'tasks = ["two-armed-1"]\nmethods = ["dual-process/custom"]'
+    (cell,) = suite_of(tmp_path, f"{method}\nparameters = {{ {fields} }}")
     (method,) = (each for each in METHODS if each.name == "dual-process/custom")
     _, execution, _ = solve(method, "two-armed-1", seed=3, **cell.parameters)
     rules = replace(CONDITIONS["EC3"], modify_other=True, epsilon=0.4, drift=(0.0, 0.3), pull=0.01)
     assert execution.reward == learn("two-armed-1", rules, seed=3, trials=30).reward
-
-
-@pytest.mark.parametrize(
-    ("fields", "sentence"),
-    [
-        ('direction = "stay"', "has no effect unless drift or pull is above 0"),
-        ('credit = "subtask"', "set learned to 'replay'"),
-        ('counted = "all"', "set credit to 'subtask'"),
-        ("drift = -1", "drift is -1; it must be a number from 0 to 10"),
-    ],
-)
-def test_conditions_that_cannot_be_are_refused_in_a_sentence(fields, sentence, tmp_path):
-    with pytest.raises(CoarticError, match=re.escape(sentence)):
-        suite_of(tmp_path, f"{CUSTOM}{{ {fields} }}")
 
 
 FAILED_AT_ONCE = MotionModel(max_iterations=60)
@@ -394,8 +392,6 @@ def assert_same(a, b):
 @pytest.mark.parametrize(
     ("task", "condition", "model"),
     [
-        ("two-armed-1", "EC4", PAPER),
-        ("two-armed-1", "EC4", FAILED_AT_ONCE),
         ("two-armed-2", "EC2", PAPER),
         ("two-armed-2", "EC4-subtask", FAILED_AT_ONCE),
         ("ascending", "EC1-uncorrected", PAPER),

@@ -17,9 +17,11 @@ from coartic import (
     load_task,
     movements_of,
 )
+from coartic.motion.batch import SLOTS
 from tests.support import noise as reference
 from tests.support.strategies import (
     STUCK,
+    TIED,
     changed,
     failing_task,
     posture,
@@ -28,42 +30,46 @@ from tests.support.strategies import (
     uneven_task,
 )
 
-TASKS = {name: load_task(name) for name in ("ascending", "two-armed-1", "two-armed-2")}
-TASKS["uneven"] = uneven_task()
-TASKS["held"] = uneven_task(
-    locked_base=["x", "y"], goals=[[1.6, 0.9], [-0.3, 0.85]], initial_hands="RL"
-)
-SHORT = MotionModel(max_iterations=120)
+TASKS = {
+    "two-armed-2": load_task("two-armed-2"),
+    "uneven": uneven_task(),
+    "held": uneven_task(
+        locked_base=["x", "y"], goals=[[1.6, 0.9], [-0.3, 0.85]], initial_hands="RL"
+    ),
+    "tied": TIED,  # hands stand in goals from the start
+}
+SHORT = MotionModel(max_iterations=70, gain=0.06, correction_tolerance=0.08)
 """Corrections that take longer fail."""
 
 
 @pytest.mark.parametrize("name", TASKS)
 def test_executions_are_those_of_the_slow_implementation(name):
     rng = np.random.default_rng(7)
-    solutions = [random_solution(TASKS[name], SHORT, rng) for _ in range(5)]
+    solutions = [random_solution(TASKS[name], SHORT, rng) for _ in range(4)]
     seen = []
     for motor_noise, grows in ((0.01, False), (0.1, True)):
-        case, options = (
-            (TASKS[name], solutions, motor_noise, 2, 3, SHORT),
-            {"signal_dependent": grows},
-        )
-        made = execute_noisy(*case, **options)
-        np.testing.assert_array_equal(made, reference.execute_noisy(*case, **options))
+        case = TASKS[name], solutions, motor_noise, 2, 3, SHORT
+        made = execute_noisy(*case, signal_dependent=grows)
+        due = reference.execute_noisy(*case, signal_dependent=grows)
+        np.testing.assert_array_equal(made, due)
         seen.append(made)
-    assert len({*np.ravel(seen)} - {np.nan}) > 10
+    completed = np.isfinite(seen)
+    assert len(np.unique(np.array(seen)[completed])) >= 5
+    assert completed.all() == (name != "held")
 
 
 def test_many_robots_execute_as_one_after_the_other():
     """More than fit into the compiled kernels at once."""
-    task = TASKS["two-armed-2"]
-    solution = movements_of("RLRR", corrective_trial(task, "RLRR").configurations)
-    case = task, [solution], 0.05, 150, [4]
+    task, count = TASKS["uneven"], SLOTS + 8
+    solution = movements_of("RLR", corrective_trial(task, "RLR").configurations)
+    case = task, [solution], 0.1, count, [4], SHORT
     made = execute_noisy(*case)
     np.testing.assert_array_equal(made, reference.execute_noisy(*case))
-    assert made.shape == (1, 150)
+    assert made.shape == (1, count)
+    assert len(np.unique(made)) > 5
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20)
 @given(st.sampled_from([*TASKS]), st.integers(0, 2**31))
 def test_without_noise_nothing_changes(name, seed):
     task = TASKS[name]
@@ -78,7 +84,7 @@ def test_without_noise_nothing_changes(name, seed):
         np.testing.assert_array_equal(again, made)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=6)
 @given(
     st.sampled_from([*TASKS]),
     st.integers(0, 2**31),
@@ -88,13 +94,13 @@ def test_without_noise_nothing_changes(name, seed):
 def test_ticks_of_a_solution_depend_on_its_own_seed(name, seed, motor_noise, signal_dependent):
     """On no other solution; child k of one seed is the seed of solution k."""
     task, rng = TASKS[name], np.random.default_rng(seed)
-    solutions = [random_solution(task, SHORT, rng) for _ in range(4)]
+    solutions = [random_solution(task, SHORT, rng) for _ in range(3)]
     options = {"model": SHORT, "signal_dependent": signal_dependent}
-    made = execute_noisy(task, solutions, motor_noise, 3, [5, 6, 7, 8], **options)
-    for order in ([2, 0, 3, 1], [3], [1, 1]):
-        some = [solutions[k] for k in order]
-        again = execute_noisy(task, some, motor_noise, 3, [5 + k for k in order], **options)
-        np.testing.assert_array_equal(again, made[order])
+    made = execute_noisy(task, solutions, motor_noise, 3, [5, 6, 7], **options)
+    order = [2, 0, 2]
+    some = [solutions[k] for k in order]
+    again = execute_noisy(task, some, motor_noise, 3, [5 + k for k in order], **options)
+    np.testing.assert_array_equal(again, made[order])
     whole = execute_noisy(task, solutions, motor_noise, 3, seed, **options)
     np.testing.assert_array_equal(
         execute_noisy(task, solutions[:2], motor_noise, 3, seed, **options), whole[:2]
@@ -103,8 +109,8 @@ def test_ticks_of_a_solution_depend_on_its_own_seed(name, seed, motor_noise, sig
 
 REACH = tiny_task(goals=[[6.004, 0.1]])
 """The right hand starts 1.404 to the left of the goal's rim."""
-NEAR = tiny_task(goals=[[5.104, 0.1]])
-"""Likewise, 0.504."""
+NEAR, FAR = tiny_task(goals=[[5.104, 0.1]]), tiny_task(goals=[[8.604, 0.1]])
+"""Likewise, 0.504 and 4.004."""
 
 
 def planned(*configuration, kind="planned"):
@@ -129,12 +135,10 @@ def test_only_coordinates_that_move_miss():
     [
         # A planned movement stops up to 0.01 before its end: it hits if it ends beyond 1.41.
         (REACH, planned(1.415), False, 0.6915),  # by half a standard deviation
-        (REACH, planned(1.415), True, 0.6915),  # which does not grow beyond a length of 1
-        (NEAR, planned(0.515), False, 0.6915),
+        (FAR, planned(4.015), True, 0.6915),  # which does not grow beyond a length of 1
         (NEAR, planned(0.515), True, 0.8342),  # by 0.5 / 0.515 standard deviations
         # Others go to their end: they hit if it is beyond 1.404.
         (REACH, planned(1.409, kind="corrective"), False, 0.6915),
-        (REACH, along(1.0, 1.409), False, 0.6915),
         (NEAR, along(0.3, 0.509), True, 0.8370),
         # The first of two waypoints is missed by half: here beyond 1.407, as the way back counts.
         (REACH, along(1.412, 0.0), False, 0.8413),
@@ -142,8 +146,9 @@ def test_only_coordinates_that_move_miss():
 )
 def test_movements_miss_by_the_normal_distribution(task, solution, grows, share):
     """From which the share of executions that hit at once follows: they take the fewest ticks."""
-    (made,) = execute_noisy(task, [solution], 0.01, 1000, 0, signal_dependent=grows)
-    assert abs(np.mean(made == execute(task, solution).ticks) - share) < 4 * 0.0146
+    (made,) = execute_noisy(task, [solution], 0.01, 400, 0, signal_dependent=grows)
+    bound = 4 * np.sqrt(share * (1 - share) / 400)
+    assert abs(np.mean(made == execute(task, solution).ticks) - share) < bound
 
 
 def test_a_correction_misses_by_its_length():
@@ -172,16 +177,9 @@ def test_an_execution_fails_where_the_corrective_process_does():
         # Noise moves the arm away from where the process is stuck.
         aimed = [Movement(1, hand, "planned", task.q0 + tilt)]
         assert np.isfinite(execute_noisy(task, [aimed], 0.01, 3, 0)).all()
-
-
-def test_shipped_runs_without_noise_have_their_rewards(shipped):
-    seen = set()
-    for task, method in shipped.cells:
-        executed = shipped.executed(task, method).runs[:1]
-        made = execute_noisy(task, [each.movements for each in executed], 0.0, 1, 0)
-        assert made[:, 0].tolist() == [each.ticks for each in executed]
-        seen |= {movement.kind for each in executed for movement in each.movements}
-    assert seen == {"learned", "planned", "corrective", "path"}
+    few = MotionModel(max_iterations=20)  # a second correction would go on where the first ends
+    reach = [Movement(1, "right", "corrective")]
+    assert np.isnan(execute_noisy(REACH, [reach], 0.01, 3, 0, few)).all()
 
 
 SOLUTION = corrective_trial("ascending", "RRR").movements
@@ -190,7 +188,7 @@ SOLUTION = corrective_trial("ascending", "RRR").movements
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        *(({"motor_noise": noise}, "motor_noise is") for noise in (-0.01, np.nan)),
+        ({"motor_noise": np.nan}, "motor_noise is"),
         ({"repeats": 0}, "repeats is"),
         ({"seed": -1}, "seed is"),
         ({"seed": [1, 2]}, "seed has 2 entries; it must have one for each of the 1"),

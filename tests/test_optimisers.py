@@ -196,7 +196,7 @@ def test_what_is_known_of_a_task():
 
 
 @pytest.mark.parametrize("threads", [1, 4])
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(
     sizes=st.lists(st.integers(0, 40), max_size=8),
     budget=st.integers(1, 200),

@@ -102,7 +102,7 @@ def test_the_most_promising_pair_is_the_cheapest_of_all():
     assert cost(found) == pytest.approx(min(map(cost, every)))
 
 
-@settings(max_examples=15)
+@settings(max_examples=10)
 @given(
     st.lists(st.tuples(st.floats(-8, 8), st.floats(-3, 3)), min_size=1, max_size=3),
     st.sampled_from([[], ["x"], ["y"]]),

@@ -40,10 +40,11 @@ def small_task(**change):
 
 @pytest.mark.parametrize(
     ("cost", "hands", "still"),
-    [  # any two of them in every combination
-        (("path-length", "squared-displacement")[(number + still) % 2], hands, still)
-        for number, hands in enumerate(itertools.product(("left", "right"), repeat=2))
-        for still in (False, True)
+    [
+        ("path-length", ("right", "left"), False),
+        ("path-length", ("left", "right"), True),
+        ("squared-displacement", ("right", "right"), False),
+        ("squared-displacement", ("right", "left"), True),
     ],
 )
 def test_plans_agree_with_another_optimiser(cost, hands, still):
@@ -143,7 +144,7 @@ def test_a_solve_that_fails_says_so():
 
 
 def test_whole_ticks_are_what_is_executed():
-    for name, hands in (("ascending", "RRR"), ("two-armed-1", "LRLR"), ("two-armed-2", "RRRR")):
+    for name, hands in (("ascending", "RRR"), ("two-armed-1", "LRLR")):
         task = load_task(name)
         sequence = hands_of(hands)
         instance = Instance.of(task, sequence, still=True, radius=task.radius)

@@ -114,12 +114,11 @@ def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, pref
     free[:2] = ["x" not in locked_base, "y" not in locked_base]
     q = np.array(q)
     for iteration in range(model.max_iterations):
-        error = goal - robot.forward_kinematics(q, hand)
+        place, jacobian = robot.linearised(q, hand)
+        error = goal - place
         if math.sqrt(_sum_of_squares(error)) <= model.correction_tolerance:
             return Correction(q, True, iteration)
-        if not np.isfinite(error).all():
-            return Correction(q, False, iteration)
-        step = model.gain * free * (robot.jacobian(q, hand).T @ error)
+        step = model.gain * free * (jacobian.T @ error)
         before, q = q, q + step
         if pull:
             moving = _moving(robot, hand, free)
