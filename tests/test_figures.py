@@ -31,6 +31,10 @@ def test_robots_and_goals_are_drawn_where_they_are():
     drawing.fill_goals(circles, [True, False, False, False])
     assert [circle.get_fill() for circle in circles] == [True, False, False, False]
     assert [circle.center for circle in circles] == [*map(tuple, task.goals)]
+    drawing.number_goals(axes, task)
+    due = {str(k): (x, y + task.radius) for k, (x, y) in enumerate(task.goals, 1)}
+    due["3"] = task.goals[2][0], task.goals[2][1] - task.radius  # goal 4 is close above
+    assert {text.get_text(): text.xy for text in axes.texts} == due
     move = drawing.draw_robot(axes, task, task.q0)
     move(task.q0 + 1.0)
     for line, hand in zip(axes.lines, ("left", "right"), strict=True):

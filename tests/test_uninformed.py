@@ -53,7 +53,8 @@ SECOND_FOR_THE_RIGHT = tiny_task(
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 def test_sequences_that_cannot_be_completed_are_left(method):
-    result, execution, session = solve(method, SECOND_FOR_THE_RIGHT, trials=150)
+    often = {"epsilon": 1.0} if method is GoalByGoal else {}  # it may choose them again
+    result, execution, session = solve(method, SECOND_FOR_THE_RIGHT, trials=150, **often)
     assert session.meter.trials == 150
     assert session.rewards.count(None) == session.meter.failed_trials == 2
     assert session.rewards.index(execution.reward) == result.details["best_trial"]
