@@ -159,6 +159,13 @@ def test_equals_the_matrix_form(robot, data, hand, goal, locked):
         np.testing.assert_allclose(fast.q, slow.q, atol=1e-9)
 
 
+def test_a_correction_whose_numbers_overflow_ends_there():
+    model = MotionModel(gain=1e3, max_iterations=5000)
+    found = correct(ROBOT, np.zeros(ROBOT.dof), "right", (3.0, 2.0), model=model)
+    assert not found.converged
+    assert found.iterations < 100  # each makes numbers a thousand times as large
+
+
 @entry
 def _largest(length):
     return largest_square(length)
