@@ -24,6 +24,7 @@ from coartic import (
 from coartic.baselines.corrective_alone import BestHands
 from coartic.method import MethodError, Session
 from coartic.motion.compile import chain_by, entry, joint_lever
+from coartic.motion.correction import project
 from coartic.motion.movement import clear_steps, largest_square
 from coartic.motion.trigonometry import cosine, sine
 from coartic.robot import HANDS
@@ -157,6 +158,28 @@ def test_equals_the_matrix_form(robot, data, hand, goal, locked):
     if fast.converged:
         assert fast.iterations == slow.iterations
         np.testing.assert_allclose(fast.q, slow.q, atol=1e-9)
+
+
+def test_a_correction_whose_numbers_overflow_ends_there():
+    model = MotionModel(gain=1e3, max_iterations=5000)
+    found = correct(ROBOT, np.zeros(ROBOT.dof), "right", (3.0, 2.0), model=model)
+    assert not found.converged
+    assert found.iterations < 100  # each makes numbers a thousand times as large
+
+
+@entry
+def _project(change, along_x, along_y):
+    project(change, along_x, along_y)
+
+
+@pytest.mark.parametrize("rows", [(1, 2, 0, 1), (1, 0, 0.5, 0), (0.5, 0, 1, 0), (0, 0, 1, 0)])
+def test_a_projection_is_that_of_the_pseudoinverse(rows):
+    """Of Jacobians of rank 2 and 1, whose rows are mixed of two."""
+    rng = np.random.default_rng(17)
+    jacobian, change = np.reshape(rows, (2, 2)) @ rng.normal(size=(2, 5)), rng.normal(size=5)
+    due = change - np.linalg.pinv(jacobian) @ jacobian @ change
+    _project(change, *jacobian)
+    np.testing.assert_allclose(change, due, atol=1e-9)
 
 
 @entry

@@ -9,6 +9,7 @@ from coartic.benchmarks import include, runner, template
 from coartic.benchmarks.planning import plan, plan_suite, request_for
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import load_suite
+from coartic.runs.plan import tasks_by_name
 from tests.support.suites import ROOT, suite_of
 
 MINE = Path(template.__file__).read_text(encoding="utf-8")
@@ -117,6 +118,7 @@ def test_a_trial_budget_limits_the_trials_that_are_asked_for(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
+        ({"methods": ["corrective-alone/given"], "trials": 5}, "trials has no effect"),
         ({"methods": ["corrective-alone/given"], "runs": 2}, "runs has no effect"),
         (
             {"methods": ["EC4"], "tasks": ["ascending", "two-armed-1"]},
@@ -129,3 +131,10 @@ def test_a_trial_budget_limits_the_trials_that_are_asked_for(tmp_path):
 def test_what_has_no_effect_is_refused(options, words):
     with pytest.raises(CoarticError, match=words):
         plan_suite("paper", **{"tasks": ["ascending"]} | options)
+
+
+def test_two_tasks_of_one_name_are_refused():
+    task = load_task("ascending")
+    assert [*tasks_by_name([task, load_task("ascending")]).values()] == [task]
+    with pytest.raises(CoarticError, match="two tasks have the name 'ascending'"):
+        tasks_by_name([task, task.model_copy(update={"radius": 0.2})])

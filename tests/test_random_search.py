@@ -48,7 +48,7 @@ ENDS = {
         *(("two-armed-1", "postures", True, *each) for each in ENDS),
         ("two-armed-1", "targets", False, 40, 4),
         ("descending", "postures", False, 40, 4),
-        ("descending", "targets", True, 40, 4),
+        ("two-armed-1", "targets", True, 40, 4),
         ("descending", "targets", True, 13, 13),
     ],
 )

@@ -101,6 +101,11 @@ def test_what_cannot_be_read_is_refused_with_its_row(people, sentence):
         check_hits(frame.set_axis(frame.index + 1), BOTH)
 
 
+def test_rows_of_a_file_are_counted_from_one(people, read):
+    with pytest.raises(CoarticError, match="data row 2: goal is 9"):
+        read(put("goal", 1, 9)(people))
+
+
 NO_TABLE = {
     "is not a table in UTF-8": "subject,trial\nä,1\n".encode("utf-16"),
     "separated by commas: .*line 3": "subject,trial\na,1\na,1,2\n",
@@ -122,8 +127,9 @@ def test_durations_are_ticks_of_their_unit(people, read):
     assert {warning.filename for warning in warned} == {__file__}
     hits = read(seconds, ticks_per_unit=100)
     pd.testing.assert_frame_equal(hits, check_hits(people, BOTH))
-    with pytest.raises(CoarticError, match="ticks_per_unit has no effect"):
-        read(people, ticks_per_unit=100)
+    for frame, options in ((people, {"ticks_per_unit": 100}), (people.assign(duration=1), {})):
+        with pytest.raises(CoarticError, match="ticks_per_unit has no effect"):
+            read(frame, **options)
     with pytest.raises(ValueError, match="ticks_per_unit is"):
         read(seconds, ticks_per_unit=0.0)
 
@@ -139,11 +145,11 @@ def test_whole_turns_of_recorded_angles_change_nothing(turns, people):
 
 def test_hits_beyond_two_radii_are_said_and_more_than_half_of_them_refused(people):
     odd = people.assign(left_1=people.left_1 + 3.0, right_1=people.right_1 + 3.0)
-    with pytest.warns(UserWarning, match="8 of 20 hits of b are more than 2 radii off") as warned:
-        check_hits(pd.concat([odd[:8], people[8:]]), BOTH)
+    with pytest.warns(UserWarning, match="10 of 20 hits of b are more than 2 radii off") as warned:
+        check_hits(pd.concat([odd[:10], people[10:]]), BOTH)
     assert len(warned) == 1
-    with pytest.raises(CoarticError, match="12 of 20 hits of b are more than 2 radii off"):
-        check_hits(pd.concat([odd[:12], people[12:]]), BOTH)
+    with pytest.raises(CoarticError, match="11 of 20 hits of b are more than 2 radii off"):
+        check_hits(pd.concat([odd[:11], people[11:]]), BOTH)
 
 
 # --------------------------------------------------------------------------------- consistency

@@ -51,6 +51,11 @@ def test_the_jerk_of_a_hand_is_its_third_derivative(hand):
     np.testing.assert_allclose(np.array(casadi.evalf(jerk)), np.array(due), rtol=1e-10)
 
 
+def test_the_outline_of_the_base_is_around_its_place():
+    outline = PAPER_ROBOT.base_outline(np.array([1.0, 2.0, *np.zeros(8)]))
+    np.testing.assert_allclose(outline, [[0.5, 1.9], [1.5, 1.9], [1.5, 2.1], [0.5, 2.1]])
+
+
 def test_names_and_shapes():
     assert UNEVEN.joint_names == (
         *("base_x", "base_y", "left_1"),

@@ -11,8 +11,10 @@ import pandas as pd
 import pytest
 
 from coartic import (
+    CoarticError,
     Movement,
     corrective_trial,
+    execute_noisy,
     initial_hands,
     load_task,
 )
@@ -27,7 +29,8 @@ from coartic.benchmarks.worker import fail
 from coartic.method import Meter
 from coartic.motion.batch import SLOTS
 from coartic.runs.plan import Job, run_seed
-from coartic.runs.record import Outcome, Times
+from coartic.runs.record import MOTOR_NOISE, Outcome, Times
+from coartic.runs.store import open_store
 from tests.support.strategies import STUCK, tiny_task
 from tests.support.suites import (
     BROKEN,
@@ -234,6 +237,22 @@ def test_the_runs_of_a_batch_are_scored():
     assert downsampled.outcome.rewards == [None, -310, -319, None]
 
 
+def test_ticks_with_noise_are_of_a_runs_own_seed_and_missing_if_an_execution_fails(
+    results, monkeypatch
+):
+    """Whatever the runs beside it."""
+    solutions = results.executed("two-armed-1", "dual-process/EC4")
+    noisy = results.runs.set_index("run_id").noisy_ticks
+    for run_id, execution in zip(solutions.run_ids, solutions.runs, strict=True):
+        seed = int(run_id.partition("-")[0], 16)
+        ticks = execute_noisy("two-armed-1", [execution.movements], MOTOR_NOISE, 100, [seed])
+        assert noisy[run_id] == ticks.mean()
+    with open_store(results.folder) as store:
+        runs = [store.run(run_id) for run_id in solutions.run_ids]
+    monkeypatch.setattr(scoring, "execute_noisy", lambda *_: np.array([[1, np.nan], [2, 4]]))
+    assert [run.solution.noisy_ticks for run in scoring.with_noise(runs)] == [None, 3.0]
+
+
 def test_a_solution_that_misses_a_goal_is_infeasible():
     job = Job(cell_on(STUCK, KNOWN["corrective-alone/given"]), 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
@@ -249,6 +268,8 @@ def test_some_runs_of_every_cell_are_performed_again(results):
         ["task", "method", "setting"]
     )
     assert len(cells) == len(again) == len(results.cells)
+    with pytest.raises(CoarticError, match="no run of .* can be performed again"):
+        reproduce.some_runs(results.folder, 1, {})
 
 
 @pytest.mark.usefixtures("in_this_process")

@@ -18,6 +18,7 @@ from coartic.analysis.methods import (
 from coartic.analysis.report.sections import SECTIONS, finding
 from coartic.analysis.statistics import holm, stratified_test
 from coartic.analysis.study import Study
+from coartic.analysis.tables import shown_columns
 from coartic.analysis.words import number
 from tests.support.made_up import MadeUp, made_up_optima, runs_of, study_of
 from tests.support.made_up import study_of_rewards as study
@@ -137,6 +138,7 @@ def test_ranked_is_who_solved_all_tasks():
     others = TABLES["not-ranked"](seen)
     why = {"mine": "1 of 2 tasks", "failed": "2 of 6 runs failed"}
     assert others.why.to_dict() == why
+    assert others.tasks.to_dict() == {"mine": 1, "failed": 1}  # of all runs
     assert others["on ascending"].to_dict() == pytest.approx({"mine": 9 / 292, "failed": 0})
     assert others.gap.isna().all()
     (axes,) = FIGURES["ranking"](seen).figure.axes
@@ -172,7 +174,7 @@ BEST = {("ascending", "mine"): [-292] * 3, ("two-armed-1", "mine"): [-465] * 3}
         ({"mine": 0}, None, 10, ""),  # without trials
     ],
 )
-def test_methods_are_ranked_with_equal_trials(trials, of_command, budget, why):
+def test_methods_are_ranked_and_compared_with_equal_trials(trials, of_command, budget, why):
     seen = with_trials(study(LEARNER | CMA | BEST), trials, of_command)
     assert standings.ranking_budget(seen) == budget
     rows = standings.standings(seen)
@@ -180,6 +182,8 @@ def test_methods_are_ranked_with_equal_trials(trials, of_command, budget, why):
     assert rows.gap["mine"] == 0  # of all tasks, with whatever trials
     unlike = {name for name in rows.index if trials.get(name, 10) not in (budget, 0)}
     assert {*TABLES["not-ranked"](seen).index} == unlike
+    alike = {name for name, made in trials.items() if made == trials["mine"]} - {"mine"}
+    assert {*TABLES["differences"](seen).method} == alike
     lines = [line for line in said(seen) if "percentage points" not in line]
     assert any("mine" in line for line in lines) == (not why)
 
@@ -223,6 +227,8 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert rows.index.tolist() == [f"mine {name}" for name in others]
     differences = [1.5 / 292 - 13 / 292, 11 / 292 - 13 / 292]
     assert rows.difference.tolist() == pytest.approx(differences)
+    shown = shown_columns(TABLES["differences"], seen, rows)["difference"].texts
+    assert shown[0] == number(100 * differences[0], 1)  # per cent, as the gaps
     assert math.isnan(rows.difference_low.iloc[0])  # of two runs there is no interval
     assert (rows.tasks == 1).all()
     same = {("ascending", "same"): list(SPREAD - 303)}

@@ -177,7 +177,7 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
     chance, there, folder = random.Random(3), [0], tmp_path / "killed"
     for _ in range(3):
         enough = chance.randrange(1, 16)
-        process, done = started(perform_until_killed, folder, enough + 20)
+        process, done = started(perform_until_killed, folder, enough + 15)
         while done.recv() < enough:
             pass
         time.sleep(chance.uniform(0, 0.05))
