@@ -442,6 +442,7 @@ SEEN = {
         ("arm-coarticulation", 1, 1, "supported", "undecided"),  # what random search shows
         ("first-movement-sacrificed", 0, 0, "not supported", "undecided"),
         ("context", 0, 0, "not supported", "undecided"),
+        ("context", 1, 0.99, "supported", "undecided"),
         # Though random search shows less:
         ("first-movement-sacrificed", -1, -2, "not supported", "supported"),
     ],
