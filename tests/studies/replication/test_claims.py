@@ -380,6 +380,9 @@ def test_hands_that_change(learned, of_random_search, verdict):
     }
     study = plant(solutions)
     assert_verdict("hand-coarticulation-task-1", study, verdict)
+    if learned == "LLRR":  # every run of one of two conditions; a quarter would be few
+        (test,) = finding_of("hand-coarticulation-task-1", study).tests
+        assert test.p == pytest.approx(2 * 0.25**40, abs=0)
     more = verdict_of("hand-coarticulation-task-1", study, claims.BEYOND)
     as_many = of_random_search == "LLRR" or verdict == "not supported"
     assert (more.verdict == "supported") != as_many, more.evidence
