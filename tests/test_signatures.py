@@ -195,8 +195,13 @@ def test_lean_is_found_through_noise_that_is_carried_on(planted):
 
 def test_lean_refuses_other_arrays():
     good = np.zeros((2, 3, 4))
-    with pytest.raises(ValueError, match="postures of a context have"):
-        signatures.lean(good, good * np.nan, rng())
+    for words, *given in (
+        ("postures of a context have", np.full((2, 3, 4), np.nan), good),
+        ("postures of a context have", good[:, :2], good),
+        ("coordinates", good, good[..., :3]),
+    ):
+        with pytest.raises(ValueError, match=words):
+            signatures.lean(*given, rng())
     with pytest.raises(ValueError, match="toward"):
         signatures.lean(good, good, rng(), toward=np.zeros(4))
 
