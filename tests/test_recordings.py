@@ -86,8 +86,6 @@ UNREADABLE = {
     r"goal is .*another goal than in the rows above.*\(40 such rows\)": lambda t: pd.concat([t, t]),
     "row 1: left_2 is '?inf": put("left_2", 0, np.inf),
     "left_2 is .*True": put("left_2", 0, True),
-    r"left_2 is .*\(1\+2j\)": put("left_2", 0, 1 + 2j),
-    "left_2 is '\u22120.3'": put("left_2", 0, "\u22120.3"),
     "20 of 20 hits of b .*must be in rad, anticlockwise": lambda t: t.assign(
         **np.degrees(t[JOINTS[2:]])
     ),

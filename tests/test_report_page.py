@@ -1,6 +1,5 @@
 """The page in a real browser: Chromium, driven by Playwright."""
 
-import itertools
 from functools import partial
 
 import pytest
@@ -81,36 +80,16 @@ def test_the_figure_shows_the_folders_own_runs_until_a_goal_is_moved(opened, tra
     expect(part(page, "score")).to_contain_text("The learner")
 
 
-def test_a_phone_shows_the_panels_of_a_figure_one_below_the_other(opened):
-    page = opened(width=390)
-    page.evaluate(OPEN_ALL)
-    panels = page.eval_on_selector_all(
-        ".drawn.narrow svg",
-        """all => all.map((panel) => {
-            const frame = panel.getBoundingClientRect();
-            const drawn = panel.firstChild.getBoundingClientRect().width;
-            const figure = panel.closest("figure").id;
-            return [figure, frame.left, frame.right, frame.top, frame.bottom, drawn];
-        })""",
-    )
-    of_figure = {}
-    for figure, left, right, top, bottom, drawn in panels:
-        assert 0 <= left < right <= 390
-        assert drawn > 0
-        of_figure.setdefault(figure, []).append((top, bottom))
-    assert {"figure-saved", "figure-tasks", "figure-runtimes"} <= {*of_figure}
-    for rows in of_figure.values():
-        assert len(rows) > 1
-        assert all(bottom <= top + 1 for (_, bottom), (top, _) in itertools.pairwise(rows))
-    assert not any(drawn.is_visible() for drawn in page.locator("#figure-saved .wide").all())
-
-
 def test_nothing_scrolls_sideways_and_all_is_accessible(opened):
+    """On a phone the panels of a figure are drawn one by one, instead of side by side."""
     page = opened(reduced_motion="reduce")
     page.evaluate(OPEN_ALL)
     for width in (1280, 390):
         page.set_viewport_size({"width": width, "height": 900})
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        for name, seen in (("wide", width > 390), ("narrow", width == 390)):
+            drawn = page.locator(f"#figure-saved .{name}").all()
+            assert [each.is_visible() for each in drawn] == [seen] * len(drawn) != []
     # Rows of a table are alike: two of each. Pictures count by their labels alone.
     alike = "tbody tr:nth-child(n+3), svg > :not(:has(a))"
     page.eval_on_selector_all(alike, "all => all.forEach(each => each.remove())")

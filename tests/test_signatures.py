@@ -69,9 +69,6 @@ def test_permutations_by_brute_force():
     observed = distance_of_means(*groups)
     p = np.mean([distance_of_means(*each) >= observed - 1e-12 for each in divisions(*groups)])
     assert permutation_p(*groups, rng()) == pytest.approx(p)
-    drawn = permutation_p(*groups, rng(), resamples=34)
-    assert drawn == pytest.approx(p, abs=0.25)
-    assert drawn * 35 == pytest.approx(round(drawn * 35))  # the observed one counts
     assert math.isnan(permutation_p(groups[0][:1], groups[1], rng()))
 
 

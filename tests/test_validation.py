@@ -217,10 +217,6 @@ def test_a_name_and_a_path_stand_for_the_task(call):
         (lambda: interval({"a": "x", "a_low": 0, "a_high": 1}, "a"), "a_l"),
         (lambda: mean([1e101, 0.0, 1.0]), "1e100"),
         (lambda: coartic.execute(TASK, np.zeros((3, 10))), r"movements_of\(hands, targets\)"),
-        (
-            lambda: coartic.objective(TASK, "RRR")(np.zeros(3)),
-            r"\(3,\); .* many\(x\) takes .* rows",
-        ),
         (lambda: load_task("long/v1/i99"), "three digits: long/v1/i099"),
         (lambda: holm([0.1, 1.01]), "p-values"),
     ],

@@ -182,9 +182,16 @@ def straight_rows(saved, cost):
 
 @pytest.mark.parametrize(
     ("saved", "cost", "due"),
-    [(0.8, 20, "aim"), (0.2, 20, "posture"), (0.5, 20, "undecided"), (0.8, 0.5, "not judged")],
+    [
+        (0.8, 20, "aim"),
+        (0.2, 20, "posture"),
+        (0.49, 20, "undecided"),
+        (0.51, 20, "undecided"),
+        (0.8, 1.2, "not judged"),
+    ],
 )
 def test_what_the_centre_saves(tmp_path, saved, cost, due):
+    """Whole intervals decide: of the share beyond one half, of the cost above one tick."""
     rows = straight_rows(saved, cost)
     rows.loc[rows.run_id == "long3", "failures"] = 1  # a run that fails is left out
     rows.to_csv(tmp_path / "rows.csv", index=False)
@@ -192,7 +199,7 @@ def test_what_the_centre_saves(tmp_path, saved, cost, due):
     assert row.verdict == due
     assert (row.runs, row.left_out, row.at_centre) == (39, 1, False)
     assert row.cost == pytest.approx(cost, abs=0.5)
-    if cost > 1:
+    if cost == 20:
         assert row.share == pytest.approx(saved, abs=0.05)
         assert row.share_low < row.share < row.share_high
 

@@ -67,6 +67,8 @@ def test_without_a_lean_the_test_keeps_its_level():
     assert values.shape == (80, 7)
     assert abs(values.mean()) < 0.02
     assert share_rejected(values) < 0.118
+    pairs = planted(np.random.default_rng(7), 60, shift=0.4, people=2)
+    assert abs(values_of(pairs, people=2).mean()) < 0.1
     few = {target: contexts[target] for target in range(60)}
     own = values_of(few, own=True)
     assert own.mean() > 0.05
