@@ -51,6 +51,7 @@ LRLR = [*enumerate(("left", "right") * 2, 1)]
         ),
         (planned(posture(1.0), posture(2.0), hand="left"), "has no left hand"),
         ([Movement(1, "right", "planned"), *planned(posture(1.0))], "needs a target"),
+        ([Movement(1, "right", "path")], "a path needs waypoints"),
         ([Movement(1, "right", "path", WAY[0] + 1, waypoints=WAY)], "or its last waypoint"),
     ],
 )
