@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 
 from coartic.baselines.uninformed import Attempts, UninformedParameters
-from coartic.method import Method, Result, Session
+from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
@@ -51,11 +51,8 @@ class HillClimbing(Method):
 
     name = "hill-climbing"
     tuned_on = "nothing: the paper's values"
-    title = "Hill climbing, (1+1) for each hand sequence"
-    citation = (
-        "H.-G. Beyer, H.-P. Schwefel (2002). Evolution strategies: a comprehensive "
-        "introduction. Natural Computing."
-    )
+    title = "hill climbing"
+    facts = Facts(works=("beyer2002",))
     information = OPTIMISER_INFORMATION
     Parameters = HillClimbingParameters
 

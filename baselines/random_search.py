@@ -29,7 +29,7 @@ from coartic.baselines.uninformed import Attempts
 from coartic.internal.validation import sentence_error
 from coartic.learner.conditions import MOST_NOISE
 from coartic.learner.learning import TRIALS, runs_at_once
-from coartic.method import Method, MethodError, Parameters, Result, Session
+from coartic.method import Facts, Method, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import HANDS
 from coartic.tasks.task import hands_of
@@ -140,10 +140,12 @@ class RandomSearchHands(Method):
 
     name = "random-search/hands"
     tuned_on = "nothing: the paper's values"
-    title = "Random search with every hand sequence"
-    citation = (
-        "L. A. Rastrigin (1963). The convergence of the random search method in the extremal "
-        "control of a many parameter system. Automation and Remote Control."
+    title = "random search, every hand sequence"
+    facts = Facts(
+        works=("rastrigin1963",),
+        algorithm="random search",
+        short="random search, hands",
+        headline=False,
     )
     information = OPTIMISER_INFORMATION
     Parameters = RandomSearchHandsParameters
@@ -195,7 +197,8 @@ class RandomSearch(RandomSearchHands):
     """Random search with one hand sequence."""
 
     name = "random-search"
-    title = "Random search around the corrective process"
+    title = "random search"
+    facts = Facts(works=("rastrigin1963",))
     Parameters = RandomSearchParameters
 
     def solve(self, session: Session) -> Result:

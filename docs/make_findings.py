@@ -15,13 +15,14 @@ import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Any, get_args
+from unittest.mock import patch
 
 import finding_figures
 import pandas as pd
 from scipy import stats
 
 from coartic.analysis import Study, by_task, load, mean
-from coartic.analysis.figures import picture
+from coartic.analysis.figures import picture, style
 from coartic.analysis.statistics import task_mean
 from common.judging import Verdict
 from common.writing import fill_page
@@ -234,12 +235,18 @@ def filled_pages() -> dict[str, str]:
 
 
 def figures() -> dict[str, bytes]:
-    """Return every figure of the findings as SVG, by its path below ``docs``."""
-    drawings = {
-        name: draw(table, *[early_less_late] * (name == "early-gain"))
-        for name, draw in finding_figures.FIGURES.items()
-    }
-    return {f"stored/findings/{name}.svg": picture(made, ".svg") for name, made in drawings.items()}
+    """Return every figure of the findings as SVG, by its path below ``docs``.
+
+    They have the font that Matplotlib brings along, so that they are the same on every machine.
+    """
+    with patch.dict(style.RC, {"font.sans-serif": ["DejaVu Sans"]}):
+        drawings = {
+            name: draw(table, *[early_less_late] * (name == "early-gain"))
+            for name, draw in finding_figures.FIGURES.items()
+        }
+        return {
+            f"stored/findings/{name}.svg": picture(made, ".svg") for name, made in drawings.items()
+        }
 
 
 def store(results: Path) -> None:

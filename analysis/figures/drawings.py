@@ -290,7 +290,7 @@ def _width_of(shape: tuple[int, int]) -> float:
     return style.TWO if shape[1] > 1 else style.ONE
 
 
-ALONE = KNOWN_METHODS["corrective-alone/given"].algorithm
+ALONE = KNOWN_METHODS["corrective-alone/given"].facts.algorithm
 
 
 @figure(
