@@ -51,7 +51,7 @@ from coartic.analysis.running_times import (
     times_of,
     times_on_tasks,
 )
-from coartic.analysis.signatures import SAME, SIGNATURES, TwoContexts
+from coartic.analysis.signatures import SAME, SIGNATURES, Signature, TwoContexts
 from coartic.analysis.standings import (
     cells_of,
     compared_runs,
@@ -726,14 +726,17 @@ def list_contexts(study: Study) -> Rows:
             yield f"{first.name} {second.name} {label} goal {shared.goal} {shared.hand}", row
 
 
-_SIGNATURE = """
-    {0}[]            | {1} | {2} | {3}
-    {0}_control      | random search | {2} | {4}
-    {0}_difference[]
-    {0}_p            | p | p | {3}
-    {0}_control_runs
-"""
-"""Lines of the columns of a signature."""
+def _columns_of(signature: Signature) -> str:
+    """Return the lines of the columns of a signature."""
+    name, decimals = signature.column, signature.decimals
+    tex, of_control = ("tex" * (part in signature.in_latex) for part in ("value", "control"))
+    return f"""
+    {name}[]            | {signature.heading} | {decimals} | {tex}
+    {name}_control      | random search | {decimals} | {of_control}
+    {name}_difference[]
+    {name}_p            | p | p | {tex}
+    {name}_control_runs
+    """
 
 
 @table(
@@ -746,11 +749,7 @@ _SIGNATURE = """
     control_runs     | runs of random search
     control_idle_arm | idle arm in random search
     """
-    + _SIGNATURE.format("first", "first movement slower by (ticks)", 1, "tex", "tex")
-    + _SIGNATURE.format("whole", "whole task faster by (ticks)", 1, "", "")
-    + _SIGNATURE.format("arm", "next goal nearer by (ticks)", 1, "tex", "")
-    + _SIGNATURE.format("other_arm", "idle hand nearer to its next goal (share)", 2, "", "")
-    + _SIGNATURE.format("hand", "goals with the slower hand for them alone (share)", 2, "", ""),
+    + "".join(map(_columns_of, SIGNATURES.values())),
 )
 def list_signatures(study: Study) -> Rows:
     """Yield the signatures of each method, except searches, on each individual task.
@@ -767,7 +766,7 @@ def list_signatures(study: Study) -> Rows:
     under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
-    columns = {signature: signature.replace(" ", "_") for signature in SIGNATURES}
+    columns = {name: signature.column for name, signature in SIGNATURES.items()}
     endings = "_low", "_high", "_control", "_difference", "_difference_low", "_difference_high"
     none = {
         f"{column}{ending}": math.nan

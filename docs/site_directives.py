@@ -15,6 +15,7 @@ from sphinx.application import Sphinx
 from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
+from coartic.analysis import SIGNATURES
 from coartic.analysis.methods import title_of
 from coartic.benchmarks.registry import built_in
 from coartic.method import Information
@@ -135,6 +136,13 @@ def tuned() -> Iterator[str]:
     for name, info in built_in().items():
         names.setdefault(info.tuned_on, []).append(title_of(name))
     yield from (f"- {', '.join(each)}: **{text}**" for text, each in names.items())
+    yield ""
+
+
+def signatures() -> Iterator[str]:
+    """Yield a list of the signatures of a run with their definitions."""
+    for each in SIGNATURES.values():
+        yield f"- `{each.name}` ({each.heading.rpartition('(')[2]}: {each.definition}"
     yield ""
 
 
