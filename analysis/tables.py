@@ -168,19 +168,25 @@ class Table:
         return _frame_of(self, study)
 
 
+TABLES: dict[str, Table] = {}
+"""Tables by id, in the order of this module."""
+
+
 def table(
     caption: str, columns: str, *, with_settings: bool = False
 ) -> Callable[[Callable[[Study], Rows]], Table]:
     """Return a decorator that makes a table from a function that yields its rows.
 
-    The id of the table is the function's name without ``list_``, with dashes for underscores.
-    ``columns`` has a line for each column (:func:`_column_of`).
+    The decorator enters the table in :data:`TABLES`. The id of the table is the function's name
+    without ``list_``, with dashes for underscores. ``columns`` has a line for each column
+    (:func:`_column_of`).
     """
     parts = [_column_of(line) for line in columns.splitlines() if line.strip()]
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
         with_ids = *parts, Column("run_ids")
-        return Table(id_of(rows), caption, with_ids, rows, with_settings)
+        made = TABLES[id_of(rows)] = Table(id_of(rows), caption, with_ids, rows, with_settings)
+        return made
 
     return as_table
 
@@ -1151,23 +1157,3 @@ def list_failed(study: Study) -> Rows:
             reasons = "; ".join(commonest(failed.reason.fillna("")))
             row = _named(study, runs) | {"failed": len(failed), "reasons": reasons}
             yield f"{task} {label}", row | run_ids(failed)
-
-
-TABLES = {
-    table_.id: table_
-    for table_ in (
-        list_ranking,
-        list_not_ranked,
-        list_differences,
-        list_contexts,
-        list_signatures,
-        list_saved,
-        list_runtimes,
-        list_learning,
-        list_family_gaps,
-        list_tasks,
-        list_methods,
-        list_failed,
-    )
-}
-"""Tables by id."""

@@ -52,7 +52,9 @@ def test_a_report_is_stamped_with_the_results_of_its_runs(traced, report):
     assert [f'name="coartic-runs" content="{each}"' in page for each in stamps] == [1, 1, 0]
 
 
-def test_a_value_without_a_column_and_a_column_without_a_value_are_errors(traced):
+def test_a_value_without_a_column_and_a_column_without_a_value_are_errors(traced, monkeypatch):
+    monkeypatch.setattr(tables, "TABLES", {})
+
     def list_mine(study):
         yield "a row", {"method": "mine", "gpa": 1.0, "run_ids": ""}
 
