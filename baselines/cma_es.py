@@ -151,18 +151,7 @@ class CMAES(Method):
         Each hand sequence first gets a trial by the corrective process. If there are more than 4096
         sequences, only the initial one does. If all of these first trials fail, the method stops.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No trial hits every goal.
+        Raises MethodError if no trial hits every goal.
         """
         attempts = Attempts(session, self.parameters.trials)
         with session.solving():
@@ -206,20 +195,7 @@ class GoalByGoal(Method):
         - all hand sequences have failed;
         - ``epsilon`` is 0 and a failed sequence is chosen again.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No trial hits every goal.
-        NotApplicableError
-            No initial hands are found.
+        Raises MethodError if no trial hits every goal.
         """
         attempts = Attempts(session, self.parameters.trials)
         letters = sorted(letters_of(session.hands))

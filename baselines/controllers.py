@@ -247,21 +247,10 @@ class Control(Method):
 
         The search extends the sequence with the fewest ticks so far by the path to its next goal,
         until that sequence is complete. Of sequences with equal ticks, it chooses the one with the
-        fewest changes of hand, then the first one.
+        fewest changes of hand, then the first one. Return a movement for each goal, and counts of
+        the search as details.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-            A movement for each goal, and counts of the search as details.
-
-        Raises
-        ------
-        MethodError
-            The hand gets stuck in all sequences, or the solver fails.
+        Raises MethodError if the hand gets stuck in all sequences, or the solver fails.
         """
         task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = self.controller(session, task, self.parameters.period)

@@ -26,22 +26,7 @@ class GivenHands(Method):
     def solve(self, session: Session) -> Result:
         """Make one trial with the task's initial hands, and return its movements.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            The trial misses a goal.
-        NotApplicableError
-            No initial hands are found.
-        BudgetError
-            No trial is left.
+        Raises MethodError if the trial misses a goal.
         """
         hands = session.find_initial_hands()
         with session.solving():
@@ -72,18 +57,7 @@ class BestHands(GivenHands):
         Trials stop when the budget ends. Of trials with equal rewards, the one with the fewest
         changes of hand is best.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No trial hits every goal.
+        Raises MethodError if no trial hits every goal.
         """
         completed: list[Execution] = []
         for hands in sequences_with(session.hands, session.goals_count, session.task_name):

@@ -59,21 +59,9 @@ class HillClimbing(Method):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left or all hand sequences have failed.
 
-        Parameters
-        ----------
-        session : Session
+        Return the movements of the best trial.
 
-        Returns
-        -------
-        Result
-            The movements of the best trial.
-
-        Raises
-        ------
-        MethodError
-            No trial hits every goal.
-        NotApplicableError
-            No initial hands are found.
+        Raises MethodError if no trial hits every goal.
         """
         initial_hands, rng = session.find_initial_hands(), session.rng
         letters = letters_of(session.hands)

@@ -64,19 +64,8 @@ class OptimumSearch(Method):
 
         At most 64 hand sequences are searched in each graph.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No movements that hit every goal are found, or the locks of the base make the task
-            invalid.
+        Raises MethodError if no movements that hit every goal are found, or the locks of the base
+        make the task invalid.
         """
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"

@@ -93,18 +93,7 @@ class PostureBased(Method):
     def solve(self, session: Session) -> Result:
         """Plan a movement to each goal from the expected end of the movement before.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            Correction brings no posture to a goal.
+        Raises MethodError if correction brings no posture to a goal.
         """
         with session.building():
             planner = PosturePlanner(session, self.parameters, self.horizon)

@@ -28,8 +28,8 @@ from pydantic import Field, model_validator
 from coartic.baselines.uninformed import Attempts
 from coartic.internal.validation import sentence_error
 from coartic.learner.conditions import MOST_NOISE
-from coartic.learner.learning import TRIALS, runs_at_once
-from coartic.method import Facts, Method, MethodError, Parameters, Result, Session
+from coartic.learner.learning import runs_at_once
+from coartic.method import TRIALS, Facts, Method, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import HANDS
 from coartic.tasks.task import hands_of
@@ -164,18 +164,7 @@ class RandomSearchHands(Method):
         The shares of the sequences differ by at most one trial. If the corrective process fails
         with a sequence, the rest of its share is not used.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            The corrective process completes no hand sequence that has a trial.
+        Raises MethodError if the corrective process completes no hand sequence that has a trial.
         """
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
@@ -204,20 +193,8 @@ class RandomSearch(RandomSearchHands):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left, and return the movements of the best trial.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No trial is left to make, or the corrective process completes no hand sequence tried.
-        ValueError
-            Parameter ``hands`` does not fit the task.
+        Raises MethodError if no trial is left to make, or the corrective process completes no hand
+        sequence tried.
         """
         parameters: RandomSearchParameters = self.parameters
         with session.solving():

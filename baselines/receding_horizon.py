@@ -83,18 +83,7 @@ class RecedingHorizon(Method):
     def solve(self, session: Session) -> Result:
         """Plan window by window, and return the movements that were made.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No path is found.
+        Raises MethodError if no path is found.
         """
         task, parameters = session.reveal(*self.information), self.parameters
         rng = np.random.default_rng(0)  # the same graphs for all seeds

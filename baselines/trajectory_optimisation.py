@@ -153,18 +153,7 @@ class TrajectoryOptimisation(Method):
         The cheapest plan for path length is solved again in whole ticks. If that fails, it is
         solved again with targets well inside the discs.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            The solver finds no plan.
+        Raises MethodError if the solver finds no plan.
         """
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():

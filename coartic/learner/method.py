@@ -19,9 +19,10 @@ from coartic.learner.conditions import (
     VARIANTS,
     ExplorationCondition,
 )
-from coartic.learner.learning import TRIALS, learn_many, runs_at_once
-from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
+from coartic.learner.learning import learn_many, runs_at_once
 from coartic.method import (
+    CORRECTIONS_BY_TENTH,
+    TRIALS,
     Facts,
     Information,
     Meter,
@@ -93,13 +94,8 @@ class DualProcess(Method):
         The learned solution is the best trial or, if the condition has ``learned="replay"``, the
         noiseless trial after learning.
 
-        Raises
-        ------
-        MethodError
-            The trial with the learned solution did not hit every goal, or the budget has no trial
-            left.
-        NotApplicableError
-            No initial hands are found.
+        Raises MethodError if the trial with the learned solution did not hit every goal, or the
+        budget has no trial left.
         """
         (result,) = self.solve_together([session])
         if isinstance(result, MethodError):

@@ -8,7 +8,9 @@ executes, scores and verifies the solution.
 """
 
 from coartic.method.base import (
+    CORRECTIONS_BY_TENTH,
     MODULES,
+    TRIALS,
     Facts,
     Method,
     Outline,
@@ -30,9 +32,11 @@ from coartic.method.session import (
 )
 
 __all__ = [
+    "CORRECTIONS_BY_TENTH",
     "METERED",
     "MODULES",
     "MOST_COUNT",
+    "TRIALS",
     "BudgetError",
     "Facts",
     "Information",

@@ -24,6 +24,12 @@ from coartic.robot import Hand
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import INITIAL_POLICIES, Task
 
+TRIALS = 10_000
+"""Number of trials of a run by default (published)."""
+CORRECTIONS_BY_TENTH = "corrections"
+"""Key in the details of a learner's result: the numbers of corrective movements in trial 0 and in
+each tenth of the later trials."""
+
 
 @in_sentences
 class Parameters(BaseModel):
@@ -165,12 +171,24 @@ class Method(ABC):
     def solve(self, session: Session) -> Result:
         """Find a solution of the session's task, and return it.
 
+        Parameters
+        ----------
+        session : Session
+            One task, one seed and one budget. All calls go through it.
+
+        Returns
+        -------
+        Result
+            The solution, with at least one movement for each goal, and further data to be stored.
+
         Raises
         ------
         MethodError
             No solution is found.
         NotApplicableError
             No initial hands are found.
+        BudgetError
+            The method made a trial when none was left.
         """
 
     def max_batch(self) -> int:
