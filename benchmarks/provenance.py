@@ -27,6 +27,12 @@ from coartic.motion.compile import PACKAGE, hash_of_files, python_files
 
 _LIBRARIES = ("casadi", "daqp", "llvmlite", "numba", "numpy", "pandas", "pydantic", "scipy")
 """Libraries that results may depend on."""
+MODEL_FILES = [
+    *(PACKAGE / name for name in ("robot.py", "model.py", "tasks/task.py")),
+    *python_files("motion", "learner", "method"),
+]
+"""Files of the model, which may change results."""
+_MODEL_CODE = hash_of_files(MODEL_FILES)
 
 
 @cache
@@ -39,7 +45,7 @@ def current_environment() -> dict[str, Any]:
     -------
     dict
         - ``coartic``, ``python``, ``packages``: versions;
-        - ``model_code``: hash of the code of the model (:func:`_hash_of_model`);
+        - ``model_code``: hash of the code of the model (:data:`MODEL_FILES`);
         - ``commit``: commit of the checkout;
         - ``platform``, ``processor``, ``cores``: the machine;
         - ``arithmetic``: fingerprint of rounding (:func:`arithmetic`);
@@ -52,7 +58,7 @@ def current_environment() -> dict[str, Any]:
             processor = named[1]
     return {
         "coartic": coartic.__version__,
-        "model_code": _hash_of_model(),
+        "model_code": _MODEL_CODE,
         "commit": _commit_of_checkout(),
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in _LIBRARIES},
@@ -81,13 +87,6 @@ def made_with() -> dict[str, Any]:
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
     return current_environment() | {"command": command, "date": now()}
-
-
-def _hash_of_model() -> str:
-    """Return the hash of ``robot.py``, ``model.py``, ``tasks/task.py``, ``motion``, ``learner`` and
-    ``method``, which may change results."""
-    single = [PACKAGE / name for name in ("robot.py", "model.py", "tasks/task.py")]
-    return hash_of_files([*single, *python_files("motion", "learner", "method")])
 
 
 def _commit_of_checkout() -> dict[str, Any] | None:

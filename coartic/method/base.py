@@ -226,8 +226,8 @@ MODULES = (
     "coartic.baselines.receding_horizon",
     "coartic.baselines.optimum",
 )
-"""Modules of the built-in methods, each with a list ``METHODS``, in the order of lists and
-figures."""
+"""Modules of the built-in methods, each with a list ``METHODS``, in the order of lists and figures.
+Add a new one at the end, so that the others keep their looks."""
 
 
 @cache
