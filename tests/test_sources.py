@@ -33,9 +33,10 @@ def test_each_shipped_table_is_listed_once():
     listed = [file for table in TABLES for file in table["files"]]
     assert len(listed) == len({*listed})
     there = {str(path.relative_to(ROOT)) for path in paths}
-    where = "sources.toml in the folder of its study, or in docs/stored/SOURCES.toml"
-    assert not there - {*listed}, f"list each table in {where}"
-    assert not {*listed} - there, f"these tables are not there: correct {where}"
+    where = "sources.toml of the folder of its study, or in docs/stored/SOURCES.toml"
+    missing, lost = sorted(there - {*listed}), sorted({*listed} - there)
+    assert not missing, f"list each of {missing} in {where}"
+    assert not lost, f"there is none of {lost}: correct {where}"
 
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table["files"][0])
