@@ -772,7 +772,9 @@ def list_signatures(study: Study) -> Rows:
     under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
-    columns = {name: signature.column for name, signature in SIGNATURES.items()}
+    # The row of the choice of hands is above those of hand sequences.
+    ordered = sorted(SIGNATURES.values(), key=lambda signature: signature.by_hands)
+    columns = {signature.name: signature.column for signature in ordered}
     endings = "_low", "_high", "_control", "_difference", "_difference_low", "_difference_high"
     none = {
         f"{column}{ending}": math.nan
