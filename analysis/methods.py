@@ -52,7 +52,7 @@ OWN_COLOR, OWN_MARK = "walnut", "star"
 """Colour of the first nine methods from files, and marker of the first one. No built-in method has
 this colour or this marker."""
 ORDER = ("azure", "rust", "navy", "rose", "ink", "grape", "silver", "amber", "forest")
-"""Colours of the built-in methods with one kind of information, in the order of these methods."""
+"""Colours of the built-in methods of a group, in the order of these methods."""
 MARKS: dict[str, Any] = {
     "star": ("*", "-"),
     "diamond": ("D", (0, (9, 1.5))),
@@ -115,12 +115,14 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "not using the reward",
 )
 """Groups of methods by their use of the reward."""
-MARKS_OF = {
-    BY_TRIAL: ("diamond", "circle", "triangle"),
-    BY_FORMULA: ("square", "inverted-triangle", "plus"),
-    WITHOUT_REWARD: ("cross", "thin-diamond"),
+LOOKS_OF = {
+    BY_TRIAL: ("azure", ("diamond", "circle", "triangle")),
+    BY_FORMULA: ("amber", ("square", "inverted-triangle", "plus")),
+    WITHOUT_REWARD: ("azure", ("cross", "thin-diamond")),
 }
-"""Markers of built-in methods by group."""
+"""First colour and all markers of the built-in methods by group. The groups begin at different
+colours, so that the shortest-path plan differs from the learners and searches that figures compare
+with it."""
 MARK = " ‡"
 """Mark after the title of a method for which there are warnings (:attr:`.Study.marks`)."""
 
@@ -287,13 +289,14 @@ def joined_label(one: str, two: str) -> str:
 def _pairs_of(group: str) -> list[tuple[str, str]]:
     """Return the looks of a group: all pairs of a colour and one of the group's markers.
 
-    Pairs that follow each other differ in both as long as there are unused colours.
+    Pairs that follow each other differ in both.
     """
-    marks = MARKS_OF[group]
+    first, marks = LOOKS_OF[group]
+    begin = ORDER.index(first)
     return [
         (color, marks[(number + turn) % len(marks)])
         for turn in range(len(marks))
-        for number, color in enumerate(ORDER)
+        for number, color in enumerate(ORDER[begin:] + ORDER[:begin])
     ]
 
 
