@@ -70,11 +70,13 @@ def bibliography(
     reasons = {"coartic": ["the software"], THE_PAPER: ["the paper"]}
     others = []
     for name, method in methods.items():
-        row = KNOWN_METHODS.get(name) if method.origin == BUILT_IN else None
-        if row is None:
+        known = KNOWN_METHODS.get(name) if method.origin == BUILT_IN else None
+        facts = known.facts if known else method.facts
+        if known is None:
             others.append(name)
-        for key in (*row.works, *row.solvers) if row else ():
-            reasons.setdefault(key, []).append(name)
+        for key in (*facts.works, *facts.solvers):
+            if key in works:
+                reasons.setdefault(key, []).append(name)
     for key in STATISTICS if analysis else ():
         reasons.setdefault(key, []).append("the analysis")
     entries = [f"{_comment(', '.join(whose))}\n{works[key]}" for key, whose in reasons.items()]
@@ -84,7 +86,12 @@ def bibliography(
             title = latex(" ".join(methods[name].title.split()) or name)
             declared = _misc(f"method-{slug[name]}", title=title, note=latex(citation))
             entries.append(f"{_comment(f'{name} cites: {citation}')}\n{declared}")
-        else:
+        facts = methods[name].facts
+        keys = (*facts.works, *facts.solvers)
+        if unknown := [key for key in keys if key not in works]:
+            words = f"{name} names {', '.join(unknown)}, which coartic's bibliography does not have"
+            entries.append(_comment(words))
+        if not citation and not keys:
             words = f"{name}: it declares no citation; ask its authors what to cite"
             entries.append(_comment(words))
         if used := (imports or {}).get(name):

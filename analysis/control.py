@@ -28,7 +28,7 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.methods import BY_TRIAL, LEARNERS, RANDOM_SEARCH, headline_methods
-from coartic.analysis.signatures import TwoContexts, context_pairs
+from coartic.analysis.signatures import SIGNATURES, TwoContexts, context_pairs
 from coartic.analysis.study import MOST_EXECUTED, Study, solved
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
@@ -91,7 +91,7 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
     """
     values = study.signature(signature, task, label).to_numpy(np.float64)
     hands = np.array(study.cells[task, label].hands.fillna("").tolist(), dtype=object)
-    if signature == "hand":
+    if not SIGNATURES[signature].by_hands:
         hands[:] = ""
     has_value = np.isfinite(values)
     sequences = sorted({*hands[has_value]})

@@ -1,21 +1,19 @@
 """Describe methods: facts about the built-in methods, and a frame of the methods of a study.
 
-The facts are in ``methods.toml``. :func:`methods_of` returns the frame.
+Each method declares its facts itself. :func:`methods_of` returns the frame.
 """
 
 from __future__ import annotations
 
 import itertools
 import json
-import tomllib
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, METHOD_PREFIX
-from coartic.method import Information
+from coartic.method import Information, Method, built_in_methods
 from coartic.runs.plan import in_words
 
 if TYPE_CHECKING:
@@ -30,6 +28,9 @@ LEARNERS = EC1, EC2, EC3, EC4 = tuple(CONDITION_OF)[: len(CONDITIONS)]
 arms."""
 INFORMED_LEARNERS = tuple(f"{METHOD_PREFIX}{name}" for name in INFORMED)
 """Ids of the informed learner, for one arm and for two arms."""
+RANKED_TOGETHER = {EC1: (EC4, EC3), INFORMED_LEARNERS[0]: INFORMED_LEARNERS[1:]}
+"""Ids of conditions for two arms by the id of the condition for one arm with which the first of
+them that ran has one row in the ranking."""
 RANDOM_SEARCH = "random-search"
 """Id of random search, which selects the best of random targets around corrective postures."""
 
@@ -47,38 +48,27 @@ COLORS = {
     "amber": "#eba717",
 }
 """Colours of methods by name, from dark to light. ``page.css`` has lighter ones for a dark page."""
+OWN_COLOR, OWN_MARK = "walnut", "star"
+"""Colour of the first nine methods from files, and marker of the first one. No built-in method has
+this colour or this marker."""
+ORDER = ("azure", "rust", "navy", "rose", "ink", "grape", "silver", "amber", "forest")
+"""Colours of the built-in methods of a group, in the order of these methods."""
 MARKS: dict[str, Any] = {
     "star": ("*", "-"),
-    "circle": ("o", (0, (1, 1.2))),
-    "square": ("s", (0, (4, 1.5))),
     "diamond": ("D", (0, (9, 1.5))),
-    "thin-diamond": ("d", "-"),
+    "circle": ("o", (0, (1, 1.2))),
     "triangle": ("^", (0, (3, 1, 1, 1, 1, 1))),
+    "square": ("s", (0, (4, 1.5))),
     "inverted-triangle": ("v", (0, (2, 2))),
     "plus": ("P", (0, (5, 1.2, 1, 1.2))),
     "cross": ("X", (0, (7, 1, 3, 1))),
+    "thin-diamond": ("d", "-"),
 }
 """Markers of methods as Matplotlib names them, each with the dash of the method's lines."""
 
 
-class _KnownMethod(NamedTuple):
-    """Facts about a built-in method; ``methods.toml`` explains the fields."""
-
-    name: str
-    algorithm: str
-    works: Sequence[str]
-    look: Sequence[str] = ()
-    headline: bool = False
-    ablation_of: str = ""
-    solvers: Sequence[str] = ()
-    short: str = ""
-
-
-KNOWN_METHODS = {
-    name: _KnownMethod(**row)
-    for name, row in tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items()
-}
-"""Facts about the built-in methods by id, in the order of lists and figures."""
+KNOWN_METHODS: Mapping[str, type[Method]] = built_in_methods()
+"""Classes of the built-in methods by id, in the order of lists and figures."""
 SEARCHES = ("optimum/search",)
 """Ids of the searches for the optimum, which are references and not compared with methods."""
 _WORDS = {
@@ -103,14 +93,15 @@ def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False
     setting : str
         Setting of the method, such as ``sigma=0.1, stop=1``; it may be empty.
     short : bool
-        True for the short name of a built-in method, if it has one, and for the id of a method from
-        a file.
+        True for the short name, if the method has one. Otherwise the short name is the title of a
+        built-in method, and the id of a method from a file.
     """
-    name, title = (method, method) if isinstance(method, str) else (method.name, method.title)
-    if known := KNOWN_METHODS.get(name):
-        name = (short and known.short) or known.name
+    if known := KNOWN_METHODS.get(method if isinstance(method, str) else method.name):
+        name = (short and known.facts.short) or known.title
+    elif isinstance(method, str):
+        name = one_line(method)
     else:
-        name = one_line(name if short else title)
+        name = one_line((method.facts.short or method.name) if short else method.title)
     if not setting:
         return name
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
@@ -124,9 +115,14 @@ BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
     "not using the reward",
 )
 """Groups of methods by their use of the reward."""
-OWN_COLOR, OWN_MARK = "walnut", "star"
-"""Colour of the first nine methods from files, and marker of the first one. No built-in method has
-this colour or this marker."""
+LOOKS_OF = {
+    BY_TRIAL: ("azure", ("diamond", "circle", "triangle")),
+    BY_FORMULA: ("amber", ("square", "inverted-triangle", "plus")),
+    WITHOUT_REWARD: ("azure", ("cross", "thin-diamond")),
+}
+"""First colour and all markers of the built-in methods by group. The groups begin at different
+colours, so that the shortest-path plan differs from the learners and searches that figures compare
+with it."""
 MARK = " ‡"
 """Mark after the title of a method for which there are warnings (:attr:`.Study.marks`)."""
 
@@ -136,7 +132,7 @@ def methods_of(
 ) -> pd.DataFrame:
     """Return a frame of the methods that have runs, with a row for each setting.
 
-    Built-in methods come first, in the order of ``methods.toml``, then methods from files, in the
+    Built-in methods come first, in the order of :data:`.MODULES`, then methods from files, in the
     order of the suite. If two conditions of the learner are ranked as one (:func:`ranked_as`), they
     have a further row, with most columns of the second condition.
 
@@ -159,6 +155,7 @@ def methods_of(
     rows, by_label = dict[str, dict[str, Any]](), dict([*runs.groupby("label", sort=False)])
     varied = parameters_varied(runs)
     titles = Counter(map(title_of, declared.values()))
+    shorts = Counter(title_of(info, short=True) for info in declared.values())
     for label, of_method in by_label.items():
         base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
         named = setting
@@ -167,25 +164,27 @@ def methods_of(
             named = in_words(dict(zip(varied.columns, varied.loc[label], strict=True)))
             named += default_note * (not setting)
         info = declared[base]
-        facts = KNOWN_METHODS.get(base) if info.is_ours else None
-        default = base if setting else facts.ablation_of if facts else ""
+        known = KNOWN_METHODS.get(base) if info.is_ours else None
+        facts = known.facts if known else info.facts
+        default = base if setting else facts.ablation_of
         called = info if titles[title_of(info)] == 1 else base  # ids, if titles are the same
+        briefly = info if shorts[title_of(info, short=True)] == 1 else base
         under = default if default in by_label and label not in varied.index else ""
         rows[label] = {
             "base": base,
             "condition": CONDITION_OF.get(base, ""),
             "setting": setting,
             "title": title_of(called, named) + MARK * (base in marked),
-            "short": title_of(base, named, short=True) + MARK * (base in marked),
-            "algorithm": facts.algorithm if facts else one_line(label),
+            "short": title_of(briefly, named, short=True) + MARK * (base in marked),
+            "algorithm": one_line(facts.algorithm or (known.title if known else label)),
             "is_learner": base in LEARNERS,
             "is_search": base in SEARCHES,
             "information": _group_of(of_method),
             "built_in": info.is_ours,
             "stochastic": info.stochastic,
-            "headline": facts is None or facts.headline,
+            "headline": facts.headline,
             "under": under,
-            "look": tuple(facts.look) if facts and not setting else (),
+            "look": LOOKS.get(base, ()) if known and not setting else (),
         }
     for label, joined in runs[runs.ranked_as != runs.label].groupby("ranked_as"):
         second = rows[max(joined.label, key=[*KNOWN_METHODS].index)]
@@ -253,7 +252,14 @@ def _group_of(runs: pd.DataFrame) -> str:
     - otherwise ``not using the reward``.
     """
     information = {kind for text in runs.information.unique() for kind in text.split(", ")}
-    if (runs.trials > 1).any() and Information.REWARD_BY_TRIAL.value in information:
+    if not (runs.trials > 1).any():
+        information -= {Information.REWARD_BY_TRIAL.value}
+    return _group_with(information)
+
+
+def _group_with(information: Collection[str]) -> str:
+    """Return the group of a method that uses kinds of information (values of Information)."""
+    if Information.REWARD_BY_TRIAL.value in information:
         return BY_TRIAL
     return BY_FORMULA if Information.REWARD_FORMULA.value in information else WITHOUT_REWARD
 
@@ -267,7 +273,7 @@ def ranked_as(runs: pd.DataFrame) -> pd.Series:
     """
     tasks = {label: {*of_method.task} for label, of_method in runs.groupby("label")}
     names = runs.label
-    for one, others in ((EC1, (EC4, EC3)), (INFORMED_LEARNERS[0], INFORMED_LEARNERS[1:])):
+    for one, others in RANKED_TOGETHER.items():
         for two in others:
             if one in tasks and two in tasks and not tasks[one] & tasks[two]:
                 names = names.mask(names.isin([one, two]), joined_label(one, two))
@@ -280,26 +286,64 @@ def joined_label(one: str, two: str) -> str:
     return f"{METHOD_PREFIX.rstrip('/')} ({CONDITION_OF[one]}, {CONDITION_OF[two]})"
 
 
+def _pairs_of(group: str) -> list[tuple[str, str]]:
+    """Return the looks of a group: all pairs of a colour and one of the group's markers.
+
+    Pairs that follow each other differ in both.
+    """
+    first, marks = LOOKS_OF[group]
+    begin = ORDER.index(first)
+    return [
+        (color, marks[(number + turn) % len(marks)])
+        for turn in range(len(marks))
+        for number, color in enumerate(ORDER[begin:] + ORDER[:begin])
+    ]
+
+
+def _looks_of_built_in() -> dict[str, tuple[str, str]]:
+    """Return the colour and the marker of each built-in method that represents its algorithm.
+
+    In each group (:data:`GROUPS`) the methods get the pairs of :func:`_pairs_of` in their order. A
+    condition for one arm has the colour of the condition for two arms with which it is ranked.
+    """
+    looks, free = dict[str, tuple[str, str]](), {group: _pairs_of(group) for group in GROUPS}
+    headlines = {name: each for name, each in KNOWN_METHODS.items() if each.facts.headline}
+    for name in sorted(headlines, key=RANKED_TOGETHER.__contains__):
+        pairs = free[_group_with({kind.value for kind in headlines[name].information})]
+        colors = [looks[two][0] for two in RANKED_TOGETHER.get(name, ())[:1]]
+        looks[name] = next(pair for pair in pairs if not colors or pair[0] in colors)
+        pairs.remove(looks[name])
+    return looks
+
+
+LOOKS = _looks_of_built_in()
+"""Names of colour and marker of the built-in methods that represent their algorithms, by id."""
+
+
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
     """Yield the label of each row with the names of its colour and marker.
 
     - A row with a ``look`` keeps it.
     - The first nine methods from files have :data:`OWN_COLOR` and a marker.
-    - Other rows have the next free pair, those with unused colours first. After the last pair, the
-      first is used again.
+    - Other rows have the next free pair of their group, those with unused colours first. After the
+      last pair, the first is used again.
     """
     fixed = {row["look"] for row in rows.values()}
     taken = {look[0] for look in fixed if look}
-    colors = [color for color in COLORS if color not in (OWN_COLOR, "ink")]
-    colors.sort(key=taken.__contains__)
-    marks = [mark for mark in MARKS if mark != OWN_MARK]
-    pairs = ((c, marks[(k + shift) % len(marks)]) for shift in range(len(marks))
-             for k, c in enumerate(colors))  # fmt: skip
-    free = itertools.cycle(pair for pair in pairs if pair not in fixed)
-    theirs = itertools.chain(((OWN_COLOR, mark) for mark in MARKS), free)
+    free = {
+        group: itertools.cycle(
+            sorted(
+                (pair for pair in _pairs_of(group) if pair not in fixed),
+                key=lambda pair: pair[0] in taken,
+            )
+        )
+        for group in GROUPS
+    }
+    own = ((OWN_COLOR, mark) for mark in MARKS)
     for label in sorted(rows, key=lambda label: bool(rows[label]["built_in"])):
         row = rows[label]
-        yield label, row["look"] or next(free if row["built_in"] else theirs)
+        others = free[row["information"]]
+        yield label, row["look"] or (None if row["built_in"] else next(own, None)) or next(others)
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:

@@ -279,12 +279,30 @@ def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
 
 @dataclass(frozen=True)
 class Signature:
-    """A signature of coarticulation."""
+    """A signature of coarticulation, with all that tables and pages say of it."""
 
+    name: str
+    """Name, such as ``other arm``. Names of columns have ``_`` for spaces."""
     each: Callable[[Solutions], Array]
-    """Function that returns the signature of each run, shape ``(n,)``, NaN for runs without it."""
+    """Function that returns the signature of each run, shape ``(n,)``. It is NaN for a run without
+    the signature, and an empty array for no runs."""
+    heading: str
+    """Heading of its column, with the unit."""
+    decimals: int
+    """Number of decimals in tables."""
     words: str
     """What the signature measures, in words with its unit."""
+    definition: str
+    """Definition on the site: sentences after the name and the unit."""
+    in_latex: str = ""
+    """Columns that LaTeX also has: ``value``, ``value and control`` (of random search), or none."""
+    by_hands: bool = True
+    """True to compare it only with runs that have the same hand sequence."""
+
+    @property
+    def column(self) -> str:
+        """Name of its column."""
+        return self.name.replace(" ", "_")
 
 
 def hand(runs: Solutions) -> Array:
@@ -343,32 +361,89 @@ def arm(runs: Solutions) -> Array:
 
 
 SIGNATURES = {
-    "hand": Signature(
-        hand,
-        "share of the goals that others follow which are hit with the slower hand for them alone",
-    ),
-    "arm": Signature(
-        arm,
-        "ticks by which the posture of base and chosen arm leaves the next goal nearer, with the "
-        "idle arm where it was (mean over goals)",
-    ),
-    "other arm": Signature(
-        other_arm,
-        "share of the initial distance to its next goal by which the idle arm brings its hand "
-        "nearer (mean over goals)",
-    ),
-    "first": Signature(
-        lambda runs: runs.against_same_hands[:, 0],
-        "ticks by which the first movement is longer than the corrective process's with the same "
-        "hands",
-    ),
-    "whole": Signature(
-        lambda runs: -runs.against_same_hands.sum(axis=1),
-        "ticks by which the whole task is shorter than the corrective process's",
-    ),
+    signature.name: signature
+    for signature in (
+        Signature(
+            name="first",
+            each=lambda runs: runs.against_same_hands[:, 0],
+            heading="first movement slower by (ticks)",
+            decimals=1,
+            words=(
+                "ticks by which the first movement is longer than the corrective process's with "
+                "the same hands"
+            ),
+            definition=(
+                "how many more ticks the first goal takes than in the corrective process alone "
+                "with the same hands. If it is positive and the whole task is faster, the first "
+                "movement is sacrificed."
+            ),
+            in_latex="value and control",
+        ),
+        Signature(
+            name="whole",
+            each=lambda runs: -runs.against_same_hands.sum(axis=1),
+            heading="whole task faster by (ticks)",
+            decimals=1,
+            words="ticks by which the whole task is shorter than the corrective process's",
+            definition=(
+                "how many fewer ticks the whole task takes than in the corrective process alone "
+                "with the same hands."
+            ),
+        ),
+        Signature(
+            name="arm",
+            each=arm,
+            heading="next goal nearer by (ticks)",
+            decimals=1,
+            words=(
+                "ticks by which the posture of base and chosen arm leaves the next goal nearer, "
+                "with the idle arm where it was (mean over goals)"
+            ),
+            definition=(
+                "how much sooner the corrective process reaches the next goal because base and "
+                "chosen arm are prepared. It starts once from their posture at the goal, and once"
+                " from the posture in which it would itself have hit the goal. The idle arm stays"
+                " where it was both times. The value is a mean over the goals before the last."
+            ),
+            in_latex="value",
+        ),
+        Signature(
+            name="other arm",
+            each=other_arm,
+            heading="idle hand nearer to its next goal (share)",
+            decimals=2,
+            words=(
+                "share of the initial distance to its next goal by which the idle arm brings its "
+                "hand nearer (mean over goals)"
+            ),
+            definition=(
+                "how much nearer the idle hand is to its own next goal because its arm has moved "
+                "since its own last hit. This is divided by the hand's distance in the initial "
+                "solution. It is 0 if the arm keeps still, whatever the base does. The value is a"
+                " mean over goals."
+            ),
+        ),
+        Signature(
+            name="hand",
+            each=hand,
+            heading="goals with the slower hand for them alone (share)",
+            decimals=2,
+            words=(
+                "share of the goals that others follow which are hit with the slower hand for "
+                "them alone"
+            ),
+            definition=(
+                "the share of goals, without the last, that are hit with another hand than the "
+                "corrective process would use. It would use the hand that gets there in fewest "
+                "ticks from the same posture."
+            ),
+            by_hands=False,
+        ),
+    )
 }
-"""Signatures by name. ``first`` is t(i, 1) − c(i, 1), and ``whole`` is Σ_g c(i, g) − t(i, g). Both
-are NaN if the corrective process does not complete the task with the hands of the run."""
+"""Signatures by name, in the order of tables. ``first`` is t(i, 1) − c(i, 1), and ``whole`` is
+Σ_g c(i, g) − t(i, g). Both are NaN if the corrective process does not complete the task with the
+hands of the run."""
 
 
 IN_MEMORY = 500

@@ -51,7 +51,7 @@ from coartic.analysis.running_times import (
     times_of,
     times_on_tasks,
 )
-from coartic.analysis.signatures import SAME, SIGNATURES, TwoContexts
+from coartic.analysis.signatures import SAME, SIGNATURES, Signature, TwoContexts
 from coartic.analysis.standings import (
     cells_of,
     compared_runs,
@@ -168,19 +168,25 @@ class Table:
         return _frame_of(self, study)
 
 
+TABLES: dict[str, Table] = {}
+"""Tables by id, in the order of this module."""
+
+
 def table(
     caption: str, columns: str, *, with_settings: bool = False
 ) -> Callable[[Callable[[Study], Rows]], Table]:
     """Return a decorator that makes a table from a function that yields its rows.
 
-    The id of the table is the function's name without ``list_``, with dashes for underscores.
-    ``columns`` has a line for each column (:func:`_column_of`).
+    The decorator enters the table in :data:`TABLES`. The id of the table is the function's name
+    without ``list_``, with dashes for underscores. ``columns`` has a line for each column
+    (:func:`_column_of`).
     """
     parts = [_column_of(line) for line in columns.splitlines() if line.strip()]
 
     def as_table(rows: Callable[[Study], Rows]) -> Table:
         with_ids = *parts, Column("run_ids")
-        return Table(id_of(rows), caption, with_ids, rows, with_settings)
+        made = TABLES[id_of(rows)] = Table(id_of(rows), caption, with_ids, rows, with_settings)
+        return made
 
     return as_table
 
@@ -726,14 +732,17 @@ def list_contexts(study: Study) -> Rows:
             yield f"{first.name} {second.name} {label} goal {shared.goal} {shared.hand}", row
 
 
-_SIGNATURE = """
-    {0}[]            | {1} | {2} | {3}
-    {0}_control      | random search | {2} | {4}
-    {0}_difference[]
-    {0}_p            | p | p | {3}
-    {0}_control_runs
-"""
-"""Lines of the columns of a signature."""
+def _columns_of(signature: Signature) -> str:
+    """Return the lines of the columns of a signature."""
+    name, decimals = signature.column, signature.decimals
+    tex, of_control = ("tex" * (part in signature.in_latex) for part in ("value", "control"))
+    return f"""
+    {name}[]            | {signature.heading} | {decimals} | {tex}
+    {name}_control      | random search | {decimals} | {of_control}
+    {name}_difference[]
+    {name}_p            | p | p | {tex}
+    {name}_control_runs
+    """
 
 
 @table(
@@ -746,11 +755,7 @@ _SIGNATURE = """
     control_runs     | runs of random search
     control_idle_arm | idle arm in random search
     """
-    + _SIGNATURE.format("first", "first movement slower by (ticks)", 1, "tex", "tex")
-    + _SIGNATURE.format("whole", "whole task faster by (ticks)", 1, "", "")
-    + _SIGNATURE.format("arm", "next goal nearer by (ticks)", 1, "tex", "")
-    + _SIGNATURE.format("other_arm", "idle hand nearer to its next goal (share)", 2, "", "")
-    + _SIGNATURE.format("hand", "goals with the slower hand for them alone (share)", 2, "", ""),
+    + "".join(map(_columns_of, SIGNATURES.values())),
 )
 def list_signatures(study: Study) -> Rows:
     """Yield the signatures of each method, except searches, on each individual task.
@@ -767,7 +772,9 @@ def list_signatures(study: Study) -> Rows:
     under EC3.
     """
     labels = study.methods.index[~study.methods.is_search]
-    columns = {signature: signature.replace(" ", "_") for signature in SIGNATURES}
+    # The row of the choice of hands is above those of hand sequences.
+    ordered = sorted(SIGNATURES.values(), key=lambda signature: signature.by_hands)
+    columns = {signature.name: signature.column for signature in ordered}
     endings = "_low", "_high", "_control", "_difference", "_difference_low", "_difference_high"
     none = {
         f"{column}{ending}": math.nan
@@ -1152,23 +1159,3 @@ def list_failed(study: Study) -> Rows:
             reasons = "; ".join(commonest(failed.reason.fillna("")))
             row = _named(study, runs) | {"failed": len(failed), "reasons": reasons}
             yield f"{task} {label}", row | run_ids(failed)
-
-
-TABLES = {
-    table_.id: table_
-    for table_ in (
-        list_ranking,
-        list_not_ranked,
-        list_differences,
-        list_contexts,
-        list_signatures,
-        list_saved,
-        list_runtimes,
-        list_learning,
-        list_family_gaps,
-        list_tasks,
-        list_methods,
-        list_failed,
-    )
-}
-"""Tables by id."""

@@ -45,16 +45,10 @@ from pydantic import Field
 
 from coartic.baselines.evolution import EvolutionStrategy
 from coartic.baselines.uninformed import Attempts, UninformedParameters
-from coartic.method import Method, Result, Session
+from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
-
-_CITATION = (
-    "N. Hansen (2016). The CMA evolution strategy: a tutorial. arXiv:1604.00772. A. Auger, N. "
-    "Hansen (2005). A restart CMA evolution strategy with increasing population size. IEEE "
-    "Congress on Evolutionary Computation."
-)
 
 
 class BanditParameters(UninformedParameters):
@@ -146,11 +140,8 @@ class CMAES(Method):
     name = "cma-es/bandit"
     version = 2
     tuned_on = "the paper's tasks: twenty settings"
-    title = "CMA-ES, a bandit over hand sequences"
-    citation = _CITATION + (
-        " P. Auer, N. Cesa-Bianchi, P. Fischer (2002). Finite-time analysis of the multiarmed "
-        "bandit problem. Machine Learning."
-    )
+    title = "CMA-ES"
+    facts = Facts(works=("hansen2016", "auger2005", "auer2002"))
     information = OPTIMISER_INFORMATION
     Parameters = BanditParameters
 
@@ -160,18 +151,7 @@ class CMAES(Method):
         Each hand sequence first gets a trial by the corrective process. If there are more than 4096
         sequences, only the initial one does. If all of these first trials fail, the method stops.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No trial hits every goal.
+        Raises MethodError if no trial hits every goal.
         """
         attempts = Attempts(session, self.parameters.trials)
         with session.solving():
@@ -196,8 +176,13 @@ class GoalByGoal(Method):
     name = "cma-es/goal-by-goal"
     version = 2
     tuned_on = f"{CMAES.tuned_on}; ε: six random tasks of 14 goals"
-    title = "CMA-ES, hands chosen goal by goal"
-    citation = _CITATION
+    title = "CMA-ES, hands goal by goal"
+    facts = Facts(
+        works=("hansen2016", "auger2005"),
+        algorithm="CMA-ES",
+        short="CMA-ES, goal by goal",
+        headline=False,
+    )
     information = OPTIMISER_INFORMATION
     Parameters = GoalByGoalParameters
 
@@ -210,20 +195,7 @@ class GoalByGoal(Method):
         - all hand sequences have failed;
         - ``epsilon`` is 0 and a failed sequence is chosen again.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No trial hits every goal.
-        NotApplicableError
-            No initial hands are found.
+        Raises MethodError if no trial hits every goal.
         """
         attempts = Attempts(session, self.parameters.trials)
         letters = sorted(letters_of(session.hands))

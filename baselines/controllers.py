@@ -32,14 +32,6 @@ _STALL_STEPS = 50  # a hand is stuck if it comes less than a tenth of a step nea
 _BINDS = 1e-3  # least difference of joint changes at which a level counts as binding
 
 
-CITATION_AHEAD = (
-    " With the next goal as lower priority: K. Rohanimanesh, R. Platt, S. Mahadevan, R. Grupen "
-    "(2004), Coarticulation in Markov decision processes, NIPS; B. Thibodeau, S. Hart, D. "
-    "Karuppiah, J. Sweeney, O. Brock (2004), Cascaded filter approach to multi-objective "
-    "control, ICRA."
-)
-
-
 class Aim(NamedTuple):
     """A goal and the hand that is to hit it."""
 
@@ -238,11 +230,6 @@ class ControlParameters(Parameters):
 class Control(Method):
     """Base of the methods that simulate a controller for all hand sequences."""
 
-    citation = (
-        "Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987). Task-priority based redundancy control of "
-        "robot manipulators. International Journal of Robotics Research; as quadratic programs "
-        "after O. Kanoun, F. Lamiraux, P.-B. Wieber (2011), IEEE Transactions on Robotics."
-    )
     information = KINEMATICS | {Information.REWARD_FORMULA}
     stochastic = False
     Parameters = ControlParameters
@@ -260,21 +247,10 @@ class Control(Method):
 
         The search extends the sequence with the fewest ticks so far by the path to its next goal,
         until that sequence is complete. Of sequences with equal ticks, it chooses the one with the
-        fewest changes of hand, then the first one.
+        fewest changes of hand, then the first one. Return a movement for each goal, and counts of
+        the search as details.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-            A movement for each goal, and counts of the search as details.
-
-        Raises
-        ------
-        MethodError
-            The hand gets stuck in all sequences, or the solver fails.
+        Raises MethodError if the hand gets stuck in all sequences, or the solver fails.
         """
         task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = self.controller(session, task, self.parameters.period)

@@ -8,7 +8,7 @@ and nothing else is explored.
 from __future__ import annotations
 
 from coartic import Execution
-from coartic.method import Information, Method, MethodError, Outline, Result, Session
+from coartic.method import Facts, Information, Method, MethodError, Outline, Result, Session
 from coartic.motion.initial_hands import changes_of_hand, sequences_with
 from coartic.motion.solution import corrective_movements
 
@@ -18,34 +18,15 @@ class GivenHands(Method):
 
     name = "corrective-alone/given"
     tuned_on = "nothing: all constants are the paper's"
-    title = "Corrective process alone, the task's hands"
-    citation = (
-        "D. E. Whitney (1969). Resolved motion rate control of manipulators and human "
-        "prostheses. IEEE Transactions on Man-Machine Systems; as used by Shah, Barto & Fagg "
-        "(2013)."
-    )
+    title = "corrective process alone"
+    facts = Facts(works=("whitney1969", "shah2013"), short="corrective process")
     information = frozenset({Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL})
     stochastic = False
 
     def solve(self, session: Session) -> Result:
         """Make one trial with the task's initial hands, and return its movements.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            The trial misses a goal.
-        NotApplicableError
-            No initial hands are found.
-        BudgetError
-            No trial is left.
+        Raises MethodError if the trial misses a goal.
         """
         hands = session.find_initial_hands()
         with session.solving():
@@ -59,7 +40,12 @@ class BestHands(GivenHands):
     """The corrective process with the hand sequence that gets the highest reward."""
 
     name = "corrective-alone/best-hands"
-    title = "Corrective process alone, best hands"
+    title = "corrective process alone, best hands"
+    facts = Facts(
+        works=("whitney1969", "shah2013"),
+        algorithm="corrective process alone",
+        short="corrective, best hands",
+    )
 
     def why_not(self, task: Outline) -> str | None:
         """Return a sentence if a task has more than 4096 hand sequences; else None."""
@@ -71,18 +57,7 @@ class BestHands(GivenHands):
         Trials stop when the budget ends. Of trials with equal rewards, the one with the fewest
         changes of hand is best.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No trial hits every goal.
+        Raises MethodError if no trial hits every goal.
         """
         completed: list[Execution] = []
         for hands in sequences_with(session.hands, session.goals_count, session.task_name):

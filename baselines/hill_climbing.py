@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 
 from coartic.baselines.uninformed import Attempts, UninformedParameters
-from coartic.method import Method, Result, Session
+from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
@@ -51,32 +51,17 @@ class HillClimbing(Method):
 
     name = "hill-climbing"
     tuned_on = "nothing: the paper's values"
-    title = "Hill climbing, (1+1) for each hand sequence"
-    citation = (
-        "H.-G. Beyer, H.-P. Schwefel (2002). Evolution strategies: a comprehensive "
-        "introduction. Natural Computing."
-    )
+    title = "hill climbing"
+    facts = Facts(works=("beyer2002",))
     information = OPTIMISER_INFORMATION
     Parameters = HillClimbingParameters
 
     def solve(self, session: Session) -> Result:
         """Make trials until none is left or all hand sequences have failed.
 
-        Parameters
-        ----------
-        session : Session
+        Return the movements of the best trial.
 
-        Returns
-        -------
-        Result
-            The movements of the best trial.
-
-        Raises
-        ------
-        MethodError
-            No trial hits every goal.
-        NotApplicableError
-            No initial hands are found.
+        Raises MethodError if no trial hits every goal.
         """
         initial_hands, rng = session.find_initial_hands(), session.rng
         letters = letters_of(session.hands)

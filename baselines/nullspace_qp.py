@@ -29,8 +29,8 @@ from __future__ import annotations
 import numpy as np
 
 from coartic.baselines.cascade import Solution
-from coartic.baselines.controllers import CITATION_AHEAD, Aim, Control, Controller
-from coartic.method import Information
+from coartic.baselines.controllers import Aim, Control, Controller
+from coartic.method import Facts, Information
 from coartic.robot import Array
 
 
@@ -119,7 +119,13 @@ class LeastMotion(Control):
     name = "nullspace-qp/least-motion"
     version = 2
     tuned_on = "nothing"
-    title = "Prioritised null-space QP, least motion"
+    title = "null-space QP, least motion"
+    facts = Facts(
+        works=("nakamura1987", "kanoun2011"),
+        solvers=("arnstrom2022",),
+        algorithm="null-space QP",
+        short="QP, least motion",
+    )
     controller = HandController
 
 
@@ -127,8 +133,13 @@ class NextGoalPosture(LeastMotion):
     """Null-space control towards a posture of the next goal."""
 
     name = "nullspace-qp/next-goal-posture"
-    title = "Prioritised null-space QP, posture of the next goal"
-    citation = Control.citation + CITATION_AHEAD
+    title = "null-space QP, posture of the next goal"
+    facts = Facts(
+        works=("nakamura1987", "kanoun2011", "rohanimanesh2004", "thibodeau2004"),
+        solvers=("arnstrom2022",),
+        algorithm="null-space QP",
+        short="QP, next posture",
+    )
     information = LeastMotion.information | {
         Information.SECONDARY_OBJECTIVES,
         Information.CORRECTIVE_PROCESS,

@@ -21,8 +21,8 @@ import numpy as np
 from coartic import Task, TaskError, parse_task
 from coartic.baselines.posture_graph import QUICK, Count, Nodes, cheapest_chains
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
-from coartic.baselines.trajectory_problem import trajectory_problem
-from coartic.method import Method, MethodError, Parameters, Result, Session
+from coartic.baselines.trajectory_problem import IPOPT, trajectory_problem
+from coartic.method import Facts, Method, MethodError, Parameters, Result, Session
 from coartic.tasks.task import letters_of
 
 MOST_KEPT = 64  # hand sequences whose shortest paths are stored with the solution
@@ -52,11 +52,8 @@ class OptimumSearch(Method):
     name = "optimum/search"
     version = 2
     tuned_on = "random tasks"
-    title = "Optimum: dynamic programming over postures"
-    citation = (
-        "J. T. Betts (1998). Survey of numerical methods for trajectory optimization. "
-        "Journal of Guidance, Control, and Dynamics."
-    )
+    title = "optimum search"
+    facts = Facts(works=("betts1998",), solvers=IPOPT, algorithm="optimum")
     information = REWARD_INFORMATION
     stochastic = False
     Parameters = OptimumParameters
@@ -67,19 +64,8 @@ class OptimumSearch(Method):
 
         At most 64 hand sequences are searched in each graph.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No movements that hit every goal are found, or the locks of the base make the task
-            invalid.
+        Raises MethodError if no movements that hit every goal are found, or the locks of the base
+        make the task invalid.
         """
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"

@@ -40,7 +40,7 @@ from pydantic import Field
 
 from coartic import Movement
 from coartic.baselines.posture_graph import KINEMATICS, HandSequence, Layers
-from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.method import Facts, Information, Method, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import explored_joints
 from coartic.motion.compile import chain_by, entry, joint_lever
 from coartic.robot import BASE_DOF, Array, Hand
@@ -86,11 +86,6 @@ class PostureBased(Method):
     version = 2
     horizon: ClassVar[Literal[1, 2]]
     tuned_on = "the paper's tasks, by hand"
-    citation = (
-        "D. A. Rosenbaum, R. J. Meulenbroek, J. Vaughan, C. Jansen (2001). Posture-based "
-        "motion planning: applications to grasping. Psychological Review 108(4), 709-734, "
-        "doi:10.1037/0033-295X.108.4.709."
-    )
     information = KINEMATICS | {Information.REWARD_FORMULA}
     Parameters = PostureBasedParameters
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
@@ -98,18 +93,7 @@ class PostureBased(Method):
     def solve(self, session: Session) -> Result:
         """Plan a movement to each goal from the expected end of the movement before.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            Correction brings no posture to a goal.
+        Raises MethodError if correction brings no posture to a goal.
         """
         with session.building():
             planner = PosturePlanner(session, self.parameters, self.horizon)
@@ -122,7 +106,12 @@ class OneGoal(PostureBased):
     """Posture-based planning of each posture for its own goal only."""
 
     name = "posture-based/one-goal"
-    title = "Posture-based planning, one goal at a time"
+    title = "posture planning, one goal"
+    facts = Facts(
+        works=("rosenbaum2001",),
+        algorithm="posture planning",
+        short="postures, one goal",
+    )
     horizon = 1
 
 
@@ -130,7 +119,12 @@ class TwoGoals(PostureBased):
     """Posture-based planning of each posture together with a posture for the next goal."""
 
     name = "posture-based/two-goals"
-    title = "Posture-based planning, one goal ahead"
+    title = "posture planning, two goals"
+    facts = Facts(
+        works=("rosenbaum2001",),
+        algorithm="posture planning",
+        short="postures, two goals",
+    )
     horizon = 2
 
 

@@ -56,8 +56,8 @@ from __future__ import annotations
 import numpy as np
 
 from coartic.baselines.cascade import Solution
-from coartic.baselines.controllers import CITATION_AHEAD, Aim, Control, Controller
-from coartic.method import Information
+from coartic.baselines.controllers import Aim, Control, Controller
+from coartic.method import Facts, Information
 from coartic.robot import Array, directions
 
 FACES = 16
@@ -237,7 +237,13 @@ class CurrentGoal(Control):
     name = "posture-qp/current-goal"
     version = 2
     tuned_on = "30 development instances: some 60 settings"
-    title = "Posture QP, current goal"
+    title = "posture QP, current goal"
+    facts = Facts(
+        works=("nakamura1987", "kanoun2011"),
+        solvers=("arnstrom2022",),
+        algorithm="posture QP",
+        short="posture QP, current",
+    )
     controller = PostureController
 
 
@@ -245,8 +251,13 @@ class GoalsAhead(CurrentGoal):
     """Posture QP that chooses its postures for the current goal and the next two goals together."""
 
     name = "posture-qp/goals-ahead"
-    title = "Posture QP, goals ahead"
-    citation = Control.citation + CITATION_AHEAD
+    title = "posture QP, goals ahead"
+    facts = Facts(
+        works=("nakamura1987", "kanoun2011", "rohanimanesh2004", "thibodeau2004"),
+        solvers=("arnstrom2022",),
+        algorithm="posture QP",
+        short="posture QP, ahead",
+    )
     information = CurrentGoal.information | {Information.SECONDARY_OBJECTIVES}
     goals_ahead = 2
 

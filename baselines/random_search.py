@@ -28,8 +28,8 @@ from pydantic import Field, model_validator
 from coartic.baselines.uninformed import Attempts
 from coartic.internal.validation import sentence_error
 from coartic.learner.conditions import MOST_NOISE
-from coartic.learner.learning import TRIALS, runs_at_once
-from coartic.method import Method, MethodError, Parameters, Result, Session
+from coartic.learner.learning import runs_at_once
+from coartic.method import TRIALS, Facts, Method, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
 from coartic.robot import HANDS
 from coartic.tasks.task import hands_of
@@ -140,10 +140,12 @@ class RandomSearchHands(Method):
 
     name = "random-search/hands"
     tuned_on = "nothing: the paper's values"
-    title = "Random search with every hand sequence"
-    citation = (
-        "L. A. Rastrigin (1963). The convergence of the random search method in the extremal "
-        "control of a many parameter system. Automation and Remote Control."
+    title = "random search, every hand sequence"
+    facts = Facts(
+        works=("rastrigin1963",),
+        algorithm="random search",
+        short="random search, hands",
+        headline=False,
     )
     information = OPTIMISER_INFORMATION
     Parameters = RandomSearchHandsParameters
@@ -162,18 +164,7 @@ class RandomSearchHands(Method):
         The shares of the sequences differ by at most one trial. If the corrective process fails
         with a sequence, the rest of its share is not used.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            The corrective process completes no hand sequence that has a trial.
+        Raises MethodError if the corrective process completes no hand sequence that has a trial.
         """
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
@@ -195,26 +186,15 @@ class RandomSearch(RandomSearchHands):
     """Random search with one hand sequence."""
 
     name = "random-search"
-    title = "Random search around the corrective process"
+    title = "random search"
+    facts = Facts(works=("rastrigin1963",))
     Parameters = RandomSearchParameters
 
     def solve(self, session: Session) -> Result:
         """Make trials until none is left, and return the movements of the best trial.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No trial is left to make, or the corrective process completes no hand sequence tried.
-        ValueError
-            Parameter ``hands`` does not fit the task.
+        Raises MethodError if no trial is left to make, or the corrective process completes no hand
+        sequence tried.
         """
         parameters: RandomSearchParameters = self.parameters
         with session.solving():

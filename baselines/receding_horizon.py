@@ -36,8 +36,8 @@ from coartic.baselines.shortest_paths import (
     fewest_ticks,
     shortest_plans,
 )
-from coartic.baselines.trajectory_problem import trajectory_problem
-from coartic.method import Method, Parameters, Result, Session
+from coartic.baselines.trajectory_problem import IPOPT, trajectory_problem
+from coartic.method import Facts, Method, Parameters, Result, Session
 from coartic.motion.movement import segment_lengths
 from coartic.robot import BASE_DOF, HANDS
 from coartic.tasks.task import MOST_GOALS, Start
@@ -68,11 +68,12 @@ class RecedingHorizon(Method):
     name = "receding-horizon"
     version = 2
     tuned_on = "random tasks"
-    title = "Receding-horizon planning of the shortest path"
-    citation = (
-        "D. Q. Mayne, J. B. Rawlings, C. V. Rao, P. O. M. Scokaert (2000). Constrained model "
-        "predictive control: stability and optimality. Automatica; C. E. Garcia, D. M. Prett, "
-        "M. Morari (1989). Model predictive control: theory and practice. Automatica."
+    title = "receding-horizon plan"
+    facts = Facts(
+        works=("mayne2000", "garcia1989"),
+        solvers=IPOPT,
+        algorithm="receding-horizon planning",
+        short="receding horizon",
     )
     information = REWARD_INFORMATION
     stochastic = False
@@ -82,18 +83,7 @@ class RecedingHorizon(Method):
     def solve(self, session: Session) -> Result:
         """Plan window by window, and return the movements that were made.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            No path is found.
+        Raises MethodError if no path is found.
         """
         task, parameters = session.reveal(*self.information), self.parameters
         rng = np.random.default_rng(0)  # the same graphs for all seeds

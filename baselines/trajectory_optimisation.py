@@ -32,6 +32,7 @@ from coartic.baselines.posture_graph import (
     cheapest_chains,
 )
 from coartic.baselines.trajectory_problem import (
+    IPOPT,
     MODEL_BASED,
     Cost,
     Instance,
@@ -41,7 +42,7 @@ from coartic.baselines.trajectory_problem import (
     trajectory_problem,
 )
 from coartic.baselines.whole_ticks import Rounding, movements
-from coartic.method import Information, Method, MethodError, Parameters, Result, Session
+from coartic.method import Facts, Information, Method, MethodError, Parameters, Result, Session
 from coartic.motion.movement import follow, segment_lengths
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
@@ -152,18 +153,7 @@ class TrajectoryOptimisation(Method):
         The cheapest plan for path length is solved again in whole ticks. If that fails, it is
         solved again with targets well inside the discs.
 
-        Parameters
-        ----------
-        session : Session
-
-        Returns
-        -------
-        Result
-
-        Raises
-        ------
-        MethodError
-            The solver finds no plan.
+        Raises MethodError if the solver finds no plan.
         """
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
@@ -268,10 +258,12 @@ class PathLength(TrajectoryOptimisation):
     """Shortest path in joint space, which is the task's reward."""
 
     name = "trajectory-optimisation/path-length"
-    title = "Trajectory optimisation, path length"
-    citation = (
-        "J. T. Betts (1998). Survey of numerical methods for trajectory optimization. "
-        "Journal of Guidance, Control, and Dynamics."
+    title = "shortest-path plan"
+    facts = Facts(
+        works=("betts1998",),
+        solvers=IPOPT,
+        algorithm="trajectory planning",
+        short="shortest path",
     )
     information = MODEL_BASED | {Information.REWARD_FORMULA}
     cost = "path-length"
@@ -281,11 +273,12 @@ class SquaredDisplacement(TrajectoryOptimisation):
     """Minimum squared joint displacement, summed over the movements from goal to goal."""
 
     name = "trajectory-optimisation/squared-displacement"
-    title = "Trajectory optimisation, minimum squared joint displacement"
-    citation = (
-        "M. I. Jordan (1992). Constrained supervised learning. Journal of Mathematical "
-        "Psychology; M. I. Jordan (1986). Serial order: a parallel distributed processing "
-        "approach."
+    title = "minimum squared joint displacement"
+    facts = Facts(
+        works=("jordan1992", "jordan1986"),
+        solvers=IPOPT,
+        algorithm="trajectory planning",
+        short="min. displacement",
     )
     information = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
     cost = "squared-displacement"
@@ -295,10 +288,12 @@ class Acceleration(TrajectoryOptimisation):
     """Minimum acceleration of the joints: a cubic spline through the goals' discs."""
 
     name = "trajectory-optimisation/acceleration"
-    title = "Trajectory optimisation, minimum acceleration"
-    citation = (
-        "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
-        "confirmed mathematical model. Journal of Neuroscience (there: jerk)."
+    title = "minimum-acceleration plan"
+    facts = Facts(
+        works=("flash1985",),
+        solvers=IPOPT,
+        algorithm="trajectory planning",
+        short="min. acceleration",
     )
     information = MODEL_BASED | {Information.SECONDARY_OBJECTIVES}
     cost: ClassVar[Cost] = "acceleration"
@@ -309,10 +304,12 @@ class Jerk(Acceleration):
     """Minimum jerk of the joints: a quintic spline through the goals' discs."""
 
     name = "trajectory-optimisation/jerk"
-    title = "Trajectory optimisation, minimum jerk"
-    citation = (
-        "T. Flash, N. Hogan (1985). The coordination of arm movements: an experimentally "
-        "confirmed mathematical model. Journal of Neuroscience."
+    title = "minimum-jerk plan"
+    facts = Facts(
+        works=("flash1985",),
+        solvers=IPOPT,
+        algorithm="trajectory planning",
+        short="min. jerk",
     )
     cost: ClassVar[Cost] = "jerk"
     Parameters = JerkParameters
@@ -322,7 +319,13 @@ class HandJerk(Jerk):
     """Minimum jerk of the hand (Flash & Hogan 1985), with a small weight on joint jerk."""
 
     name = "trajectory-optimisation/hand-jerk"
-    title = "Trajectory optimisation, minimum hand jerk"
+    title = "minimum-hand-jerk plan"
+    facts = Facts(
+        works=("flash1985",),
+        solvers=IPOPT,
+        algorithm="trajectory planning",
+        short="min. hand jerk",
+    )
     tuned_on = (
         "two-armed-2: least time between goals, and weight of joint jerk, where weights from 0.001 "
         "to 10 end at -349 to -399 (shipped: -393); else random tasks"

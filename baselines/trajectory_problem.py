@@ -60,6 +60,8 @@ JOINT_WEIGHT = 0.1
 
 _ONE_AT_A_TIME = RLock()
 """Lock while CasADi builds a programme or IPOPT solves it: threads must not do so at once."""
+IPOPT = "wachter2006", "andersson2019"
+"""Works on the solver, as keys of ``references.bib``."""
 _RIM = 1e-7  # solutions stay this far inside the disc (in length units): IPOPT's tolerance
 # Least duration of a segment; the mean is 1. It binds where a smooth plan would hit two goals at
 # once. With a smaller value, jerk does not converge for many hand sequences of two-armed-2.

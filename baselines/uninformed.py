@@ -13,8 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from coartic.learner.learning import TRIALS
-from coartic.method import MethodError, Parameters, Result, Session
+from coartic.method import TRIALS, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import explored_joints
 from coartic.motion.solution import Movement, movements_of
 from coartic.motion.trial import Trials

@@ -111,7 +111,10 @@ _Runs = dict[str, dict[str, Run]]
 
 
 def _declaration(info: MethodInfo, _: _Runs) -> Iterator[str]:
-    yield from (f"{n} is empty" for n in ("title", "citation") if not getattr(info, n).strip())
+    if not info.title.strip():
+        yield "title is empty"
+    if not info.citation.strip() and not info.facts.works:
+        yield "citation is empty, and facts name no works"
 
 
 def _parameters(info: MethodInfo, _: _Runs) -> Iterator[str]:

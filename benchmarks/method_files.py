@@ -28,7 +28,7 @@ from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, error_line, plain
 from coartic.internal.threads import begin_worker
 from coartic.internal.toml_files import read_bytes
-from coartic.method import Information, Method
+from coartic.method import Facts, Information, Method
 from coartic.method.optimisers import Optimiser
 from coartic.model import MODEL_VERSION
 from coartic.runs.method_info import (
@@ -150,6 +150,8 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
             raise CoarticError(
                 f"{where}: information must be a set of Information, not {information!r}"
             )
+        if not isinstance(method.facts, Facts):
+            raise CoarticError(f"{where}: facts must be Facts(...), not {method.facts!r}")
         function, arguments = "solve", "session"
         if issubclass(method, Optimiser):
             function, arguments = "optimise", "objective, rng"

@@ -23,10 +23,16 @@ from coartic.benchmarks.pool import process_pool
 from coartic.benchmarks.processes import CONTEXT
 from coartic.internal.text import LONGEST_LINE, plain
 from coartic.internal.threads import threads_for, worker_variables
-from coartic.motion.compile import FINGERPRINT, PACKAGE
+from coartic.motion.compile import PACKAGE, hash_of_files, python_files
 
 _LIBRARIES = ("casadi", "daqp", "llvmlite", "numba", "numpy", "pandas", "pydantic", "scipy")
 """Libraries that results may depend on."""
+MODEL_FILES = [
+    *(PACKAGE / name for name in ("robot.py", "model.py", "tasks/task.py")),
+    *python_files("motion", "learner", "method"),
+]
+"""Files of the model, which may change results."""
+_MODEL_CODE = hash_of_files(MODEL_FILES)
 
 
 @cache
@@ -39,7 +45,7 @@ def current_environment() -> dict[str, Any]:
     -------
     dict
         - ``coartic``, ``python``, ``packages``: versions;
-        - ``model_code``: hash of the code of the model;
+        - ``model_code``: hash of the code of the model (:data:`MODEL_FILES`);
         - ``commit``: commit of the checkout;
         - ``platform``, ``processor``, ``cores``: the machine;
         - ``arithmetic``: fingerprint of rounding (:func:`arithmetic`);
@@ -52,7 +58,7 @@ def current_environment() -> dict[str, Any]:
             processor = named[1]
     return {
         "coartic": coartic.__version__,
-        "model_code": FINGERPRINT,
+        "model_code": _MODEL_CODE,
         "commit": _commit_of_checkout(),
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in _LIBRARIES},

@@ -5,7 +5,6 @@ Method files are imported in separate processes (:mod:`coartic.benchmarks.method
 
 from __future__ import annotations
 
-import importlib
 import re
 from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
@@ -15,7 +14,7 @@ from pathlib import Path
 from coartic.errors import CoarticError
 from coartic.internal.text import unknown
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
-from coartic.method import MODULES
+from coartic.method import built_in_methods
 from coartic.model import MODEL_VERSION
 from coartic.runs.method_info import BUILT_IN, MethodInfo, method_info
 
@@ -53,9 +52,8 @@ def built_in() -> Mapping[str, MethodInfo]:
     Each call returns the same mapping: do not change it.
     """
     return {
-        method.name: method_info(method, BUILT_IN, name, f"{MODEL_VERSION}.{method.version}")
-        for name in MODULES
-        for method in importlib.import_module(name).METHODS
+        name: method_info(method, BUILT_IN, method.__module__, f"{MODEL_VERSION}.{method.version}")
+        for name, method in built_in_methods().items()
     }
 
 

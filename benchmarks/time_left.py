@@ -9,7 +9,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from functools import cache
 
-from coartic.learner.learning import TRIALS
+from coartic.method import TRIALS
 from coartic.runs.plan import Cell, Job, trials_in
 from coartic.runs.record import Run
 from coartic.runs.shipped import open_shipped

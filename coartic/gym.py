@@ -32,7 +32,7 @@ from coartic.motion.batch import robot_parameters
 from coartic.motion.solution import execute, initial_reward
 from coartic.motion.trial import ALL_STOP, Requests, count_trials, reach
 from coartic.robot import HANDS, LARGEST_FIGURE, Array
-from coartic.tasks.catalogue import as_task
+from coartic.tasks.catalogue import as_task, builtin_tasks
 from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import MOST_GOALS, Split, Task
@@ -47,13 +47,9 @@ except ImportError:
 REACH = 0.5
 """Half width of the box of targets, in length units (base) and rad (angles)."""
 IDS: dict[str, dict[str, Any]] = {
-    "coartic/Ascending-v2": {"task": "ascending"},
-    "coartic/Descending-v2": {"task": "descending"},
-    "coartic/TwoArmed1-v2": {"task": "two-armed-1"},
-    "coartic/TwoArmed2-v2": {"task": "two-armed-2"},
-    "coartic/Task-v2": {},
-}
-"""Options with which the environments are registered, by id."""
+    f"coartic/{name.title().replace('-', '')}-v2": {"task": name} for name in builtin_tasks()
+} | {"coartic/Task-v2": {}}
+"""Options with which the environments are registered, by id: ``coartic/Ascending-v2`` and so on."""
 Policy = Callable[[NDArray[np.float32]], ArrayLike] | Method | Any
 _NEUTRAL = (
     *("OrderEnforcing", "PassiveEnvChecker", "SyncVectorEnv"),

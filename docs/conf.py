@@ -1,5 +1,6 @@
 """The site: `make docs` builds it, and ends at the first warning."""
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -57,6 +58,14 @@ toc_object_entries = False
 # Names in signatures are short, and two packages may have one: the link goes to the first.
 suppress_warnings = ["ref.python"]
 
+# Pages that are written from files outside this folder whenever the site is built.
+READMES = sorted(ROOT.glob("studies/*/README.md"))
+WRITTEN = {
+    ROOT / "CHANGELOG.md": DOCS / "changelog.md",
+    ROOT / "studies" / "README.md": DOCS / "studies" / "index.md",
+    **{readme: DOCS / "studies" / f"{readme.parent.name}.md" for readme in READMES},
+}
+_LINK = re.compile(r"(?<=\]\()([^)#\s:]+)")
 _OUTSIDE = re.compile(r"(?<!!)\[([^\]]+)\]\((\.\./[^)#\s]+)(#[^)\s]*)?\)")
 _BAR = re.compile(r"(?<![`\\\w])\|(?=\S)|(?<=\S)\|(?![`\w])")
 
@@ -86,15 +95,35 @@ def pictures_named(section):
     return section.replace(cell, f'{cell}:mystnb: {{image: {{alt: "{heading}"}}}}\n')
 
 
+def write_pages():
+    """Write the pages of :data:`WRITTEN`: texts with links from their new places, and an index."""
+    for source, page in WRITTEN.items():
+
+        def moved(link, source=source, page=page):
+            path = source.parent / link[1]
+            return os.path.relpath(path, page.parent) if path.exists() else link[1]
+
+        page.parent.mkdir(exist_ok=True)
+        page.write_text(_LINK.sub(moved, source.read_text("utf-8")), "utf-8")
+    names = "\n".join(readme.parent.name for readme in READMES)
+    with WRITTEN[ROOT / "studies" / "README.md"].open("a", encoding="utf-8") as index:
+        index.write(f"\n```{{toctree}}\n:hidden:\n\n{names}\n```\n")
+
+
+write_pages()
+
+
 def setup(app):
     """Let the pages be read in the repository and on the site alike."""
 
     def links(app, name, source):
-        """Turn links to files of the repository that are not on the site into paths."""
+        """Turn links to files that are not in this folder into links to their pages, or paths."""
         folder = Path(app.env.doc2path(name)).parent
 
         def path_of(link):
             target = (folder / link[2]).resolve()
+            if page := WRITTEN.get(target):
+                return f"[{link[1]}]({os.path.relpath(page, folder)}{link[3] or ''})"
             if target.is_relative_to(DOCS):
                 return link[0]
             return f"{link[1]} (`{target.relative_to(ROOT)}`)"

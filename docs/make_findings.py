@@ -12,16 +12,18 @@ import argparse
 import re
 import shutil
 import tomllib
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any, get_args
+from unittest.mock import patch
 
 import finding_figures
 import pandas as pd
 from scipy import stats
 
 from coartic.analysis import Study, by_task, load, mean
-from coartic.analysis.figures import picture
+from coartic.analysis.figures import picture, style
 from coartic.analysis.statistics import task_mean
 from common.judging import Verdict
 from common.writing import fill_page
@@ -29,21 +31,26 @@ from common.writing import fill_page
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
 STORED = DOCS / "stored"
-KEPT = {
-    "comparison": (
-        "contexts learning methods runtimes ranking signatures",
-        "postures ranking runtimes shared-goal",
-    ),
-    "families": ("family-gaps", ""),
-}
-"""Tables and figures of each suite's report that are stored."""
+NEW = dict[str, Path]()
+"""Results folders that the command line names, by suite: what the pages ask for is stored anew."""
 
 
 @cache
 def table(suite: str, name: str) -> pd.DataFrame:
-    """Return a stored table of a suite or a study, with its rows by name."""
+    """Return a stored table of a suite or a study, with its rows by name.
+
+    If the suite is in :data:`NEW`, the table is first copied from its report, without run ids.
+    """
     folder = STUDIES / suite if (STUDIES / suite).is_dir() else STORED / suite
-    return pd.read_csv(folder / f"{name}.csv", index_col=0)
+    path = folder / f"{name}.csv"
+    if suite in NEW:
+        if name == "by-task":  # no table of the report: pages compute means over tasks from it
+            frame = by_task(load(NEW[suite]).runs).set_index("task")
+        else:
+            frame = pd.read_csv(NEW[suite] / "report" / "tables" / path.name, index_col="row")
+        frame = frame.drop(columns="run_ids", errors="ignore")
+        frame.to_csv(path, float_format="%.6g", lineterminator="\n")
+    return pd.read_csv(path, index_col=0)
 
 
 def row(suite: str, name: str, which: str) -> dict[Any, Any]:
@@ -234,41 +241,43 @@ def filled_pages() -> dict[str, str]:
 
 
 def figures() -> dict[str, bytes]:
-    """Return every figure of the findings as SVG, by its path below ``docs``."""
-    drawings = {
-        name: draw(table, *[early_less_late] * (name == "early-gain"))
-        for name, draw in finding_figures.FIGURES.items()
-    }
-    return {f"stored/findings/{name}.svg": picture(made, ".svg") for name, made in drawings.items()}
+    """Return every figure of the findings as SVG, by its path below ``docs``.
+
+    They have the font that Matplotlib brings along, so that they are the same on every machine.
+    """
+    with patch.dict(style.RC, {"font.sans-serif": ["DejaVu Sans"]}):
+        drawings = {
+            name: draw(table, *[early_less_late] * (name == "early-gain"))
+            for name, draw in finding_figures.FIGURES.items()
+        }
+        return {
+            f"stored/findings/{name}.svg": picture(made, ".svg") for name, made in drawings.items()
+        }
 
 
-def store(results: Path) -> None:
-    """Copy tables (without run ids) and figures from the reports below ``results``.
+def forget_stored(results: Path) -> None:
+    """Remove the tables and figures of suites that have a report below ``results``.
 
-    Stored tables and figures of a suite without a report below ``results`` are not changed.
+    Pages then store those that they ask for (:data:`NEW`). The runs of suite ``foreign`` are
+    stored at once.
     """
     for suite, name in (("foreign", "runs"), ("tuning", "tuning")):
         if (results / suite).is_dir():
             rows = foreign_rows(load(results / suite)).dropna(axis="columns", how="all")
             file = STORED / "foreign" / f"{name}.csv"
             rows.to_csv(file, float_format="%.6g", lineterminator="\n")
-    for suite, (tables, figures) in KEPT.items():
-        report, kept = results / suite / "report", STORED / suite
-        if not report.is_dir():
-            continue
-        shutil.rmtree(kept, ignore_errors=True)
-        kept.mkdir(parents=True)
-        frames = {
-            name: pd.read_csv(report / "tables" / f"{name}.csv", index_col="row")
-            for name in tables.split()
-        }
-        for name in figures.split():
-            shutil.copy(report / "figures" / f"{name}.svg", kept)
-        if suite == "families":  # pages compute means over tasks from this table
-            frames["by-task"] = by_task(load(results / suite).runs).set_index("task")
-        for name, frame in frames.items():
-            frame = frame.drop(columns="run_ids", errors="ignore")
-            frame.to_csv(kept / f"{name}.csv", float_format="%.6g", lineterminator="\n")
+    for kept in STORED.iterdir():
+        if (results / kept.name / "report").is_dir():
+            NEW[kept.name] = results / kept.name
+            shutil.rmtree(kept)
+            kept.mkdir()
+
+
+def store_figures(pages: Iterable[str]) -> None:
+    """Copy the figures that pages (texts) show from the reports of :data:`NEW`."""
+    for suite, name in re.findall(r"\bstored/([\w-]+)/([\w-]+\.svg)\)", "\n".join(pages)):
+        if suite in NEW:
+            shutil.copy(NEW[suite] / "report" / "figures" / name, STORED / suite)
 
 
 def main() -> None:
@@ -277,8 +286,10 @@ def main() -> None:
     parser.add_argument("--from", dest="results", type=Path, help="Folder of the suites' results.")
     results = parser.parse_args().results
     if results is not None:
-        store(results)
-    for name, text in filled_pages().items():
+        forget_stored(results)
+    pages = filled_pages()
+    store_figures([*pages.values(), (DOCS.parent / "README.md").read_text("utf-8")])
+    for name, text in pages.items():
         (DOCS / name).write_text(text, encoding="utf-8")
     (STORED / "findings").mkdir(exist_ok=True)
     for name, drawing in figures().items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
+from inspect import getdoc
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
@@ -15,9 +16,10 @@ from sphinx.application import Sphinx
 from sphinx.util import inspect
 from sphinx.util.docutils import SphinxDirective
 
+from coartic.analysis import SIGNATURES
 from coartic.analysis.methods import title_of
 from coartic.benchmarks.registry import built_in
-from coartic.method import Information
+from coartic.method import MODULES, Information, built_in_methods
 from coartic.play.page import part_of_page, play_page, player_figure, preset_of, up_or_down
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import Task, shipped_tasks
@@ -108,7 +110,7 @@ def tasks() -> Iterator[str]:
 
 def methods(group: str) -> Iterator[str]:
     """Yield the table of the built-in methods that use the reward of trials, its ``formula``, or
-    ``none`` of it, with a letter for each information."""
+    ``none`` of it, with the first sentence of their classes and a letter for each information."""
     letters = dict(zip(Information, "GFJATUKRS", strict=True))
 
     def group_of(uses: Sequence[Information]) -> str:
@@ -121,12 +123,22 @@ def methods(group: str) -> Iterator[str]:
         (
             title_of(name),
             f"`{name}`",
+            (getdoc(built_in_methods()[name]) or "").partition("\n\n")[0],
             " ".join(sorted(map(letters.get, uses), key="GFJATUKRS".find)),
         )
         for name, uses in declared.items()
         if group_of(uses) == group
     )
-    yield from table(("name", "id", "information"), rows)
+    yield from table(("name", "id", "what it does", "information"), rows)
+
+
+def baselines() -> Iterator[str]:
+    """Yield the reference of the modules of the built-in methods, without the learner's."""
+    yield "```{eval-rst}"
+    for module in MODULES:
+        if module.startswith("coartic.baselines."):
+            yield f".. automodule:: {module}\n"
+    yield "```"
 
 
 def tuned() -> Iterator[str]:
@@ -135,6 +147,13 @@ def tuned() -> Iterator[str]:
     for name, info in built_in().items():
         names.setdefault(info.tuned_on, []).append(title_of(name))
     yield from (f"- {', '.join(each)}: **{text}**" for text, each in names.items())
+    yield ""
+
+
+def signatures() -> Iterator[str]:
+    """Yield a list of the signatures of a run with their definitions."""
+    for each in SIGNATURES.values():
+        yield f"- `{each.name}` ({each.heading.rpartition('(')[2]}: {each.definition}"
     yield ""
 
 

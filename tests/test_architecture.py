@@ -3,12 +3,14 @@
 import ast
 import re
 import sys
+from collections import defaultdict
 from functools import cache
 from pkgutil import iter_modules
 
 import pytest
 
 import coartic
+from coartic.motion.compile import KERNEL_FILES
 from tests.support.processes import ROOT, python
 
 PACKAGES = ("coartic", "baselines", "benchmarks", "analysis")
@@ -124,6 +126,87 @@ def test_processes_that_compute_are_started_in_one_place():
     for path in paths:
         if path.relative_to(ROOT).as_posix() not in home:
             assert not pattern.search(path.read_text(encoding="utf-8")), path
+
+
+KERNELS = {"entry", "inner", "shared", "inlined", "scalar", "intrinsic"}
+"""Decorators of kernels."""
+
+
+@cache
+def bindings(path):
+    """What a module binds at its top level: nodes by name, and imported names of coartic."""
+    defined, imported_names = defaultdict(list), {}
+    for node in tree_of(path).body:
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("coartic"):
+            for alias in node.names:
+                imported_names[alias.asname or alias.name] = f"{node.module}.{alias.name}"
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            defined[node.name].append(node)
+        else:
+            stored = (n for n in ast.walk(node) if isinstance(n, ast.Name))
+            for name in stored:
+                if isinstance(name.ctx, ast.Store):
+                    defined[name.id].append(node)
+    return defined, imported_names
+
+
+def kernels_of(path):
+    """Names that a module makes kernels, by decorator or by a call."""
+    for name, nodes in bindings(path)[0].items():
+        for node in nodes:
+            made = [
+                *getattr(node, "decorator_list", ()),
+                getattr(getattr(node, "value", 0), "func", 0),
+            ]
+            if {getattr(each, "id", "") for each in made} & KERNELS:
+                yield name
+
+
+def read_from(path, name, seen):
+    """Fill ``seen`` with all pairs of file and name that the value of a name is made from, without
+    types and decorators."""
+    defined, imported_names = bindings(path)
+    if name in imported_names:
+        module, _, original = imported_names[name].rpartition(".")
+        file = ROOT.joinpath(*module.split(".")).with_suffix(".py")
+        if file.is_file():  # else it is imported from a package, as modules are
+            read_from(file, original, seen)
+    if name not in defined or (path, name) in seen:
+        return
+    seen.add((path, name))
+    for node in defined[name]:
+        kinds = [
+            getattr(n, "annotation", None) or getattr(n, "returns", None) for n in ast.walk(node)
+        ]
+        kinds += getattr(node, "decorator_list", [])
+        skipped = {n for kind in kinds if kind for n in ast.walk(kind)}
+        for n in ast.walk(node):
+            if isinstance(n, ast.Name) and n not in skipped and n.id not in KERNELS:
+                read_from(path, n.id, seen)
+            elif isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name):
+                module = imported_names.get(n.value.id, "")
+                file = ROOT.joinpath(*module.split(".")).with_suffix(".py")
+                if module and file.is_file():
+                    read_from(file, n.attr, seen)
+
+
+def test_the_hash_of_kernels_covers_the_files_that_they_consist_of_and_no_others():
+    """Else changed kernels would not be compiled, or unchanged ones would be."""
+    covered, needed = set(KERNEL_FILES), set()
+    for path in sources():
+        for name in kernels_of(path):
+            seen = set()
+            read_from(path, name, seen)
+            files = {file for file, _ in seen}
+            if path.parts[len(ROOT.parts)] == "baselines":
+                files.remove(path)  # Numba looks at the file of a cached function itself
+            needed |= files
+            assert files <= covered, (
+                f"kernel {name} of {path} reads {files - covered}: define kernels, and the numbers "
+                "that they read, in coartic/motion or coartic/learner, beside other kernels, or "
+                "add the file to KERNEL_FILES of coartic/motion/compile.py"
+            )
+    assert covered == needed, f"take {covered - needed} out of KERNEL_FILES: no kernel reads it"
 
 
 def test_no_module_is_imported_but_undeclared():

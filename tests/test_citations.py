@@ -1,14 +1,15 @@
 """The bibliography: well-formed, and what the methods say of themselves."""
 
 import re
-import unicodedata
 
 import pytest
 
 from coartic import load_task
 from coartic.analysis.citations import STATISTICS, THE_PAPER, references
 from coartic.analysis.methods import KNOWN_METHODS
-from coartic.benchmarks.registry import built_in, registry
+from coartic.analysis.study import load
+from coartic.benchmarks.registry import registry
+from coartic.method import Facts
 from tests.support.suites import BROKEN, ROOT, cell_on, edit, run_and_write
 
 
@@ -19,34 +20,64 @@ def fields_of(entry):
 
 
 BIB = {key: fields_of(entry) for key, entry in references().items()}
-BUILT_IN = list(built_in().values())
-
-
-def plain(text):
-    """Without accents, TeX's or Unicode's."""
-    text = re.sub(r"\{\\.(\w)\}", r"\1", text)
-    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
 
 
 def keys_in(text):
     return re.findall(r"^@\w+\{([^,]+),", text, re.MULTILINE)
 
 
-@pytest.mark.parametrize("method", BUILT_IN, ids=lambda method: method.name)
-def test_keys_and_citation_of_a_method_are_of_the_same_works(method):
-    """First authors and years."""
-    keys, text = KNOWN_METHODS[method.name].works, plain(method.citation)
-    assert keys or text.startswith("This package")
-    assert set(re.findall(r"\((\d{4})\)", text)) == {BIB[key]["year"] for key in keys}
-    for key in keys:
-        assert plain(BIB[key]["author"]).partition(",")[0] in text
-
-
-def test_every_method_has_a_row_and_every_entry_is_used():
-    assert list(KNOWN_METHODS) == [method.name for method in BUILT_IN]
-    behind_methods = {key for row in KNOWN_METHODS.values() for key in (*row.works, *row.solvers)}
+def test_every_method_has_works_and_every_entry_is_used():
+    """And the file has no entry with another layout, which would be overlooked."""
+    cited = {THE_PAPER, *STATISTICS}
+    for name, method in KNOWN_METHODS.items():
+        assert method.facts.works, f"{name}: add facts = Facts(works=(KEY, ...)) to its class"
+        cited |= {*method.facts.works, *method.facts.solvers}
+    assert not cited - {*BIB}, "add entries with these keys to analysis/references.bib"
+    assert not {*BIB} - cited, (
+        "remove these entries from analysis/references.bib: nothing cites them"
+    )
     text = (ROOT / "analysis" / "references.bib").read_text(encoding="utf-8")
-    assert {THE_PAPER, *STATISTICS} | behind_methods == set(BIB) == set(keys_in(text))
+    assert [*BIB] == keys_in(text), "write these entries of analysis/references.bib like the others"
+
+
+OWN = """
+class Own(Good):
+    name = "test/own"
+    title = "A title that is too long for figures of one column"
+    facts = Facts(works=("hansen2016", "nobody2020"), algorithm="CMA-ES", short="own, short")
+
+
+class Heir(Own):
+    name = "test/heir"
+    title = "Another title"
+"""
+
+
+@pytest.mark.process
+@pytest.mark.usefixtures("in_this_process")
+def test_a_method_of_a_file_has_a_short_name_an_algorithm_and_its_works(tmp_path, coartic):
+    """Its folder carries them; a subclass does not inherit them."""
+    head = "from coartic.method import Facts\n"
+    (tmp_path / "own.py").write_text(head + BROKEN.read_text("utf-8") + OWN, encoding="utf-8")
+    methods = registry([tmp_path / "own.py"])
+    names = "cma-es/bandit", "test/own", "test/heir"
+    cells = [cell_on(load_task("ascending"), methods[name]) for name in names]
+    run_and_write(tmp_path / "results", cells, runs=1, trials=40)
+    rows = load(tmp_path / "results").methods
+    assert rows.short.to_dict() == {
+        "cma-es/bandit": "CMA-ES", "test/own": "own, short", "test/heir": "test/heir",
+    }  # fmt: skip
+    assert [*rows.algorithm] == ["CMA-ES", "CMA-ES", "test/heir"]
+    text = coartic("cite", tmp_path / "results")[1]
+    assert "% cma-es/bandit, test/own\n@article{hansen2016" in text.replace("@misc", "@article")
+    assert "% test/own names nobody2020, which coartic's bibliography does not have" in text
+
+
+def test_a_wrong_fact_is_refused():
+    with pytest.raises(ValueError, match="Facts: .*short.* 22 characters"):
+        Facts(short="a name that is much too long")
+    with pytest.raises(ValueError, match="Facts: .*works"):
+        Facts(works="hansen2016")
 
 
 @pytest.mark.usefixtures("in_this_process")

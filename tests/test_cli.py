@@ -370,7 +370,6 @@ REFUSED = (
     "verify out --run {run} [--again 1]",
     "verify out [--method-file mine.py]",
     "draw ascending --out h.svg [--initial]",
-    "draw ascending --out l.svg [--ticks-per-unit 100]",
 )
 
 

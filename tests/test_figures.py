@@ -49,10 +49,13 @@ def contrast(color):
     return 1.05 / (linear @ [0.2126, 0.7152, 0.0722] + 0.05)
 
 
-@pytest.mark.parametrize("name", ["ranking", "runtimes", "learning-curves", "tasks"])
+@pytest.mark.parametrize("name", [name for name in FIGURES if name != "gaps-by-family"])
 def test_no_text_leaves_a_narrow_figure_or_lies_on_another(name, few):
     """Names beside rows, names at the ends of lines, a legend below panels, numbers in pictures."""
     plot = FIGURES[name](few, width=3.4)
+    assert plot, (
+        f"{name} draws nothing of suite comparison: leave it out here, and test it elsewhere"
+    )
     texts = texts_of(plot.figure)
     assert misplaced(plot.figure) == ([], [])
     assert min(contrast(text.get_color()) for text in texts) > 4.5

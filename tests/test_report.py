@@ -17,6 +17,7 @@ from coartic.analysis.report import build, sections
 from coartic.analysis.report.build import stamp, write_report
 from coartic.analysis.report.sections import SECTIONS, attempt, finding
 from coartic.analysis.study import load
+from coartic.analysis.words import id_of
 from tests.support.processes import ROOT
 from tests.support.suites import cells_of, run_and_write
 
@@ -52,7 +53,14 @@ def test_a_report_is_stamped_with_the_results_of_its_runs(traced, report):
     assert [f'name="coartic-runs" content="{each}"' in page for each in stamps] == [1, 1, 0]
 
 
-def test_a_value_without_a_column_and_a_column_without_a_value_are_errors(traced):
+def test_each_figure_is_in_a_section():
+    shown = {id_of(draw) for section in SECTIONS for draw in section.figures}
+    assert not {*FIGURES} - shown, "add these figures to a Section of analysis/report/sections.py"
+
+
+def test_a_value_without_a_column_and_a_column_without_a_value_are_errors(traced, monkeypatch):
+    monkeypatch.setattr(tables, "TABLES", {})
+
     def list_mine(study):
         yield "a row", {"method": "mine", "gpa": 1.0, "run_ids": ""}
 

@@ -479,7 +479,10 @@ def test_the_control_of_ec3_has_an_idle_arm_that_keeps_still(has_its_own):
     for label, expected in ((EC3, of_ec3), (EC4, [2, 3, 4])):
         ((_, control),) = with_control(study, "first", name, label).values()
         assert control.tolist() == expected
-    idle = TABLES["signatures"](study).control_idle_arm
+    rows = TABLES["signatures"](study)
+    of_ec4 = rows[rows.method == EC4]
+    assert [*of_ec4.hands] == ["", "RRRR"]  # the choice of hands is first
+    idle = rows.control_idle_arm
     assert idle[f"{name} {EC3} RRRR"] == ("still" if has_its_own else "with noise")
     assert idle[f"{name} {EC4} RRRR"] == "with noise"
     missing = control_suite(study)

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import check_shipped
 import pytest
+from check_shipped import SHORT_RUNS
 from pydantic import create_model
 
-from coartic import CoarticError, execute, load_task
+from coartic import CoarticError, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks.include import include_folders
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import compare_runs, perform_runs_again
 from coartic.benchmarks.runner import perform
-from coartic.method import run_method
 from coartic.runs.method_info import BUILT_IN, answer, method_info
 from coartic.runs.plan import Cell, cell_of
 from coartic.runs.record import PARTS
@@ -82,32 +82,22 @@ def built_in_digest(name):
     return cell_of(TASK, info, {}).digest
 
 
-RUNS = {
-    "dual-process/EC1-uncorrected": ("two-armed-2", -357, "RRRR", 384_054),
-    "dual-process/EC4-uncorrected": ("two-armed-2", -357, "RRRR", 406_895),
-    "dual-process/custom": ("two-armed-2", -357, "RRRR", 821_009),
-    "trajectory-optimisation/path-length": ("descending", -304, "RRR", 306),
-    "trajectory-optimisation/squared-displacement": ("ascending", -298, "RRR", 94),
-    "trajectory-optimisation/acceleration": ("descending", -319, "RRR", 128),
-    "trajectory-optimisation/jerk": ("ascending", -323, "RRR", 23),
-    "trajectory-optimisation/hand-jerk": ("descending", -409, "RRR", 44),
-    "receding-horizon": ("ascending", -299, "RRR", 74),
-    "optimum/search": ("ascending", -292, "RRR", 46),
-}
-"""Task, reward, hands, and control ticks of all trials or iterations of the solver, of methods
-without a shipped run, with seed 1 and 2,000 trials; and of planners whose cheapest shipped run
-takes seconds, with the parameters of a quick check."""
-
-
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", SHORT_RUNS)
 def test_a_method_without_a_quick_shipped_run_has_a_short_one(name):
-    info, (task, *due) = built_in()[name], RUNS[name]
-    trials = {"trials": 2000} if "trials" in info.defaults else {}
-    parameters = info.configure(trials | info.load().quick)
-    result, session = run_method(parameters, load_task(task), seed=1)
-    execution, meter = execute(task, result.solution), session.meter
-    effort = meter.movement_ticks or meter.solver_iterations
-    assert [execution.reward, execution.hands, effort] == due
+    assert check_shipped.short_run(name, SHORT_RUNS[name][0]) == SHORT_RUNS[name]
+
+
+def test_a_release_names_what_is_new(monkeypatch):
+    """Methods and families that nothing would compare with later versions, with their entries."""
+    runs = check_shipped.shipped_runs()
+    before = [*check_shipped.missing_entries(runs)]
+    entry = SHORT_RUNS["dual-process/EC4-uncorrected"]
+    monkeypatch.delitem(SHORT_RUNS, "dual-process/EC4-uncorrected")
+    monkeypatch.delitem(check_shipped.FAMILIES, "long/v1")
+    more = [each for each in check_shipped.missing_entries(runs) if each not in before]
+    method, family = more
+    assert f'"dual-process/EC4-uncorrected": {entry} to SHORT_RUNS' in method
+    assert f'"long/v1": "{check_shipped.family_hash("long/v1")}" to FAMILIES' in family
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -125,7 +115,7 @@ def test_a_shipped_run_of_each_other_built_in_method_comes_back(monkeypatch):
     monkeypatch.setattr(check_shipped, "shipped_hashes", lambda: ["comparison"])
     monkeypatch.setattr(check_shipped, "perform_runs_again", watched)
     runs = check_shipped.shipped_runs()
-    assert {*runs.method} | {*RUNS} == {*built_in()}
-    rows = runs[runs.is_current & ~runs.method.isin({*RUNS})].groupby("method").head(1)
-    assert len(rows) >= 0.75 * (len(built_in()) - len(RUNS))
+    shipped = {*runs.method} - {*SHORT_RUNS}
+    rows = runs[runs.is_current & runs.method.isin(shipped)].groupby("method").head(1)
+    assert len(rows) >= 0.75 * len(shipped)
     assert [*check_shipped.differences(rows), *found] == []

@@ -6,7 +6,6 @@ import itertools
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,10 +20,9 @@ from matplotlib.patheffects import withStroke
 from coartic import Task
 from coartic.analysis.control import contexts_of_control, shared_goal
 from coartic.analysis.figures import style
+from coartic.analysis.figures.plot import FIGURES as FIGURES
 from coartic.analysis.figures.plot import (
-    DrawsFigure,
     Parts,
-    Plot,
     figure,
     looks_in,
     name_in_figure,
@@ -64,30 +62,25 @@ from coartic.analysis.tables import (
     list_saved,
     on_instances,
 )
-from coartic.analysis.words import capital, id_of, interval, listed, marked, number, titled_apart
+from coartic.analysis.words import capital, interval, listed, marked, number, titled_apart
 from coartic.estimates import FEWEST, Estimate
 from coartic.internal.text import counted
 from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
 from coartic.tasks.task import shipped_tasks
 
 
-def draw_ranking(study: Study, /, **how: Any) -> Plot | None:
+@figure("Gap to the best reward", "Ticks of the mean beyond the {reference}, in per cent of it")
+def draw_ranking(study: Study) -> Parts | None:
     """Draw the gap of each ranked method, or of each setting if the study varies parameters.
 
     Returns None if no method has a gap, and if more than two parameters vary. If fewer than two
-    settings have a gap, the gaps of ranked methods are drawn. For ``how`` see :data:`.DrawsFigure`.
+    settings have a gap, the gaps of ranked methods are drawn.
     """
     if len(study.varied.columns) > 2:
         return None
-    plot = _draw_settings(study, **how) or _draw_gaps(study, **how)
-    return plot and replace(plot, id="ranking")
+    return _draw_settings(study) or _draw_gaps(study)
 
 
-@figure(
-    "Gap by setting",
-    "Ticks of the mean beyond the {reference}, in per cent of it, by the values that vary. "
-    "n = {n} runs of a setting.",
-)
 def _draw_settings(study: Study) -> Parts | None:
     """Draw gaps by the values of the one or two parameters that the study varies.
 
@@ -112,7 +105,8 @@ def _draw_settings(study: Study) -> Parts | None:
         axes.set_ylabel(f"gap to the {reference(study, tasks)} (%)")
     words = spoken(study, rows.assign(gap=100 * rows.gap), "{title} {gap:.1f} %")
     alt = f"Gap to the {reference(study, tasks)} by setting: {words}."
-    return drawing, rows, alt, " Means over all tasks." * (len(tasks) > 1) + more
+    more = " Means over all tasks." * (len(tasks) > 1) + more
+    return drawing, rows, alt, f", by the values that vary. n = {{n}} runs of a setting.{more}"
 
 
 def _draw_lines(study: Study, axes: Axes, rows: pd.DataFrame, other: str = "") -> str:
@@ -208,11 +202,6 @@ def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
     return list(gaps) if 1 < runs.groupby("task").size().min() < FEWEST else []
 
 
-@figure(
-    "Gap to the best reward",
-    "Ticks of the mean beyond the {reference}, in per cent of it: less is better. With its "
-    f"{style.COVERAGE} bootstrap interval over runs.",
-)
 def _draw_gaps(study: Study) -> Parts | None:
     """Draw the gap of each ranked method, a mean over tasks, with its interval.
 
@@ -259,13 +248,12 @@ def _draw_gaps(study: Study) -> Parts | None:
             axes.text(0.01, -place, row, color=style.GREY, **at)
             continue
         learner, y = row["is_learner"], -place
-        size = looks[row["method"]]["markersize"] + learner  # diamonds look smaller
         look: Any = {"color": looks[row["method"]]["color"], "clip_on": False}
         axes.hlines(y, row["gap_low"], row["gap_high"], linewidth=2.5, alpha=0.6, **look)
         of_runs, of_tasks = few[row["method"]], on_tasks.get(row["method"], ())
         axes.plot(of_tasks, [y] * len(of_tasks), "|", color=style.GREY, markersize=4, zorder=1)
         axes.plot(of_runs, [y] * len(of_runs), ".", **_FEW, **look)
-        mark = looks[row["method"]]["marker"]
+        mark, size = looks[row["method"]]["marker"], looks[row["method"]]["markersize"]
         (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
         name = row["title"]
         style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
@@ -275,9 +263,10 @@ def _draw_gaps(study: Study) -> Parts | None:
     where = "" if len(tasks) > 1 else marked(study.tasks[tasks[0]]) + (":\n" if narrow else ": ")
     axes.set_xlabel(f"{where}gap to the {to} (%)")
     alt = f"Gap to the {to} by method: {spoken(study, shown, '{title} {gap:.1f} %')}."
-    bold = ["the paper's learner (diamonds)"] * any(rows.is_learner)
+    bold = ["the paper's learner"] * any(rows.is_learner)
     bold += ["methods from files (larger marks)"] * (not all(rows.built_in))
-    more = " Means over all tasks." * (len(tasks) > 1)
+    more = f": less is better. With its {style.COVERAGE} bootstrap interval over runs."
+    more += " Means over all tasks." * (len(tasks) > 1)
     more += " Grey lines: the gap on each task." * bool(on_tasks)
     more += " The axis is logarithmic from 0.1 % on." * is_log
     more += " Methods that are run once have no interval." * (not all(rows.stochastic))
@@ -290,7 +279,7 @@ def _width_of(shape: tuple[int, int]) -> float:
     return style.TWO if shape[1] > 1 else style.ONE
 
 
-ALONE = KNOWN_METHODS["corrective-alone/given"].algorithm
+ALONE = KNOWN_METHODS["corrective-alone/given"].facts.algorithm
 
 
 @figure(
@@ -852,19 +841,3 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     goal = style.legend_line("goal", linestyle="", color=style.INK, **circle)
     style.legend(drawing, [*arms, goal], 3)
     return drawing
-
-
-FIGURES: dict[str, DrawsFigure] = {
-    id_of(draw): draw
-    for draw in (
-        draw_ranking,
-        draw_shared_goal,
-        draw_postures,
-        draw_saved,
-        draw_runtimes,
-        draw_learning_curves,
-        draw_gaps_by_family,
-        draw_tasks,
-    )
-}
-"""Figures by id."""

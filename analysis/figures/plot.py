@@ -77,8 +77,14 @@ as ``matplotlib.style.use`` accepts them, that override the project's.
 """
 
 
+FIGURES: dict[str, DrawsFigure] = {}
+"""Figures by id, in the order of :mod:`coartic.analysis.figures.drawings`."""
+
+
 def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None]], DrawsFigure]:
     """Return a decorator that makes a figure of the report from a drawing function.
+
+    The decorator enters the figure in :data:`FIGURES`.
 
     - The figure has the style of all figures.
     - Its id is the part of the function's name after the first underscore, with dashes for
@@ -108,6 +114,7 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
             n = " to ".join(dict.fromkeys(map(number, ends)))
             return Plot(id_of(draw), title, words.format(n=n, reference=to), alt, drawing, data)
 
+        FIGURES[id_of(draw)] = plot
         return plot
 
     return as_figure

@@ -26,7 +26,7 @@ from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
 from coartic import estimates
 from coartic.analysis.frames import checked
-from coartic.analysis.methods import COLORS, KNOWN_METHODS, MARKS
+from coartic.analysis.methods import COLORS, LOOKS, MARKS
 
 INCH = 25.4  # mm
 ONE = 89 / INCH
@@ -67,14 +67,14 @@ def look_of(method: str) -> Look:
     Parameters
     ----------
     method : str
-        Id of a method that ships and is drawn in figures, such as ``"cma-es/bandit"``.
+        Id of a built-in method that represents its algorithm, such as ``"cma-es/bandit"``.
 
     Returns
     -------
     dict
         ``color``, ``marker`` and ``linestyle``, arguments of Matplotlib's ``plot``.
     """
-    color, mark = KNOWN_METHODS[method].look
+    color, mark = LOOKS[method]
     return {"color": COLORS[color], "marker": MARKS[mark][0], "linestyle": MARKS[mark][1]}
 
 

@@ -73,7 +73,7 @@ from coartic.analysis.words import (
 from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL
 from coartic.internal.text import error_line, one_line
-from coartic.learner.learning import TRIALS
+from coartic.method import TRIALS
 
 Made = TypeVar("Made")
 RUNS = 20

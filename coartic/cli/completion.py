@@ -2,12 +2,11 @@
 
 A shell calls these functions when the user presses Tab. Each takes the incomplete word and returns
 words; typer offers those that begin with it. If there are none, the shell offers files. To be fast,
-they read the names of shipped files, and import neither pandas nor Numba.
+they import neither pandas nor Numba.
 """
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -42,10 +41,12 @@ def families(incomplete: str = "") -> list[str]:
 
 def methods(incomplete: str = "") -> list[str]:
     """Return the ids of built-in methods, conditions of the learner, and names without blanks."""
-    known = tomllib.loads((_PACKAGE / "analysis" / "methods.toml").read_text("utf-8"))
+    from coartic.method import built_in_methods
+
+    known = built_in_methods()
     conditions = [name.partition("dual-process/")[2] for name in known]
-    short_names = [method["name"] for method in known.values() if " " not in method["name"]]
-    return [name for name in (*conditions, *short_names, *known) if name not in ("", "custom")]
+    titles = [method.title for method in known.values() if " " not in method.title]
+    return [name for name in (*conditions, *titles, *known) if name not in ("", "custom")]
 
 
 def names(incomplete: str = "") -> list[str]:

@@ -307,14 +307,6 @@ def draw(
     initial: Annotated[
         bool, typer.Option("--initial", help="Also film the corrective process, next to the run.")
     ] = False,
-    recording: Annotated[
-        Path | None,
-        given.file_or_folder("FILE", "Recorded hits or markers (CSV) to draw.", "--recording"),
-    ] = None,
-    ticks_per_unit: Annotated[
-        float | None,
-        given.within("--ticks-per-unit", "Ticks in a unit of time of the recording.", 1e-9, 1e9),
-    ] = None,
     width: Annotated[
         int | None,
         given.within("--width", "Width of the film in pixels; by default 800.", 200, 3840),
@@ -327,20 +319,12 @@ def draw(
     ] = None,
     replace: given.Replace = False,
 ) -> None:
-    """Draw tasks, film runs, or draw a recording.
+    """Draw tasks, or film runs.
 
     If --out is a folder, the files of the tasks are written there, too.
     """
     from coartic import builtin_tasks
 
-    if recording:
-        if run or initial or width is not None:
-            raise CoarticError("--run, --initial and --width have no effect with --recording")
-        if len(tasks := tasks or []) != 1:
-            raise CoarticError("--recording needs one task: coartic draw TASK --recording FILE")
-        return _draw_recording(tasks[0], recording, ticks_per_unit, out, replace)
-    if ticks_per_unit is not None:
-        raise CoarticError("--ticks-per-unit has no effect without --recording")
     if run:
         if len(tasks := tasks or []) != 1:
             raise CoarticError("--run needs one results folder: coartic draw FOLDER --run ID")
@@ -390,44 +374,6 @@ def draw(
         publish(out, files)
     drawn = f"; the first {_PICTURED} are drawn" if len(chosen) > _PICTURED else ""
     return say(f"{out}: {counted(len(chosen), 'task')}{drawn}.")
-
-
-def _draw_recording(
-    task_name: str, recording: Path, ticks_per_unit: float | None, out: Path | None, replace: bool
-) -> None:
-    """Write a picture of a recording.
-
-    Raises CoarticError if the recording cannot be read, or, after the picture is written, if its
-    hits do not fit the task.
-    """
-    from coartic import load_task
-    from coartic.analysis.figures.plot import FORMATS, picture
-    from coartic.analysis.recordings import (
-        draw_recording,
-        hits_from_markers,
-        is_of_markers,
-        read_hits,
-        solutions_of,
-    )
-    from coartic.internal.files import check_ending, check_output, write_output
-
-    out = out or Path("recording.svg")
-    check_ending(out, FORMATS)
-    check_output(out, replace=replace)
-    task = load_task(task_name)
-    if has_markers := is_of_markers(recording):
-        drawing = draw_recording(None, task, recording, ticks_per_unit=ticks_per_unit)
-    else:
-        drawing = draw_recording(recording, task, ticks_per_unit=ticks_per_unit)
-    write_output(out, picture(drawing, out.suffix.lower()), replace=replace)
-    say(f"{out}: {recording}.")  # said even if the hits are refused below
-    if has_markers:
-        hits = hits_from_markers(recording, task, ticks_per_unit=ticks_per_unit or 100.0)
-    else:
-        hits = read_hits(recording, task, ticks_per_unit=ticks_per_unit or 1.0)
-    solutions = solutions_of(task, hits)
-    finished = counted(len(solutions.runs), "trial")
-    say(f"{finished} with all goals hit, {solutions.unfinished} with a goal missed.")
 
 
 def _film(

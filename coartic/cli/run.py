@@ -285,7 +285,8 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     yield "Tasks", ", ".join(applies) or "none of the paper's tasks"
     yield "Runs", "depend on the seed" if info.stochastic else "do not depend on the seed"
     yield "Tuned on", info.tuned_on or "not stated"
-    yield "Cites", info.citation or "nothing"
+    works = *info.facts.works, *info.facts.solvers, info.citation
+    yield "Cites", ", ".join(filter(None, works)) or "nothing"
 
 
 def check(

@@ -210,14 +210,16 @@ CONDITIONS = {
         ExplorationCondition("EC4", HANDS, True, True, "random"),
     )
 }
+VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
+    "uncorrected": ("no correction", {"corrects": False}),
+    # A learner of subtasks must not choose its solution by the reward of the whole task.
+    "subtask": ("subtask reward", {"credit": "subtask", "learned": "replay"}),
+}
+"""Words for the title, and changed fields, of each variant of EC1 and EC4."""
 ABLATIONS = {
-    f"{base}-{name}": replace(CONDITIONS[base], id=f"{base}-{name}", **changes)  # type: ignore[arg-type]
+    f"{base}-{name}": replace(CONDITIONS[base], id=f"{base}-{name}", **fields)
     for base in ("EC1", "EC4")
-    for name, changes in {
-        "uncorrected": {"corrects": False},
-        # A learner of subtasks must not choose its solution by the reward of the whole task.
-        "subtask": {"credit": "subtask", "learned": "replay"},
-    }.items()
+    for name, (_, fields) in VARIANTS.items()
 }
 
 INFORMED = {

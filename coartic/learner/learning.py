@@ -31,7 +31,7 @@ from coartic.learner.kernel import (
     workspace_for,
 )
 from coartic.learner.learning_run import LearningRun
-from coartic.method import Meter
+from coartic.method import TRIALS, Meter
 from coartic.model import PAPER, MotionModel
 from coartic.motion.batch import SLOTS
 from coartic.motion.compile import addresses
@@ -49,7 +49,6 @@ from coartic.motion.trial import COUNTED, compiled_task, count_trials, empty_acc
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, letters_of
 
-TRIALS = 10_000  # trials of one run (published)
 _MOST_STORED = 200_000_000  # trials of one call; each takes 9 bytes
 _MOST_IN_BATCH = 4_000_000  # trials of runs whose rewards fit into one answer of a worker
 

@@ -18,10 +18,6 @@ from coartic.motion.solution import Execution, Movement, execute, hands_in
 from coartic.robot import Array
 from coartic.tasks.task import Task
 
-CORRECTIONS_BY_TENTH = "corrections"
-"""Name of a detail of a stored run: the numbers of corrective movements in trial 0 and in each
-tenth of the later trials."""
-
 
 @dataclass(frozen=True, eq=False)
 class LearningRun:

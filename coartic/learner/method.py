@@ -16,11 +16,14 @@ from coartic.learner.conditions import (
     CONDITIONS,
     EVERY_CONDITION,
     METHOD_PREFIX,
+    VARIANTS,
     ExplorationCondition,
 )
-from coartic.learner.learning import TRIALS, learn_many, runs_at_once
-from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
+from coartic.learner.learning import learn_many, runs_at_once
 from coartic.method import (
+    CORRECTIONS_BY_TENTH,
+    TRIALS,
+    Facts,
     Information,
     Meter,
     Method,
@@ -71,10 +74,7 @@ class DualProcess(Method):
     """Trial and error on top of the corrective process (paper, Figure 3)."""
 
     condition: ClassVar[ExplorationCondition]
-    citation = (
-        "A. Shah, A. G. Barto, A. H. Fagg (2013). A dual process account of coarticulation "
-        "in motor skill acquisition. Journal of Motor Behavior."
-    )
+    facts = Facts(works=("shah2013",), algorithm="learner")
     tuned_on = "nothing: the paper's values"
 
     def rules(self) -> ExplorationCondition:
@@ -94,13 +94,8 @@ class DualProcess(Method):
         The learned solution is the best trial or, if the condition has ``learned="replay"``, the
         noiseless trial after learning.
 
-        Raises
-        ------
-        MethodError
-            The trial with the learned solution did not hit every goal, or the budget has no trial
-            left.
-        NotApplicableError
-            No initial hands are found.
+        Raises MethodError if the trial with the learned solution did not hit every goal, or the
+        budget has no trial left.
         """
         (result,) = self.solve_together([session])
         if isinstance(result, MethodError):
@@ -157,21 +152,25 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
     Its parameters are trials, noise and ε. An informed condition also has drift, pull and
     direction; a condition with credit for subtasks also has discount and counted.
     """
-    names, citation = ["epsilon", "noise_sd"], DualProcess.citation
+    names = ["epsilon", "noise_sd"]
+    base, _, change = condition.id.partition("-")
+    title, facts = f"learner {base}", DualProcess.facts
+    if change in VARIANTS:
+        words, _ = VARIANTS[change]
+        title, of = f"{title}, {words}", f"{METHOD_PREFIX}{base}"
+        facts = replace(facts, short=f"{base}, {words}", headline=False, ablation_of=of)
     information = {Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL}
     if condition.is_informed:  # to move in the null space of a hand, where paths are short
         information |= {Information.JACOBIAN, Information.REWARD_FORMULA}
         names += ["drift", "pull", "direction"]
+        title = f"informed learner {base}"
+        facts = replace(facts, algorithm="informed learner", short=f"informed {base}")
     if condition.hand_exploration == "closest":  # to find the closest hand
         information |= {Information.GOALS, Information.FORWARD_KINEMATICS}
     if condition.credit == "subtask":
         information |= {Information.REWARD_BY_SUBTASK}
         names += ["discount", "counted"]
-        citation += (
-            " Reward of subtasks, after T. G. Dietterich (2000). Hierarchical reinforcement "
-            "learning with the MAXQ value function decomposition. Journal of Artificial "
-            "Intelligence Research."
-        )
+        facts = replace(facts, works=(*facts.works, "dietterich2000"))
     fields: Any = {name: (_FIELDS[name], getattr(condition, name)) for name in names}
 
     def check(parameters: Parameters) -> Parameters:
@@ -179,7 +178,6 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
         return parameters
 
     checks: Any = {"check": model_validator(mode="after")(check)}
-    number, _, ablation = condition.id[2:].partition("-")
     return type(
         f"DualProcess{condition.id.replace('-', '')}",
         (DualProcess,),
@@ -187,10 +185,9 @@ def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
             "__doc__": DualProcess.__doc__,
             "__module__": __name__,
             "name": f"{METHOD_PREFIX}{condition.id}",
-            "title": f"Dual-process learner, exploration condition {number}"
-            + (f", {ablation}" if ablation else ""),
+            "title": title,
+            "facts": facts,
             "information": frozenset(information),
-            "citation": citation,
             "Parameters": create_model(
                 "DualProcessParameters",
                 __base__=DualProcessParameters,
@@ -219,7 +216,8 @@ class CustomDualProcess(DualProcess):
     """
 
     name = f"{METHOD_PREFIX}custom"
-    title = "Dual-process learner, any exploration condition"
+    title = "learner, own condition"
+    facts = Facts(works=("shah2013",), headline=False)
     information = frozenset[Information]().union(*(learner.information for learner in _LEARNERS))
     Parameters: ClassVar[type[Parameters]] = create_model(
         "CustomParameters", __base__=CustomParameters, **_optional

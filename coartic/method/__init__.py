@@ -1,6 +1,6 @@
 """The base of methods, and the session through which a method works.
 
-A learner, planner or controller is a :class:`Method`. It declares its citation, its parameters and
+A learner, planner or controller is a :class:`Method`. It declares its facts, its parameters and
 the **information** that it uses. Its method ``solve`` gets a :class:`Session` (one task, one seed,
 one meter) and returns a solution. The session is the only access to the robot: it counts trials and
 evaluations, and refuses a call that the method's declaration does not cover. The harness itself
@@ -8,11 +8,15 @@ executes, scores and verifies the solution.
 """
 
 from coartic.method.base import (
+    CORRECTIONS_BY_TENTH,
     MODULES,
+    TRIALS,
+    Facts,
     Method,
     Outline,
     Parameters,
     Result,
+    built_in_methods,
     outline_of,
     run_method,
 )
@@ -28,10 +32,13 @@ from coartic.method.session import (
 )
 
 __all__ = [
+    "CORRECTIONS_BY_TENTH",
     "METERED",
     "MODULES",
     "MOST_COUNT",
+    "TRIALS",
     "BudgetError",
+    "Facts",
     "Information",
     "Meter",
     "Method",
@@ -41,6 +48,7 @@ __all__ = [
     "Result",
     "Session",
     "UndeclaredError",
+    "built_in_methods",
     "outline_of",
     "run_method",
 ]

@@ -6,9 +6,12 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from functools import cache
+from importlib import import_module
+from typing import Annotated, Any, ClassVar, NamedTuple
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.dataclasses import dataclass as checked_dataclass
 
 from coartic.errors import NotApplicableError
 from coartic.internal.limits import MOST_RUN_SEED, check_limits
@@ -20,6 +23,12 @@ from coartic.motion.solution import Movement
 from coartic.robot import Hand
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import INITIAL_POLICIES, Task
+
+TRIALS = 10_000
+"""Number of trials of a run by default (published)."""
+CORRECTIONS_BY_TENTH = "corrections"
+"""Key in the details of a learner's result: the numbers of corrective movements in trial 0 and in
+each tenth of the later trials."""
 
 
 @in_sentences
@@ -78,6 +87,37 @@ def outline_of(task: Task) -> Outline:
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
+@in_sentences
+@checked_dataclass(frozen=True)
+class Facts:
+    """What figures, tables and the bibliography say of a method besides its title.
+
+    A wrong value raises ValueError.
+
+    Examples
+    --------
+    >>> Facts(works=("hansen2016",), algorithm="CMA-ES", short="CMA-ES, big steps").short
+    'CMA-ES, big steps'
+    """
+
+    works: tuple[str, ...] = ()
+    """Keys in ``analysis/references.bib`` of the works from which the method comes, the most
+    important first."""
+    solvers: tuple[str, ...] = ()
+    """Keys in ``analysis/references.bib`` of the works on the solvers that the method uses."""
+    algorithm: str = ""
+    """Algorithm of which the method is a form, by default the method itself. A ranking counts
+    algorithms."""
+    short: Annotated[str, Field(max_length=22)] = ""
+    """Name in figures of one column, at most 22 letters. By default it is the title of a built-in
+    method, and the id of a method from a file."""
+    headline: bool = True
+    """True if the method represents its algorithm where a table or figure names only some
+    methods."""
+    ablation_of: str = ""
+    """Id of the method of which this method is an ablation."""
+
+
 class Method(ABC):
     """Base class of methods.
 
@@ -89,8 +129,11 @@ class Method(ABC):
     """Id, such as ``"random-search"``. The id of another form of the same method adds ``/form``."""
     title: ClassVar[str]
     """Name in figures and tables."""
-    citation: ClassVar[str]
-    """Publications from which the method comes."""
+    facts: ClassVar[Facts] = Facts()
+    """Works, short name and algorithm of the method. A subclass does not inherit them."""
+    citation: ClassVar[str] = ""
+    """Works from which the method comes that ``analysis/references.bib`` does not have, in
+    words."""
     information: ClassVar[frozenset[Information]]
     """Information that the method uses."""
     tuned_on: ClassVar[str] = ""
@@ -110,6 +153,10 @@ class Method(ABC):
     quick: ClassVar[Mapping[str, Any]] = {}
     """Parameters for a check that takes seconds, if the defaults take longer."""
 
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        cls.facts = vars(cls).get("facts", Facts())
+
     def __init__(self, parameters: Any = None) -> None:
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
@@ -124,12 +171,24 @@ class Method(ABC):
     def solve(self, session: Session) -> Result:
         """Find a solution of the session's task, and return it.
 
+        Parameters
+        ----------
+        session : Session
+            One task, one seed and one budget. All calls go through it.
+
+        Returns
+        -------
+        Result
+            The solution, with at least one movement for each goal, and further data to be stored.
+
         Raises
         ------
         MethodError
             No solution is found.
         NotApplicableError
             No initial hands are found.
+        BudgetError
+            The method made a trial when none was left.
         """
 
     def max_batch(self) -> int:
@@ -167,7 +226,17 @@ MODULES = (
     "coartic.baselines.receding_horizon",
     "coartic.baselines.optimum",
 )
-"""Modules of the built-in methods, each with a list ``METHODS``."""
+"""Modules of the built-in methods, each with a list ``METHODS``, in the order of lists and figures.
+Add a new one at the end, so that the others keep their looks."""
+
+
+@cache
+def built_in_methods() -> Mapping[str, type[Method]]:
+    """Import the built-in methods, and return their classes by id in the order of :data:`MODULES`.
+
+    Each call returns the same mapping: do not change it.
+    """
+    return {method.name: method for name in MODULES for method in import_module(name).METHODS}
 
 
 def run_method(

@@ -19,9 +19,9 @@ from pydantic import Field
 from coartic.errors import CoarticError
 from coartic.internal.limits import MOST_TRIALS, WIDTHS, brief_value, check_limits, real_array
 from coartic.internal.text import counted
-from coartic.learner.learning import TRIALS
 from coartic.method import (
     MOST_COUNT,
+    TRIALS,
     BudgetError,
     Information,
     Method,

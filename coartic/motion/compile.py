@@ -3,7 +3,7 @@
 Numba is imported with the first call, so that a command that only lists names needs no compiler.
 Machine code is stored on disk. Numba itself looks only at the file of the cached function, and
 would miss a change in a function from another file. Here the folder of the machine code is named
-after a hash of the model's sources, so that changed sources are compiled again.
+after a hash of the files that kernels consist of, so that changed kernels are compiled again.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import fcntl
 import hashlib
 import logging
 import os
+import re
 import shutil
 import sys
 import time
@@ -40,21 +41,27 @@ _IMPORTING = Lock()  # an option of LLVM can be set only once
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _hash_of_sources() -> str:
-    """Return 16 hex digits of the SHA-256 hash of the model's sources.
+def python_files(*folders: str) -> list[Path]:
+    """Return the Python files in folders of the package ``coartic``, and in their subfolders."""
+    return sorted(path for folder in folders for path in (PACKAGE / folder).rglob("*.py"))
 
-    The sources are ``robot.py``, ``model.py``, ``tasks/task.py`` and the modules of ``motion``,
-    ``learner`` and ``method``.
-    """
-    single = (PACKAGE / name for name in ("robot.py", "model.py", "tasks/task.py"))
-    folders = ((PACKAGE / folder).glob("*.py") for folder in ("motion", "learner", "method"))
-    files = sorted([*single, *(path for folder in folders for path in folder)])
+
+def hash_of_files(files: Iterable[Path]) -> str:
+    """Return 16 hex digits of the SHA-256 hash of the names and contents of files."""
     texts = (path.name.encode() + b"\0" + path.read_bytes() for path in files)
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
 
 
-FINGERPRINT = _hash_of_sources()
-"""Hash of the model's sources when this module was imported."""
+_DECORATED = re.compile(rb"^@(entry|inner|shared|inlined|scalar|intrinsic)$", re.MULTILINE)
+KERNEL_FILES = [
+    PACKAGE / "robot.py",
+    *(path for path in python_files("motion", "learner") if _DECORATED.search(path.read_bytes())),
+]
+"""Files of which kernels consist: those in ``motion`` and ``learner`` that define kernels, and
+``robot.py``, whose formulas become kernels. A kernel elsewhere may use these files and its own, at
+which Numba looks itself."""
+FINGERPRINT = hash_of_files(KERNEL_FILES)
+"""Hash of the files of the kernels when this module was imported."""
 
 
 class _Kernel:

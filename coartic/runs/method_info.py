@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, plain
 from coartic.internal.validation import explain
-from coartic.method import Method, Outline, outline_of
+from coartic.method import Facts, Method, Outline, outline_of
 from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
@@ -61,6 +61,8 @@ class MethodInfo:
     (:mod:`coartic.benchmarks.method_files`)."""
     packages: dict[str, str] = field(default_factory=dict, compare=False)
     """Versions of the installed packages that the method file imports, by name."""
+    facts: Facts = field(default_factory=Facts, compare=False)
+    """Works, short name and algorithm. Folders of 6.0.0 do not have them."""
     tuned_on: str = field(default="", compare=False)
     """Tasks on which the method's parameters were chosen; not stored."""
     where: str = field(default="", compare=False)
@@ -194,6 +196,7 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
         defaults=_defaults(method),
         origin=origin,
         code=code,
+        facts=method.facts,
         tuned_on=method.tuned_on,
         where=where,
     )

@@ -76,9 +76,12 @@ class Cell:
     @property
     def content(self) -> dict[str, Any]:
         """The cell as plain data, as it is stored, with the motion model."""
+        method = asdict(replace(self.method, tuned_on="", where=""))
+        if self.method.is_ours:
+            del method["facts"]  # they are in its class
         return {
             "task": self.definition,
-            "method": asdict(replace(self.method, tuned_on="", where="")),
+            "method": method,
             "parameters": self.parameters,
             "model": PAPER.for_radius(self.task.radius)._asdict(),
             "trial_budget": self.trial_budget,

@@ -17,8 +17,7 @@ from pydantic import Field, InstanceOf
 
 from coartic.errors import SolutionError
 from coartic.internal.limits import real_array
-from coartic.learner.learning_run import CORRECTIONS_BY_TENTH
-from coartic.method import MOST_COUNT, Meter
+from coartic.method import CORRECTIONS_BY_TENTH, MOST_COUNT, Meter
 from coartic.model import PAPER
 from coartic.motion.movement import segment_lengths
 from coartic.motion.solution import Execution, Movement, execute_many

@@ -6,21 +6,55 @@ The script performs one run of each cell of suite ``comparison``, and one run of
 of each method on each family of suite ``families``. With ``--all`` it performs one run of each cell
 of both suites, which takes an hour. Runs by an earlier version of their method are not performed:
 the script counts them as to be made again.
+
+With ``--release`` it also names the methods and families that nothing would compare with later
+versions, with the entries that they need in :data:`SHORT_RUNS` and :data:`FAMILIES`.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
+import json
 import sys
 from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
+from coartic import execute, load_task
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import perform_runs_again
+from coartic.method import run_method
 from coartic.runs.record import PARTS, Run
 from coartic.runs.shipped import open_shipped, shipped_hashes
+from coartic.tasks.families import instance, shipped_families
+from coartic.tasks.task import task_text
 
+SHORT_RUNS = {
+    "dual-process/EC1-uncorrected": ("two-armed-2", -357, "RRRR", 384_054),
+    "dual-process/EC4-uncorrected": ("two-armed-2", -357, "RRRR", 406_895),
+    "dual-process/custom": ("two-armed-2", -357, "RRRR", 821_009),
+    "trajectory-optimisation/path-length": ("descending", -304, "RRR", 306),
+    "trajectory-optimisation/squared-displacement": ("ascending", -298, "RRR", 94),
+    "trajectory-optimisation/acceleration": ("descending", -319, "RRR", 128),
+    "trajectory-optimisation/jerk": ("ascending", -323, "RRR", 23),
+    "trajectory-optimisation/hand-jerk": ("descending", -409, "RRR", 44),
+    "receding-horizon": ("ascending", -299, "RRR", 74),
+    "optimum/search": ("ascending", -292, "RRR", 46),
+}
+"""Task, reward, hands, and control ticks of all trials or iterations of the solver, of methods
+without a shipped run, with seed 1 and 2,000 trials; and of planners whose cheapest shipped run
+takes seconds, with the parameters of a quick check."""
+FAMILIES = {
+    "aligned/v1": "7d54471d916711ce",
+    "long/v1": "f1f48d64e2a1d1ee",
+    "many-goals/v1": "431e6d2a591657a2",
+    "one-armed/v1": "85c1cafe81ce2bc4",
+    "redundancy/v1": "74dc928d21a32f17",
+    "two-armed/v1": "3c581b274307a7ab",
+}
+"""Hashes of the released families (:func:`family_hash`). A family never changes, because results of
+the same name would not be comparable. Another distribution has another version."""
 CELL = ["suite", "task", "method", "setting"]
 
 
@@ -75,6 +109,39 @@ def differences(rows: pd.DataFrame) -> Iterator[str]:
             )
 
 
+def short_run(name: str, task: str) -> tuple[str, int, str, int]:
+    """Perform the short run of a method on a task, and return it as in :data:`SHORT_RUNS`."""
+    info = built_in()[name]
+    trials = {"trials": 2000} if "trials" in info.defaults else {}
+    parameters = info.configure(trials | info.load().quick)
+    result, session = run_method(parameters, load_task(task), seed=1)
+    execution, meter = execute(task, result.solution), session.meter
+    effort = meter.movement_ticks or meter.solver_iterations
+    return task, int(execution.reward), execution.hands, int(effort)
+
+
+def family_hash(name: str) -> str:
+    """Return a hash (16 hex digits) of a family and a task of each split that it draws."""
+    family = json.dumps(shipped_families()[name].model_dump(mode="json"), sort_keys=True)
+    drawn = [task_text(instance(f"{name}/{number}")) for number in ("i017", "d003", "2027-041")]
+    return hashlib.sha256("".join([family, *drawn]).encode()).hexdigest()[:16]
+
+
+def missing_entries(runs: pd.DataFrame) -> Iterator[str]:
+    """Yield a sentence for each method and family that nothing would compare with later versions.
+
+    ``runs`` are the shipped runs. The sentences have the entries that are missing.
+    """
+    for name, info in built_in().items():
+        if name not in {*runs.method, *SHORT_RUNS}:
+            tasks = ("two-armed-2", "ascending")
+            task = next(task for task in tasks if info.why_not(load_task(task)) is None)
+            yield f'{name} has no shipped run: add "{name}": {short_run(name, task)} to SHORT_RUNS'
+    for name in shipped_families():
+        if name not in FAMILIES:
+            yield f'{name} is new: add "{name}": "{family_hash(name)}" to FAMILIES'
+
+
 def result_of(run: Run) -> str:
     """Return reward, hands and ticks of each movement of the parts of a run, as a string."""
     scores = {part: run.scores[part] for part in PARTS if part in run.scores}
@@ -87,7 +154,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Check the runs that the command line asks for, and print the result.
 
     Returns 1 if a run differs, or, with ``--release``, if a run is by an earlier version of its
-    method; otherwise 0.
+    method or an entry is missing (:func:`missing_entries`); otherwise 0.
     """
     parser = argparse.ArgumentParser(prog="python docs/scripts/check_shipped.py")
     parser.add_argument("--all", action="store_true", help="one run of each cell (an hour)")
@@ -102,7 +169,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"Runs by earlier versions, to be made again: {len(old) or 'none'} of {len(runs)}.")
     for (suite, method, version), rows_of in old.groupby(["suite", "method", "code"]):
         print(f"- {suite}: {len(rows_of)} of {method} {version}; here {built_in()[method].code}")
-    return int(bool(found) or (options.release and len(old) > 0))
+    missing = [*missing_entries(runs)] if options.release else []
+    print(*(f"- {sentence}" for sentence in missing), sep="\n", end="\n" * bool(missing))
+    return int(bool(found) or bool(missing) or (options.release and len(old) > 0))
 
 
 if __name__ == "__main__":

@@ -21,8 +21,8 @@ from coartic.baselines.cma_es import CMAES
 from coartic.benchmarks.planning import plan_suite
 from coartic.gym import TaskEnv
 from coartic.learner.conditions import METHOD_PREFIX
-from coartic.learner.learning import TRIALS, warm_up
-from coartic.method import Session
+from coartic.learner.learning import warm_up
+from coartic.method import TRIALS, Session
 from coartic.motion.batch import SLOTS
 from coartic.motion.solution import movements_of
 

@@ -42,11 +42,11 @@ def tabulate_runs(study: Study) -> pd.DataFrame:
         are left out.
     """
     runs = study.runs[_OF_RUN].assign(
-        **{name.replace(" ", "_"): study.signature(name) for name in SIGNATURES}
+        **{each.column: study.signature(name) for name, each in SIGNATURES.items()}
     )
     if runs.replay_reward.notna().any():
-        for name in SIGNATURES:
-            runs[f"replay_{name}".replace(" ", "_")] = study.signature(name, replay=True)
+        for name, each in SIGNATURES.items():
+            runs[f"replay_{each.column}"] = study.signature(name, replay=True)
     tabulated: pd.DataFrame = runs.set_index("run_id").dropna(axis="columns", how="all")
     return tabulated
 

@@ -512,6 +512,13 @@ def test_the_base_goes_right_once_rrlr_is_learned(xs, runs, verdict):
     assert_verdict("no-reversal", study, verdict)
 
 
+def test_each_claim_has_a_rule():
+    todo = (
+        "add rules with these ids to RULES of postures.py, hands.py, performance.py or families.py"
+    )
+    assert not {*claims.CLAIMS.index} - {*claims.RULES}, todo
+
+
 def test_the_register_on_runs(study, tables):
     entries = tables["claims"]
     assert list(entries.index) == [*claims.CLAIMS.index]

@@ -3,8 +3,8 @@
 import pytest
 
 from coartic import PAPER, Robot, corrective_trial, hand_sequences, load_task
-from coartic.learner import learning
 from coartic.learner.conditions import CONDITIONS
+from coartic.method import TRIALS
 from coartic.tasks.catalogue import builtin_tasks
 from tests.support.processes import programs
 
@@ -35,7 +35,7 @@ def test_constants_are_those_of_the_code():
         condition.epsilon for condition in CONDITIONS.values()
     }
     assert {constant("noise-sd")} == {condition.noise_sd for condition in CONDITIONS.values()}
-    assert (RUNS, constant("trials")) == (20, learning.TRIALS) == (20, 10_000)
+    assert (RUNS, constant("trials")) == (20, TRIALS) == (20, 10_000)
     robot = Robot()
     assert robot.dof == constant("degrees-of-freedom")
     assert robot.left_links == (constant("link-length"),) * int(constant("joints-per-arm"))
