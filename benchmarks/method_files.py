@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import site
 import sys
-import sysconfig
 from collections.abc import Iterable
 from concurrent.futures import BrokenExecutor
 from dataclasses import replace
@@ -28,6 +26,7 @@ from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, error_line, plain
 from coartic.internal.threads import begin_worker
 from coartic.internal.toml_files import read_bytes
+from coartic.internal.user_files import is_users
 from coartic.method import Information, Method
 from coartic.method.optimisers import Optimiser
 from coartic.model import MODEL_VERSION
@@ -190,24 +189,14 @@ def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
 def _user_files(names: Iterable[str]) -> set[Path]:
     """Return the files of the loaded modules ``names``, if they are the user's.
 
-    A file is the user's if it does not belong to this project, the standard library or an
-    installed package.
+    :func:`.is_users` says which files are the user's.
     """
-    folders = [sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")]
-    folders += [*site.getsitepackages(), site.getusersitepackages()]
-    modules = {
-        Path(path).resolve()
+    files = {
+        name: Path(path).resolve()
         for name in names
-        if name.partition(".")[0] != "coartic"
-        and isinstance(path := getattr(sys.modules.get(name), "__file__", None), str)
+        if isinstance(path := getattr(sys.modules.get(name), "__file__", None), str)
     }
-    return {
-        path
-        for path in modules
-        if path.is_file()
-        and not {"site-packages", "dist-packages"} & {*path.parts}
-        and not any(path.is_relative_to(Path(folder).resolve()) for folder in folders)
-    }
+    return {path for name, path in files.items() if is_users(name, path)}
 
 
 def _packages_of(files: Iterable[Path]) -> dict[str, str]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import multiprocessing
 import os
 import resource
 import signal
@@ -309,6 +310,8 @@ def _begin(folder: Path, workers: int, verbose: bool) -> None:
     memory is 80 % of the machine's memory divided by the number of ``workers``, but at least 1 GiB.
     """
     os.environ.pop("PYTHONSAFEPATH", None)  # see WorkerProcess
+    # Other processes cannot import the module of a method file. Forked ones have it.
+    multiprocessing.set_start_method("fork", force=True)
     begin_worker(folder, streams=1 if verbose else 3)
     if verbose:
         _show_errors()

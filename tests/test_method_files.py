@@ -1,5 +1,7 @@
 """Methods and tasks of the user's files, and the examples of the pages."""
 
+import os
+import py_compile
 import signal
 from pathlib import Path
 
@@ -8,6 +10,7 @@ import pytest
 
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
+from coartic.benchmarks.registry import registry
 from tests.support.suites import ROOT
 
 METHOD = ROOT / "tests" / "methods" / "nearest_hand.py"
@@ -33,6 +36,22 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     code, _, error = coartic(*again)
     assert code == 2
     assert "unknown method 'nearest-hand': pass --method-file" in error
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("helper", ["stepsize", "analysis", "tests"])
+def test_a_helper_is_compiled_from_its_source_and_is_that_of_its_folder(helper, tmp_path):
+    """Whatever bytecode there is, and also if a folder of this checkout has its name."""
+    path = tmp_path / f"{helper}.py"
+    for step in (0.02, 0.30):
+        path.write_text(f"STEP = {step:.2f}\n", encoding="utf-8")
+        os.utime(path, (1.7e9, 1.7e9))  # as from an archive
+        if step == 0.02:
+            py_compile.compile(path)
+    text = TEXT.replace('title = "', f'title = f"{{{helper}.STEP}} of ')
+    (tmp_path / "mine.py").write_text(f"import {helper}\n{text}", encoding="utf-8")
+    assert registry([tmp_path / "mine.py"])["nearest-hand"].title.startswith("0.3 of ")
+    assert [*tmp_path.rglob("mine*.pyc")] == []
 
 
 HARMLESS = """os.chdir('/'); print('x' * 10**6)

@@ -20,13 +20,19 @@ from tests.support.suites import KNOWN, cell_on, made_once, planned, run_and_wri
 pytestmark = [pytest.mark.process, pytest.mark.usefixtures("not_repeated")]
 
 METHODS = """
-import itertools, os, signal, subprocess, sys, time
+import itertools, multiprocessing, os, signal, subprocess, sys, time
 import numpy as np
 from coartic.method import Information, Method, Parameters, Result
 from coartic.motion.solution import Movement
 
 def corrected(session, hand="right"):
     return tuple(Movement(n, hand, "corrective") for n in range(1, session.goals_count + 1))
+
+def hand_of(n):
+    return "right" if n else "left"
+
+def trial_of(n):
+    return KEPT.trial(corrected(KEPT)).reward
 
 class What(Parameters):
     what: str = "honest"
@@ -63,6 +69,11 @@ HANDLED = {
     "details": ("return Result(corrected(session), {'call': print})",
                 "solver-failed", "cannot be stored: TypeError"),
     "honest": ("return Result(corrected(session))", "ok", ""),
+    "maps": ("with multiprocessing.Pool(1) as pool: (hand,) = pool.map(hand_of, [1])\n"
+             "        return Result(corrected(session, hand))", "ok", ""),
+    "tries_elsewhere": ("global KEPT; KEPT = session\n"
+                        "        with multiprocessing.Pool(1) as pool: pool.map(trial_of, [1])",
+                        "crashed", "a session cannot be used in another process"),
     "prints": ("print('x' * 10**6); os.write(2, b'\\x1b[31m' * 10**5)\n"
                "        return Result(corrected(session))", "ok", ""),
 }  # fmt: skip

@@ -19,6 +19,7 @@ from pydantic import ValidationError
 
 from coartic.errors import CoarticError
 from coartic.internal.text import error_line, plain
+from coartic.internal.user_files import import_from
 from coartic.internal.validation import explain
 from coartic.method import Method, Outline, outline_of
 from coartic.tasks.task import Task
@@ -256,12 +257,11 @@ def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
     """Import a method file, and return its module and the names of loaded modules.
 
     The names are those of the other modules that the import has loaded. A process imports the file
-    once for each ``code``, a hash. The folder of the file is added to ``sys.path``. Errors of the
-    file are raised as they are.
+    once for each ``code``, a hash. The file and the user's modules are compiled from their source
+    (:func:`.import_from`). Errors of the file are raised as they are.
     """
     name = f"coartic_method_{path.stem}"
-    if str(path.parent) not in sys.path:
-        sys.path.append(str(path.parent))
+    import_from(path.parent)
     before = {*sys.modules}
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
