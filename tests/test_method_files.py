@@ -1,5 +1,6 @@
 """Methods and tasks of the user's files, and the examples of the pages."""
 
+import math
 import os
 import py_compile
 import signal
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coartic import CoarticError
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
 from coartic.benchmarks.registry import registry
@@ -54,6 +56,27 @@ def test_a_helper_is_compiled_from_its_source_and_is_that_of_its_folder(helper, 
     assert [*tmp_path.rglob("mine*.pyc")] == []
 
 
+@pytest.mark.process
+@pytest.mark.parametrize("value", ["math.inf", "[1.0, math.nan]"])
+def test_parameters_that_json_does_not_have_are_refused(value, tmp_path):
+    text = f"import math\n{TEXT}\n{PATIENT}"
+    path = tmp_path / "mine.py"
+    path.write_text(text.replace("VALUE", value), encoding="utf-8")
+    words = r"method 'patient': patience is .*; a parameter must be finite: use None for no limit"
+    with pytest.raises(CoarticError, match=words):
+        registry([path])
+    path.write_text(text.replace("VALUE", "2.0"), encoding="utf-8")
+    with pytest.raises(CoarticError, match=words):
+        registry([path])["patient"].complete({"patience": eval(value, {"math": math})})
+
+
+PATIENT = """
+from typing import Any
+class Patience(Parameters):
+    patience: Any = VALUE
+class Patient(NearestHand):
+    name, Parameters = "patient", Patience
+"""
 HARMLESS = """os.chdir('/'); print('x' * 10**6)
 import coartic.benchmarks.scoring as s; s.score = s.execute_many = None
 import numpy; numpy.sqrt = None

@@ -18,6 +18,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from coartic.errors import CoarticError
+from coartic.internal.limits import brief_value
 from coartic.internal.text import error_line, plain
 from coartic.internal.user_files import import_from
 from coartic.internal.validation import explain
@@ -168,7 +169,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
             f"method {method.name!r}: {problem} (its parameters: {listed})"
         ) from None
     if question == "complete":
-        values = json.loads(json.dumps(typed.model_dump(mode="json")))
+        _plain_parameters(method, typed.model_dump())  # mode json has None for some NaN
+        values = _plain_parameters(method, typed.model_dump(mode="json"))
         return {
             name: value
             for name, value in values.items()
@@ -201,12 +203,32 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return the defaults of parameters as plain data, by name; None if there is no default."""
+    """Return the defaults of parameters as plain data, by name; None if there is no default.
+
+    Raises CoarticError for a default that is infinite or NaN.
+    """
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
         for name, field in method.Parameters.model_fields.items()
     }
-    return dict(json.loads(json.dumps(defaults, default=str)))
+    return _plain_parameters(method, defaults)
+
+
+def _plain_parameters(method: type[Method], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of parameters as plain data, by name.
+
+    Raises CoarticError for a value with infinity or NaN, which JSON does not have.
+    """
+    plain_values = {}
+    for name, value in values.items():
+        try:
+            plain_values[name] = json.loads(json.dumps(value, default=str, allow_nan=False))
+        except ValueError:
+            raise CoarticError(
+                f"method {method.name!r}: {name} is {brief_value(value)}; a parameter must be "
+                "finite: use None for no limit"
+            ) from None
+    return plain_values
 
 
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
