@@ -79,6 +79,8 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     assert text.splitlines()[-1] == "1 run performed again: none with another result."
     assert re.search(rf"Run +{first}: Ascending, .*, run 0\nSeed +[0-9]+\nParam.*\nResult", text)
     assert "checked" not in text
+    text = coartic("verify", out, "--run", first, "--run", second)[1]
+    assert text.splitlines()[-1] == "2 runs performed again: none with another result."
     assert f"`coartic list {out}`" in coartic("verify", out, "--run", "0123456789")[2]
     part = tmp_path / "part"  # of an array, and of all methods those for one arm
     own = ("--methods", "dual-process/*", "--runs", "2..3")
