@@ -103,6 +103,9 @@ class MethodError(CoarticError):
         self.outcome = outcome
         self.details = details or {}
 
+    def __reduce__(self) -> Any:  # for pools, which would wait for ever for an error like this
+        return type(self), (self.outcome, str(self), self.details)
+
 
 @dataclass
 class Meter:
