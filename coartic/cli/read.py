@@ -128,7 +128,7 @@ def say_ranking(study: Study, folder: Path) -> None:
     if notes["own"]:
         known = f"for {listed(notes['own'])} only the best reward of this folder is known"
         all_methods = ",".join(dict.fromkeys([*study.declared, *SEARCHES]))
-        search = f"repeat the command with --methods {quote(all_methods)}"
+        search = f"repeat the command with `--methods {quote(all_methods)}`"
         pairs.append(("", f"{known}; to search for the optimum, {search}"))
     if notes["unknown"]:
         pairs.append(("", f"for {listed(notes['unknown'])} no reward is known"))
@@ -142,7 +142,7 @@ def say_ranking(study: Study, folder: Path) -> None:
         pairs.append(("Failed", f"{notes['failed']} of {counted(notes['runs'], 'run')}: {reasons}"))
     pairs += [("‡", sentence) for sentence in notes["late"]]
     page = folder / "report" / "report.html"
-    say_pairs([*pairs, ("Report", f"coartic report {quote(str(folder))} writes {page}")])
+    say_pairs([*pairs, ("Report", f"`coartic report {quote(str(folder))}` writes {page}")])
 
 
 def verify(

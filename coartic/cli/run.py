@@ -144,7 +144,7 @@ def run(
         progress = perform(asked, out, executor=executor, watch=display.update)
     say(str(progress))
     if isinstance(runs, range):
-        part = f"--include {quote(str(out))}, with all other parts, joins them"
+        part = f"`--include {quote(str(out))}`, with all other parts, joins them"
         say_pairs([("Next", f"{out} has runs {runs[0]} to {runs[-1]}: {part}")])
     else:
         say_ranking(load(out), out)
