@@ -75,7 +75,7 @@ def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
         raise CoarticError(f"{shown}: the process that reads it ended: {how}") from None
     except TimeoutError:
         raise CoarticError(f"{shown}: its process did not answer within {_ANSWER_S:g} s") from None
-    except (BrokenExecutor, OSError) as error:
+    except (BrokenExecutor, OSError, RuntimeError) as error:
         reason = error_line(error.__cause__ or error)
         raise CoarticError(
             f"{shown}: a process to read it cannot start ({reason}). Repeat the command"
