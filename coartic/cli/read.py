@@ -157,18 +157,27 @@ def verify(
             words=completion.runs,
         ),
     ] = None,
+    noise: Annotated[
+        bool,
+        typer.Option(
+            "--noise", help="Execute all solutions with motor noise, not only one of each cell."
+        ),
+    ] = False,
     method_file: given.MethodFiles = None,
 ) -> None:
     """Check stored runs by executing their solutions again.
 
-    Exits with code 1 if a result differs, or if the folder lacks runs. With --run only one run is
-    performed again, and nothing else is checked.
+    Exits with code 1 if a result differs, or if the folder lacks runs. With --run only these runs
+    are performed again, and nothing else is checked.
     """
     from coartic.analysis.verify import check_runs
+    from coartic.benchmarks.reproduce import execute_with_noise_again
     from coartic.runs.store import explain_errors, open_store
 
     if again and run:
         raise CoarticError("--again has no effect with --run, which performs one run again")
+    if noise and run:
+        raise CoarticError("--noise has no effect with --run")
     if method_file and not (again or run):
         raise CoarticError("--method-file has no effect without --again or --run")
     is_right = True
@@ -176,11 +185,16 @@ def verify(
         with Display() as display, open_store(folder), explain_errors(folder):
             display.show(f"Executing the solutions of {folder}")
             report = check_runs(folder)
-        is_right = not (report.wrong or report.unfinished)
+            executed, wrong = 0, report.wrong
+            if not wrong:
+                display.show(f"Executing solutions of {folder} with motor noise")
+                executed, wrong = execute_with_noise_again(folder, every=noise)
+        is_right = not (wrong or report.unfinished)
         say(
             f"{counted(report.runs, 'run')} checked, "
             f"{counted(report.movements, 'movement')} executed.",
-            *(report.wrong or ["Nothing differs."]),
+            *[f"{counted(executed, 'solution')} executed with motor noise."] * bool(executed),
+            *(wrong or ["Nothing differs."]),
             *report.unfinished,
         )
     differing = _perform_again(folder, again, run, method_file) if again or run else 0
