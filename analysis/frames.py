@@ -389,7 +389,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - ``corrective_best``: needed for shares (:func:`shares`);
         - ``budget``: the number of trials that was asked for, missing for a method without trials;
         - ``noisy_ticks``: mean ticks of the run's solution with motor noise, missing if executions
-          fail.
+          fail;
+        - ``note``: what readers should know of the run, empty or missing for nothing.
 
         ``load(folder).runs`` has all of them.
 
@@ -412,6 +413,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - ``runs`` and ``failed``: numbers of runs and of failed runs.
         - ``why``: why the method is not ranked, such as ``"1 of 2 tasks"`` or ``"6 of 9 runs
           failed"``; empty for a ranked method.
+        - ``note``: the notes on the method's runs, each once. Only for a frame with ``note``.
 
         Tasks without a best known reward are left out of gaps and shares.
 
@@ -438,6 +440,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         frame = frame.drop(columns=["method", "setting"], errors="ignore")
         frame = frame.rename(columns={"ranked_as": "method"})
     runs = _scored_runs(frame, *(name for name in ("budget", "noisy_ticks") if name in existing))
+    if "note" in existing:
+        runs["note"] = frame["note"].to_numpy(object)
     if "noisy_ticks" in runs:
         runs["noisy_gap"] = gap_share(-runs.noisy_ticks, runs.best_known)
     asked = sorted(runs.budget.dropna().unique()) if "budget" in existing else []
@@ -475,5 +479,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
             row |= (Estimate(np.nan) if fails else task_mean(parts)).columns("noisy_gap")
         counts = {"tasks": len(by_task), "runs": len(of_method)}
         rows.append(row | counts | {"failed": int(of_method.reward.isna().sum()), "why": why})
+        if "note" in runs:
+            rows[-1]["note"] = "; ".join(filter(None, map(str, of_method.note.dropna().unique())))
     methods = pd.Index([*runs.method.unique()], name="method", tupleize_cols=False)
     return pd.DataFrame(rows, methods).sort_values("gap", kind="stable")

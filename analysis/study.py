@@ -247,6 +247,7 @@ class Study:
           conditions of the learner, for one arm and for two arms, share a row;
         - ``budget``: the number of trials that was asked for, missing for methods that do not use
           the reward of each trial;
+        - ``note``: warnings about the method (:attr:`marks`), empty if there are none;
         - ``family``, ``split``, number of ``goals`` and number of ``arms`` (1 or 2) of the task;
         - ``best_known``: best known reward of the task, missing if there is none, and for a search
           with another base;
@@ -259,6 +260,7 @@ class Study:
         labels = [*map(label_of, self.stored.method, self.stored.setting)]
         runs, cells = self.stored.assign(label=labels), [job.cell for job in self.plan]
         runs["ranked_as"] = ranked_as(runs)
+        runs["note"] = ["; ".join(self.marks.get(name, ())) for name in runs.method]
         rows = [
             {
                 **cell.method.defaults,

@@ -161,8 +161,9 @@ class Table:
     def __call__(self, study: Study) -> pd.DataFrame:
         """Return the table of a study, indexed by the names of the rows.
 
-        Intervals and deviations have columns that end in ``_low``, ``_high`` and ``_sd``. The frame
-        is cached: do not change it.
+        Intervals and deviations have columns that end in ``_low``, ``_high`` and ``_sd``. Column
+        ``note`` has what marks methods with ‡ (:attr:`.Study.marks`). The frame is cached: do not
+        change it.
         """
         check_study(study)
         return _frame_of(self, study)
@@ -211,7 +212,25 @@ def _frame_of(table: Table, study: Study) -> pd.DataFrame:
             f"table {table.id}: the rows and the columns must have the same names; only one of "
             f"them has {sorted(wrong)}"
         )
-    return rows.reindex(columns=names).rename_axis("row")
+    return _with_marks(rows.reindex(columns=names), study).rename_axis("row")
+
+
+def _with_marks(rows: pd.DataFrame, study: Study) -> pd.DataFrame:
+    """Return rows with the warnings about their methods (:attr:`.Study.marks`) in column ``note``.
+
+    A table of methods without this column gets it, before ``run_ids``, if there are warnings.
+    """
+    columns = [name for name in ("method", "against") if name in rows]
+    if not (study.marks and columns):
+        return rows
+    notes = []
+    for row in rows.to_dict("records"):
+        methods = dict.fromkeys(str(study.methods.base.get(row[name])) for name in columns)
+        marks = itertools.chain(*(study.marks.get(method, ()) for method in methods))
+        notes.append("; ".join(filter(None, [row.get("note"), *marks])))
+    if "note" not in rows:
+        rows.insert(len(rows.columns) - 1, "note", "")
+    return rows.assign(note=notes)
 
 
 def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:

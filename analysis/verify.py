@@ -6,7 +6,7 @@ opens ``FOLDER/runs.sqlite`` and checks that
 - the solution of each run (and the first trial and the replay of a learner) obeys the rules, hits
   all goals, and has the stored ticks, reward and hands;
 - no joint and no trial was changed afterwards, by a hash;
-- each run belongs to its task, method and parameters, by its id and its seed;
+- each run belongs to its task, method and parameters, by its id, its seed and its labels;
 - the folder has all runs that the plan asks for.
 
 The rules (Shah, Barto & Fagg 2013, *A Dual Process Account of Coarticulation in Motor Skill
@@ -103,13 +103,16 @@ def stored_task(content: str) -> Any:
     """Return the task of a cell from the cell's stored JSON.
 
     Further attributes are the constants of movement (``model``), the start (``q0``), locked
-    coordinates, arms, and the hash of the cell (``digest``).
+    coordinates, arms, the hash of the cell (``digest``), and names of task, method and setting.
     """
     plain = json.loads(content)
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
     task = cell.task
     task.model = cell.model
-    plain["method"] = plain["method"]["name"]
+    method, given = plain["method"], plain["parameters"]
+    changed = [f"{name}={x}" for name, x in given.items() if x != method["defaults"].get(name)]
+    task.labels = task.name, method["name"], ", ".join(changed)
+    plain["method"] = method["name"]
     text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
     task.digest = hashlib.sha256(text.encode()).hexdigest()
     task.q0 = np.array([*task.start.base, *task.start.left, *task.start.right], dtype=np.float64)
@@ -264,6 +267,8 @@ def _check_run(row: Any) -> int:
     words = np.frombuffer(hashlib.sha256(task.name.encode()).digest()[:16], "<u4").tolist()
     sequence = np.random.SeedSequence(row["suite_seed"], spawn_key=(*words, row["run"]))
     need(row["seed"] == int(sequence.generate_state(1, "u8")[0]) >> 1, "its seed is another one")
+    labels = row["task"], row["method"], row["setting"]
+    need(task.labels == labels, f"it is listed as a run of {labels}, not of {task.labels}")
     parts, stored = json.loads(row["movements"]), [row["status"]]
     need(("solution" in parts) == (row["status"] == "ok"), f"its status is {row['status']}")
     for part, names in STATED.items():
@@ -274,6 +279,7 @@ def _check_run(row: Any) -> int:
             close = name == "other_arm_travel" and moves and abs(row[name] - now) <= 1e-9
             need(close or row[name] == now, f"{part}: {name} is {now}, not {row[name]}")
     rewards = zlib.decompress(row["rewards"]) if row["rewards"] else bytes(4)
+    need(row["trials"] in (None, len(rewards) // 4 - 1), "it has rewards of more or fewer trials")
     result = hashlib.sha256(json.dumps(stored).encode() + rewards).hexdigest()[:16]
     need(row["result"] == result, "a joint or a trial was changed")
     return len(stored) - 1

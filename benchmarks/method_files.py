@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import site
 import sys
-import sysconfig
 from collections.abc import Iterable
 from concurrent.futures import BrokenExecutor
 from dataclasses import replace
@@ -28,6 +26,7 @@ from coartic.errors import CoarticError
 from coartic.internal.text import LONGEST_LINE, error_line, plain
 from coartic.internal.threads import begin_worker
 from coartic.internal.toml_files import read_bytes
+from coartic.internal.user_files import is_users
 from coartic.method import Facts, Information, Method
 from coartic.method.optimisers import Optimiser
 from coartic.model import MODEL_VERSION
@@ -76,7 +75,7 @@ def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
         raise CoarticError(f"{shown}: the process that reads it ended: {how}") from None
     except TimeoutError:
         raise CoarticError(f"{shown}: its process did not answer within {_ANSWER_S:g} s") from None
-    except (BrokenExecutor, OSError) as error:
+    except (BrokenExecutor, OSError, RuntimeError) as error:
         reason = error_line(error.__cause__ or error)
         raise CoarticError(
             f"{shown}: a process to read it cannot start ({reason}). Repeat the command"
@@ -192,24 +191,14 @@ def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
 def _user_files(names: Iterable[str]) -> set[Path]:
     """Return the files of the loaded modules ``names``, if they are the user's.
 
-    A file is the user's if it does not belong to this project, the standard library or an
-    installed package.
+    :func:`.is_users` says which files are the user's.
     """
-    folders = [sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")]
-    folders += [*site.getsitepackages(), site.getusersitepackages()]
-    modules = {
-        Path(path).resolve()
+    files = {
+        name: Path(path).resolve()
         for name in names
-        if name.partition(".")[0] != "coartic"
-        and isinstance(path := getattr(sys.modules.get(name), "__file__", None), str)
+        if isinstance(path := getattr(sys.modules.get(name), "__file__", None), str)
     }
-    return {
-        path
-        for path in modules
-        if path.is_file()
-        and not {"site-packages", "dist-packages"} & {*path.parts}
-        and not any(path.is_relative_to(Path(folder).resolve()) for folder in folders)
-    }
+    return {path for name, path in files.items() if is_users(name, path)}
 
 
 def _packages_of(files: Iterable[Path]) -> dict[str, str]:

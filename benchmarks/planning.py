@@ -133,6 +133,7 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
         - a name is unknown, or belongs to something else already;
         - a number or a parameter is wrong;
         - ``trials``, ``runs`` (except 1) or a family file has no effect;
+        - ``trials`` would make one cell of two that differ only in their trials;
         - a named task or method has no runs;
         - two blocks of the suite ask for different numbers of runs of the same cell;
         - a block without wildcards names a method that does not apply to all of its tasks.
@@ -184,6 +185,10 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
             idle_methods = [registered[name] for name in wanted]
             raise CoarticError(_why_nothing_runs(suite, [], idle_methods, jobs))
     _check_effects(request, chosen)
+    if request.trials:
+        _check_trials(
+            request.trials, plan(suite, request.model_copy(update={"trials": None}), registered)
+        )
     jobs = _distinct_jobs([planned for planned in chosen if planned.numbers])
     if own or suite in suites().values():
         return jobs
@@ -228,6 +233,23 @@ def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
             raise CoarticError(
                 f"{path} has no effect: the tasks contain no instance of {family}. Name some, such "
                 f"as {family}/i000..i009"
+            )
+
+
+def _check_trials(trials: int, jobs: Iterable[Job]) -> None:
+    """Raise CoarticError if two cells differ only in their trials, which are to be ``trials``.
+
+    ``jobs`` are the jobs of the suite with its own numbers of trials.
+    """
+    first_jobs = dict[str, Job]()
+    for job in jobs:
+        cell, others = job.cell, {**job.cell.parameters, "trials": trials}
+        first_job = first_jobs.setdefault(replace(cell, parameters=others).digest, job)
+        if first_job is not job:
+            first, other = (each.cell.parameters["trials"] for each in (first_job, job))
+            raise CoarticError(
+                f"trials is {trials}, but suite {job.suite!r} compares {first} with {other} trials "
+                f"of {cell.method.name} on {cell.task.name}: leave trials out, or change the suite"
             )
 
 

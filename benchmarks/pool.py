@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import multiprocessing
 import os
 import resource
 import signal
@@ -48,6 +49,8 @@ from coartic.runs.record import Outcome
 _LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit
 _LEAST_MEMORY = 2**30  # bytes for a process: four times as much as built-in methods need
 _LAST_LINES = 3  # number of last lines of an ended process's errors in a reason
+_LOOK_S = 1.0  # time between looks whether a pool is broken
+_MOST_BROKEN = 5  # pools of a group that may break before a job gets an answer
 _REPEATED = (-signal.SIGKILL, 255)  # exit codes of a process that was killed or lost its server
 
 
@@ -116,7 +119,8 @@ class Local:
 
         A job whose process is killed, or that exceeds its limit of wall time, is performed once
         more. If this happens again, or if the process of a job ends for another reason, such as its
-        limit of CPU time, the outcomes of the job have status ``crashed`` or ``timeout``.
+        limit of CPU time, the outcomes of the job have status ``crashed`` or ``timeout``. Processes
+        that end while they have no job are replaced.
 
         Parameters
         ----------
@@ -133,7 +137,7 @@ class Local:
         Raises
         ------
         CoarticError
-            Processes cannot start.
+            Processes cannot start, or end again and again before they begin a job.
         """
         groups = dict[Any, _Group]()
         for number, job in enumerate(jobs):
@@ -174,14 +178,25 @@ class Local:
                     )
                 ):
                     number, job = group.waiting.popleft()
-                    running[group.give(number, job)] = group, number, job
-            done = wait(running, return_when=FIRST_COMPLETED).done
-            for future in sorted(done, key=lambda future: running[future][1]):
+                    try:
+                        running[group.give(number, job)] = group, number, job
+                    except BrokenExecutor:  # a process cannot start
+                        raise
+                    except RuntimeError:  # the pool is broken
+                        group.waiting.appendleft((number, job))
+                        break
+            # A broken pool can leave futures without an answer.
+            done = wait(running, timeout=_LOOK_S, return_when=FIRST_COMPLETED).done
+            for group in groups:
+                if group.is_broken:
+                    self._replace_pool(group, running)
+            for future in sorted(done & {*running}, key=lambda future: running[future][1]):
                 group, number, job = running.pop(future)
                 group.running -= 1
                 error = future.exception()
-                if isinstance(error, CoarticError | BrokenExecutor):
+                if isinstance(error, CoarticError):
                     raise error
+                group.broken_pools = 0
                 if error is None:
                     outcomes = outcomes_from(job, future.result())
                 else:
@@ -197,6 +212,26 @@ class Local:
                 if not (group.waiting or group.running):
                     group.close()
 
+    @staticmethod
+    def _replace_pool(group: _Group, running: dict[Future[Any], tuple[_Group, int, Job]]) -> None:
+        """Close the broken pool of a group, whose next job starts a new one.
+
+        Jobs without an answer are given to the new pool. Raises BrokenExecutor if pools of the
+        group have broken too often before a job got an answer.
+        """
+        error: BaseException | None = None
+        for future, (of, number, job) in [*running.items()]:
+            failure = future.exception() if future.done() else BrokenExecutor()
+            if of is group and isinstance(failure, BrokenExecutor):
+                error = error or failure.__cause__
+                del running[future]
+                group.waiting.appendleft((number, job))
+                group.running -= 1
+        group.broken_pools += 1
+        if group.broken_pools >= _MOST_BROKEN:
+            raise BrokenExecutor("processes end before they begin a job") from error
+        group.close()
+
     def wall_limit_s(self, job: Job) -> float:
         """Return the limit of wall time for a job, in s."""
         return 3 * (job.time_limit_s or _LONGEST_S) + self.timeout_s
@@ -208,7 +243,9 @@ class Local:
         """
         if isinstance(error, TimeoutError):
             wall_s = self.wall_limit_s(job)
-            reason = f"wall time limit of {wall_s:g} s exceeded twice: the job waited"
+            reason = (
+                f"wall time limit of {wall_s:g} s exceeded twice: the job, or the machine, waited"
+            )
             return fail(job, "timeout", reason, wall_s=wall_s)
         if not isinstance(error, ProcessExpired):
             return fail(job, "crashed", error_line(error))
@@ -234,7 +271,14 @@ class _Group:
     """Number of jobs that were given to processes and have no answer yet."""
     folder: Path = Path()
     """Folder of temporary files. Each job has a file ``NUMBER-PID`` with the errors it prints."""
+    broken_pools: int = 0
+    """Number of pools that broke since a job got an answer."""
     _pool: Any = None
+
+    @property
+    def is_broken(self) -> bool:
+        """True if the pool of the group has broken: it accepts no jobs, and answers none."""
+        return self._pool is not None and not self._pool.active
 
     @property
     def busy(self) -> int:
@@ -244,7 +288,7 @@ class _Group:
     def give(self, number: int, job: Job) -> Future[Any]:
         """Give a job to the processes, and return the future of its answer.
 
-        The first job starts the processes.
+        The first job starts the processes. Raises RuntimeError if the pool is broken.
         """
         if self._pool is None:
             begin = self.folder, self.local.workers, self.local.verbose
@@ -259,10 +303,10 @@ class _Group:
         return self._schedule(number, job)
 
     def _schedule(self, number: int, job: Job) -> Future[Any]:
-        self.running += 1
         arguments = self.folder, number, job, self.local.verbose
         limit_s = self.local.wall_limit_s(job)
         future: Future[Any] = self._pool.schedule(_answer_to, args=arguments, timeout=limit_s)
+        self.running += 1
         return future
 
     def end_process(self, number: int) -> str:
@@ -309,6 +353,8 @@ def _begin(folder: Path, workers: int, verbose: bool) -> None:
     memory is 80 % of the machine's memory divided by the number of ``workers``, but at least 1 GiB.
     """
     os.environ.pop("PYTHONSAFEPATH", None)  # see WorkerProcess
+    # Other processes cannot import the module of a method file. Forked ones have it.
+    multiprocessing.set_start_method("fork", force=True)
     begin_worker(folder, streams=1 if verbose else 3)
     if verbose:
         _show_errors()

@@ -8,10 +8,12 @@ import signal
 import sys
 import tempfile
 import threading
+from collections.abc import Callable
 from multiprocessing import resource_tracker
 from types import ModuleType
 from typing import Any
 
+from coartic.errors import CoarticError
 from coartic.internal.interruption import blocked_signals
 from coartic.internal.threads import environment, worker_variables
 
@@ -67,12 +69,22 @@ class _WorkerContext(type(_BASE)):  # type: ignore[misc]
     Process = WorkerProcess
 
     def Lock(self) -> Any:  # noqa: N802
-        _start_tracker()
-        return super().Lock()
+        return _made(super().Lock)
 
     def RLock(self) -> Any:  # noqa: N802
-        _start_tracker()
-        return super().RLock()
+        return _made(super().RLock)
+
+
+def _made(lock: Callable[[], Any]) -> Any:
+    """Make a lock. Raises CoarticError if the system has none, as on a full ``/dev/shm``."""
+    _start_tracker()
+    try:
+        return lock()
+    except OSError as error:
+        raise CoarticError(
+            f"processes cannot have a lock ({error.strerror}): /dev/shm must have free space, and "
+            "you must be allowed to write there"
+        ) from None
 
 
 def _start_tracker() -> None:

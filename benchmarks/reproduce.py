@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
-from coartic.benchmarks.scoring import score
+from coartic.benchmarks.scoring import score, with_noise
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import plain
@@ -169,6 +170,38 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
             )
         step = max(1, len(ids) // count)
         return [store.run(run_id) for run_id in ids[::step][:count]]
+
+
+def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int, list[str]]:
+    """Execute solutions of a folder with motor noise again, and compare the mean ticks.
+
+    The noise of a run is that of its score (:func:`.with_noise`).
+
+    Parameters
+    ----------
+    folder : Path
+        Results folder.
+    every : bool
+        True for all solutions; otherwise for one of each cell, which is drawn by lot.
+
+    Returns
+    -------
+    int
+        Number of solutions.
+    list of str
+        A sentence for each run that differs.
+    """
+    executed, wrong = 0, list[str]()
+    with open_store(folder) as store:
+        for run_ids in store.solved().values():
+            for run_id in run_ids if every else [random.choice(run_ids)]:
+                stored = store.run(run_id)
+                (again,) = with_noise([stored])
+                executed += 1
+                was, now = stored.solution.noisy_ticks, again.solution.noisy_ticks
+                if was != now:
+                    wrong.append(f"Run {run_id}: noisy_ticks is {now}, not {was}.")
+    return executed, wrong
 
 
 def compare_runs(a: Run, b: Run) -> list[str]:

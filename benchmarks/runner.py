@@ -184,8 +184,10 @@ def perform(
     - Runs that fail are stored and counted. They do not raise an error. The next call performs
       crashed runs again, and runs that timed out under a lower limit.
     - Finished runs are stored even if the call is interrupted.
-    - The quickest ok run that this call makes with each method from a file is made again in another
-      process. If the result differs, this call warns, and reports mark the method.
+    - An ok run that this call makes with each method from a file is made again in another process.
+      If the result differs, this call warns, and reports mark the method. It is the quickest of
+      those that were not the first of their process, if there are such runs: a method can keep
+      something from run to run.
 
     Parameters
     ----------
@@ -269,11 +271,12 @@ def perform(
 def _note_quickest(run: Run, quickest: dict[str, Run]) -> None:
     """Set ``quickest[method]`` to ``run`` if the run is quicker than the one stored there.
 
-    Runs that are not ok, and runs of built-in methods, are ignored.
+    Runs that were the first of their method in a process count as slower than all others. Runs that
+    are not ok, and runs of built-in methods, are ignored.
     """
 
-    def seconds(run: Run) -> float:
-        return run.outcome.times.wall_s or math.inf
+    def seconds(run: Run) -> tuple[bool, float]:
+        return not run.outcome.times.warm, run.outcome.times.wall_s or math.inf
 
     if run.outcome.status == "ok" and not run.cell.method.is_ours:
         name = run.cell.method.name

@@ -19,7 +19,7 @@ from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import suites
 from coartic.cli import COMMANDS, completion
 from coartic.cli.arguments import methods_meant
-from coartic.cli.terminal import say
+from coartic.cli.terminal import complain, say, say_pairs
 from coartic.pictures import film
 from coartic.runs.store import lock, open_store
 from coartic.tasks.task import TASK_FOLDER
@@ -57,6 +57,20 @@ def test_run_resumes(coartic, tmp_path):
     assert coartic(*SMALL, "--runs", 3, "--out", out)[1].startswith("3 runs (2 reused) in ")
 
 
+def test_commands_are_not_wrapped(coartic, monkeypatch, capsys):
+    """However narrow the terminal is: they are to be copied."""
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    command = "coartic run comparison --tasks 'my own/shelf.toml' --methods hill-climbing,cma-es"
+    say_pairs([("Check", command), ("", f"{'words ' * 12}`{command}` {'and more ' * 9}")])
+    complain("Error", f"{'words ' * 12}`{command}` {'and more ' * 9}")
+    for text in capsys.readouterr():
+        lines = text.splitlines()
+        assert text.count(command) == sum(command in line for line in lines) > 0
+        assert all(len(line) <= 40 for line in lines if "coartic" not in line)
+    assert "CMA-ES --runs 5 --out results\n" in coartic("run", "--help")[1]
+
+
 def test_a_terminal_without_a_sign_shows_one_like_it():
     terminal = io.TextIOWrapper(io.BytesIO(), "latin-1", "replaced")
     say("−3 ± 1 –", stream=terminal)
@@ -79,6 +93,8 @@ def test_verify_performs_runs_again(coartic, tmp_path):
     assert text.splitlines()[-1] == "1 run performed again: none with another result."
     assert re.search(rf"Run +{first}: Ascending, .*, run 0\nSeed +[0-9]+\nParam.*\nResult", text)
     assert "checked" not in text
+    text = coartic("verify", out, "--run", first, "--run", second)[1]
+    assert text.splitlines()[-1] == "2 runs performed again: none with another result."
     assert f"`coartic list {out}`" in coartic("verify", out, "--run", "0123456789")[2]
     part = tmp_path / "part"  # of an array, and of all methods those for one arm
     own = ("--methods", "dual-process/*", "--runs", "2..3")

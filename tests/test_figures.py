@@ -1,6 +1,8 @@
 """Figures: what they show is what the runs say."""
 
+import os
 from dataclasses import replace
+from threading import Thread
 
 import numpy as np
 import pandas as pd
@@ -12,6 +14,8 @@ from coartic import CoarticError, load_task
 from coartic.analysis import FIGURES
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
 from coartic.analysis.methods import KNOWN_METHODS, title_of
+from coartic.analysis.optima import BestKnown
+from coartic.internal.threads import environment
 from coartic.pictures import drawing
 from tests.support.figures import misplaced, texts_of
 from tests.support.made_up import row, study_of
@@ -66,6 +70,58 @@ def test_no_text_leaves_a_narrow_figure_or_lies_on_another(name, few):
     assert all(map(len, (plot.alt, plot.caption, plot.data)))
 
 
+def ends_drawn(figure):
+    """The coordinates of all lines, bands and marks of a figure."""
+    parts = [line.get_xydata() for axes in figure.axes for line in axes.lines]
+    for axes in figure.axes:
+        parts += [path.vertices for each in axes.collections for path in each.get_paths()]
+    return np.concatenate([np.ravel(np.asarray(part, float)) for part in parts])
+
+
+INTERVALS = {
+    "ranking": (["gap"], 100.0),
+    "shared-goal": (["distance", "lean"], 1.0),
+    "runtimes": (["share"], 100.0),
+    "learning-curves": (["best"], 1.0),
+    "gaps-by-family": (["mean"], 1.0),
+}
+"""Columns with intervals, by figure, and the factor by which they are drawn."""
+
+
+@pytest.mark.parametrize("name", INTERVALS)
+def test_intervals_are_drawn(name, shipped):
+    study = shipped
+    if name == "gaps-by-family":
+        rewards = np.random.default_rng(0).integers(-450, -310, 20).tolist()
+        tasks = [f"two-armed/v1/i{number:03}" for number in range(20)]
+        runs = [row("mine", of, task=task) for task, of in zip(tasks, rewards, strict=True)]
+        study = study_of(runs, optima=dict.fromkeys(tasks, BestKnown(-300, -300)))
+    plot, (columns, factor) = FIGURES[name](study), INTERVALS[name]
+    ends = plot.data[[f"{column}{end}" for column in columns for end in ("_low", "_high")]]
+    due = factor * ends.dropna().to_numpy(float).ravel()
+    assert len(due) > 0
+    drawn = np.sort(ends_drawn(plot.figure))
+    nearest = drawn[np.searchsorted(drawn, due - 1e-9).clip(max=len(drawn) - 1)]
+    np.testing.assert_allclose(nearest, due, rtol=0, atol=1e-8)
+
+
+def test_intervals_of_ticks_saved_are_drawn_to_scale(shipped):
+    plot = FIGURES["saved"](shipped)
+    for axes, (_, part) in zip(
+        plot.figure.axes, plot.data.groupby("task", sort=False), strict=True
+    ):
+        names = [name for name in part if name.endswith("_low")]
+        low, high = (
+            part[[n[:-4] + end for n in names]].to_numpy(float) for end in ("_low", "_high")
+        )
+        segments = [path.vertices[:, 1] for each in axes.collections for path in each.get_paths()]
+        lengths, due = (
+            np.sort(ends[~np.isnan(ends)]) for ends in (np.ptp(segments, 1), high - low)
+        )
+        assert lengths[-1] > 0.0
+        np.testing.assert_allclose(lengths / lengths[-1], due / due[-1], atol=1e-9)
+
+
 def test_a_figure_has_chosen_style(tmp_path):
     study = study_of([row("mine", -300, task="ascending")])
     plot = FIGURES["ranking"](study, style={"axes.labelsize": 20.0})
@@ -89,6 +145,23 @@ def test_names_and_looks_tell_methods_apart():
     own = {color for color, _ in both[["mine", "theirs"]]}
     assert len(own) == 1
     assert not own & {color for color, _ in alone}
+
+
+def test_figures_are_written_one_after_the_other():
+    """Also in threads: they change the environment of the process."""
+    seen = []
+
+    def write():
+        with environment({"COARTIC_TEST": "2"}):
+            seen.append(os.environ["COARTIC_TEST"])
+
+    other = Thread(target=write)
+    with environment({"COARTIC_TEST": "1"}):
+        other.start()
+        other.join(0.2)
+        assert (seen, os.environ["COARTIC_TEST"]) == ([], "1")
+    other.join()
+    assert (seen, "COARTIC_TEST" in os.environ) == (["2"], False)
 
 
 def test_a_picture_leaves_its_figure_as_it_was_and_has_no_date(monkeypatch):

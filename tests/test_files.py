@@ -33,7 +33,7 @@ def test_a_folder_holds_what_was_published_last(tmp_path):
 def test_what_is_not_ours_is_in_the_way_before_anything_is_written(tmp_path):
     (tmp_path / "b.txt").write_text("mine")
     for what in (publish, make_folder):
-        with pytest.raises(CoarticError, match=r"b.txt, which was not written by coartic.*another"):
+        with pytest.raises(CoarticError, match=r"b.txt, which coartic has not listed in .*another"):
             what(tmp_path, {"a.txt": b"1", "b.txt": b"2"})
     assert content(tmp_path) == {"b.txt": b"mine"}
     with pytest.raises(CoarticError, match="b.txt cannot be written: File exists"):
@@ -48,6 +48,18 @@ def test_a_listing_that_leads_elsewhere_is_refused(tmp_path):
         with pytest.raises(CoarticError, match="leads out of"):
             publish(tmp_path / "report", {"a.txt": b"1"})
     assert (tmp_path / ".coartic-9-mine").read_text() == "mine"
+
+
+@pytest.mark.parametrize("listing", [None, b"", b"a.txt\n\0\0\0\0", b"\0" * 4096, b"\x1b\xff\xfe"])
+def test_a_list_that_is_missing_or_damaged_is_said(listing, tmp_path):
+    publish(tmp_path, {"a.txt": b"1"})
+    (tmp_path / LISTING).unlink()
+    if listing is not None:
+        (tmp_path / LISTING).write_bytes(listing)
+    with pytest.raises(CoarticError, match="a.txt, which .* copy this hidden file, too"):
+        publish(tmp_path, {"a.txt": b"2"})
+    publish(tmp_path, {"b.txt": b"2"})
+    assert content(tmp_path) == {"a.txt": b"1", "b.txt": b"2"}
 
 
 def test_what_fails_leaves_the_old_file(tmp_path, monkeypatch):

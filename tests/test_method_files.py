@@ -1,13 +1,18 @@
 """Methods and tasks of the user's files, and the examples of the pages."""
 
+import math
+import os
+import py_compile
 import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from coartic import CoarticError
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
+from coartic.benchmarks.registry import registry
 from tests.support.suites import ROOT
 
 METHOD = ROOT / "tests" / "methods" / "nearest_hand.py"
@@ -35,6 +40,43 @@ def test_a_file_brings_a_method(coartic, tmp_path):
     assert "unknown method 'nearest-hand': pass --method-file" in error
 
 
+@pytest.mark.process
+@pytest.mark.parametrize("helper", ["stepsize", "analysis", "tests"])
+def test_a_helper_is_compiled_from_its_source_and_is_that_of_its_folder(helper, tmp_path):
+    """Whatever bytecode there is, and also if a folder of this checkout has its name."""
+    path = tmp_path / f"{helper}.py"
+    for step in (0.02, 0.30):
+        path.write_text(f"STEP = {step:.2f}\n", encoding="utf-8")
+        os.utime(path, (1.7e9, 1.7e9))  # as from an archive
+        if step == 0.02:
+            py_compile.compile(path)
+    text = TEXT.replace('title = "', f'title = f"{{{helper}.STEP}} of ')
+    (tmp_path / "mine.py").write_text(f"import {helper}\n{text}", encoding="utf-8")
+    assert registry([tmp_path / "mine.py"])["nearest-hand"].title.startswith("0.3 of ")
+    assert [*tmp_path.rglob("mine*.pyc")] == []
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("value", ["math.inf", "[1.0, math.nan]"])
+def test_parameters_that_json_does_not_have_are_refused(value, tmp_path):
+    text = f"import math\n{TEXT}\n{PATIENT}"
+    path = tmp_path / "mine.py"
+    path.write_text(text.replace("VALUE", value), encoding="utf-8")
+    words = r"method 'patient': patience is .*; a parameter must be finite: use None for no limit"
+    with pytest.raises(CoarticError, match=words):
+        registry([path])
+    path.write_text(text.replace("VALUE", "2.0"), encoding="utf-8")
+    with pytest.raises(CoarticError, match=words):
+        registry([path])["patient"].complete({"patience": eval(value, {"math": math})})
+
+
+PATIENT = """
+from typing import Any
+class Patience(Parameters):
+    patience: Any = VALUE
+class Patient(NearestHand):
+    name, Parameters = "patient", Patience
+"""
 HARMLESS = """os.chdir('/'); print('x' * 10**6)
 import coartic.benchmarks.scoring as s; s.score = s.execute_many = None
 import numpy; numpy.sqrt = None

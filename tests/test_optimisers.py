@@ -38,6 +38,8 @@ def test_the_cost_of_a_point_is_what_its_trial_takes():
     task = load_task("two-armed-1")
     cost = objective(task, "LRLR", half_width=0.25)
     assert (cost.dim, cost.bounds.shape) == (4 * 9, (36, 2))  # the base is locked in y
+    with pytest.raises(ValueError, match="read-only"):
+        cost.configurations[0] += 1.0  # would move x0
     np.testing.assert_array_equal(cost.bounds.T, [cost.lower, cost.upper])
     np.testing.assert_allclose(cost.bounds.T - cost.x0, [[-0.25] * 36, [0.25] * 36])
     assert cost.best_cost == -corrective_trial(task, "LRLR").reward

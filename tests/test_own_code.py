@@ -2,6 +2,7 @@
 
 import pytest
 
+from coartic.analysis import TABLES, ranking
 from coartic.analysis.study import load
 from coartic.benchmarks.registry import registry
 
@@ -139,3 +140,7 @@ def test_runs_with_another_version_of_an_imported_package_are_marked(coartic, tm
     ]
     assert study.methods.title["mine"] == "Mine ‡"
     assert not any(each.startswith("json") for each in study.imports["mine"])
+    (words,) = study.marks["mine"]
+    assert ranking(study.runs).note.to_dict() == {"mine": words}
+    assert TABLES["ranking"](study).note.to_dict() == {"mine": words}
+    assert TABLES["saved"](study).note.unique().tolist() == [words]  # in CSV only

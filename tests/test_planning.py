@@ -26,6 +26,36 @@ def here(tmp_path, monkeypatch):
     Path("strips.v1.toml").write_text(FAMILY, encoding="utf-8")
 
 
+@pytest.mark.usefixtures("here")
+def test_tasks_and_methods_given_twice_add_up(coartic, monkeypatch):
+    plans = []
+    monkeypatch.setattr(runner, "perform", lambda plan, *_, **__: plans.append(plan) or exit())
+    repeated = ("--tasks", "ascending", "--tasks", "two-armed-1,descending")
+    repeated += ("--methods", "hill-climbing", "--methods", "random-search")
+    coartic("run", "comparison", *repeated)
+    cells = {(job.cell.task.name, job.cell.method.name) for job in plans[0]}
+    assert len(cells) == 3 * 2
+
+
+TRIALS = {
+    "a grid": 'methods = ["random-search"]\ngrid = {trials = [100, 800]}',
+    "two blocks": 'methods = ["random-search"]\nparameters = {trials = 100}\n[[blocks]]\n'
+    'tasks = ["ascending"]\nmethods = ["random-search"]\nparameters = {trials = 800}',
+}
+
+
+@pytest.mark.parametrize("compared", TRIALS)
+def test_trials_do_not_make_one_cell_of_two(compared, tmp_path):
+    path = tmp_path / "g.toml"
+    text = f'tasks = ["ascending"]\n{TRIALS[compared]}'
+    path.write_text(f'title = "G"\ndescription = "G."\nruns = 2\n[[blocks]]\n{text}', "utf-8")
+    assert len(plan_suite(path)) == 2
+    words = "trials is 60, but suite 'g' compares 100 with 800 trials of random-search on ascending"
+    with pytest.raises(CoarticError, match=words):
+        plan_suite(path, trials=60)
+    assert len(plan_suite(path, trials=60, methods=["hill-climbing"])) == 1
+
+
 OPTIONS = {
     "suite": ("quick",),
     "folder": ("--out", "other"),
@@ -97,11 +127,11 @@ def test_a_method_file_that_is_named_runs():
     assert methods("own.toml") == ["first"]
 
 
-def test_the_command_outranks_a_grid_and_a_block(tmp_path):
-    ec1 = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'
-    suite_of(tmp_path, ec1 + "grid = { trials = [5, 50] }", ec1 + "parameters = { trials = 500 }")
-    trials = [job.cell.parameters["trials"] for job in plan_suite(tmp_path / "own.toml")]
-    assert trials == [5, 50, 500]
+@pytest.mark.parametrize("trials", ["grid = { trials = [5] }", "parameters = { trials = 5 }"])
+def test_the_command_outranks_a_grid_and_a_block(trials, tmp_path):
+    suite_of(tmp_path, f'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n{trials}')
+    (own,) = plan_suite(tmp_path / "own.toml")
+    assert own.cell.parameters["trials"] == 5
     (job,) = plan_suite(tmp_path / "own.toml", trials=7)
     assert (job.cell.parameters["trials"], job.cell.trials, job.trials) == (7, 7, 7)
 

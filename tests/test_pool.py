@@ -14,19 +14,30 @@ from coartic.benchmarks import pool
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.runner import perform
-from tests.support.processes import comes, folders_of_session
+from tests.support.processes import (
+    begin_after_deaths,
+    begin_never,
+    comes,
+    folders_of_session,
+)
 from tests.support.suites import KNOWN, cell_on, made_once, planned, run_and_write
 
 pytestmark = [pytest.mark.process, pytest.mark.usefixtures("not_repeated")]
 
 METHODS = """
-import itertools, os, signal, subprocess, sys, time
+import itertools, multiprocessing, os, signal, subprocess, sys, time
 import numpy as np
 from coartic.method import Information, Method, Parameters, Result
 from coartic.motion.solution import Movement
 
 def corrected(session, hand="right"):
     return tuple(Movement(n, hand, "corrective") for n in range(1, session.goals_count + 1))
+
+def hand_of(n):
+    return "right" if n else "left"
+
+def trial_of(n):
+    return KEPT.trial(corrected(KEPT)).reward
 
 class What(Parameters):
     what: str = "honest"
@@ -63,6 +74,11 @@ HANDLED = {
     "details": ("return Result(corrected(session), {'call': print})",
                 "solver-failed", "cannot be stored: TypeError"),
     "honest": ("return Result(corrected(session))", "ok", ""),
+    "maps": ("with multiprocessing.Pool(1) as pool: (hand,) = pool.map(hand_of, [1])\n"
+             "        return Result(corrected(session, hand))", "ok", ""),
+    "tries_elsewhere": ("global KEPT; KEPT = session\n"
+                        "        with multiprocessing.Pool(1) as pool: pool.map(trial_of, [1])",
+                        "crashed", "a session cannot be used in another process"),
     "prints": ("print('x' * 10**6); os.write(2, b'\\x1b[31m' * 10**5)\n"
                "        return Result(corrected(session))", "ok", ""),
 }  # fmt: skip
@@ -147,7 +163,9 @@ def test_a_run_that_waits_twice_is_stored_as_timed_out(tmp_path):
     said = [str(perform(plan, tmp_path / "out", executor=executor)) for plan in plans[:2]]
     runs = load(tmp_path / "out").runs
     assert runs.status.tolist() == ["ok", "timeout"]
-    assert runs.reason[1] == "wall time limit of 0.2 s exceeded twice: the job waited"
+    assert (
+        runs.reason[1] == "wall time limit of 0.2 s exceeded twice: the job, or the machine, waited"
+    )
     assert said[0].startswith("2 runs in ")
     assert "1 failed" in said[0]
     assert said[1].startswith("2 runs (2 reused) in ")
@@ -188,6 +206,16 @@ def test_what_a_method_starts_ends_with_it():
 
 PRINTS = """os.write(2, b'line' * 10**6 + b'\\none\\ntwo\\nthe end')
         os._exit(3)"""
+
+
+def test_a_worker_that_is_killed_before_its_job_is_replaced(tmp_path, monkeypatch):
+    """Unless none ever begins."""
+    monkeypatch.setattr(pool, "_begin", begin_after_deaths)
+    cells = [cell_on(TASK, KNOWN["corrective-alone/given"])]
+    assert run_and_write(tmp_path / "out", cells, executor=Local(1)).runs.reward[0] == HONEST
+    monkeypatch.setattr(pool, "_begin", begin_never)
+    with pytest.raises(CoarticError, match="worker processes cannot start or work"):
+        run_and_write(tmp_path / "never", cells, executor=Local(1))
 
 
 def test_the_last_words_of_a_run_are_kept(tmp_path):

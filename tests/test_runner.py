@@ -294,3 +294,29 @@ def test_a_run_of_each_method_of_a_file_is_made_again(methods, name, repeats, tm
     changed = replace(methods[name], code="another")
     perform(planned([cell_on(tasks[0], changed)]), tmp_path, executor=Silent())
     assert load(tmp_path).marks == {}
+
+
+KEEPS = """
+import time
+from coartic.method import Information, Method, Result
+from coartic.motion.solution import Movement
+seen = []
+class Keeps(Method):
+    name, title, citation = "keeps", "Keeps its runs", "none"
+    information = frozenset({Information.CORRECTIVE_PROCESS})
+    def solve(self, session):
+        time.sleep(0.2 * bool(seen))  # the first run is the quickest
+        seen.append(1)
+        moves = [Movement(n, "right", "corrective") for n in (1, 2, 3)]
+        return Result(tuple(moves), {"n": len(seen)})
+"""
+
+
+@pytest.mark.process
+def test_a_method_that_keeps_something_from_run_to_run_is_marked(tmp_path):
+    """The run that is made again in a new process was not the first of its own."""
+    (tmp_path / "keeps.py").write_text(KEEPS, encoding="utf-8")
+    (method,) = (info for info in registry([tmp_path / "keeps.py"]).values() if not info.is_ours)
+    plan = planned([cell_on(load_task("ascending"), method)], runs=3)
+    with pytest.warns(UserWarning, match="keeps: another result when a run was made again"):
+        perform(plan, tmp_path / "out", executor=Local(1))

@@ -37,6 +37,27 @@ def planned(*targets, hand="right"):
     ]
 
 
+def test_a_planner_may_move_one_posture_on_in_place():
+    task, q, way = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]]), posture(0.0), WAY.copy()
+    straight, paths = [], []
+    for number in (1, 2):
+        q += posture(1.0)
+        way += posture(1.0)
+        straight.append(Movement(number, "right", "planned", q))
+        paths.append(Movement(number, "right", "path", waypoints=way))
+    of_hands = movements_of("RR", targets := np.array([posture(1.0), posture(2.0)]))
+    targets[:] = 0.0
+    due = execute(task, planned(posture(1.0), posture(2.0)))
+    assert [execute(task, moves).reward for moves in (straight, paths, of_hands)] == [
+        due.reward
+    ] * 3
+    for movement in (*straight, *of_hands):
+        assert movement.target[0] == movement.goal
+    assert [movement.waypoints[0, 0] for movement in paths] == [1.0, 2.0]
+    with pytest.raises(ValueError, match="read-only"):
+        straight[0].target += 1.0  # it would be the stored solution
+
+
 WAY = np.zeros((1, 10))
 LRLR = [*enumerate(("left", "right") * 2, 1)]
 

@@ -73,6 +73,30 @@ def undisturbed(tmp_path_factory):
     return run_and_write(tmp_path_factory.mktemp("undisturbed"), ONE, **FEW)
 
 
+def test_all_rows_of_a_large_folder_are_read(undisturbed, tmp_path):
+    """More than are read at once, and the last of them right."""
+    folder, count = shutil.copytree(undisturbed.folder, tmp_path / "large"), 12_345
+    with closing(sqlite3.connect(folder / RUNS_FILE)) as database:
+        columns = [row[1] for row in database.execute("PRAGMA table_info(results)")]
+        values = {"run_id": "'run-' || n", "run": "n", "reward": "-n", "seed": "n"}
+        selected = ", ".join(values.get(name, f'results."{name}"') for name in columns)
+        names = ", ".join(f'"{name}"' for name in columns)
+        database.execute(
+            f"""WITH RECURSIVE more(n) AS
+            (SELECT 100 UNION ALL SELECT n + 1 FROM more LIMIT {count})
+            INSERT INTO results ({names}) SELECT {selected} FROM more, results
+            WHERE results.rowid = 1"""
+        )
+        database.execute("DELETE FROM results WHERE run < 100")
+        database.execute("UPDATE cells SET runs = 100000")
+        database.commit()
+    with open_store(folder) as store:
+        runs, solutions = store.runs(), store.solutions()
+    assert runs.run.tolist() == [*range(100, 100 + count)]
+    assert (runs.reward == -runs.run).all()
+    assert [*dict.fromkeys(solutions.run_id)] == [f"run-{n}" for n in range(100, 100 + count)]
+
+
 @pytest.fixture
 def copied(undisturbed, tmp_path):
     """The file of a copy of these runs, to be changed."""

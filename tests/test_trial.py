@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 import coartic
-from coartic import MotionModel, execute, load_task, movements_of, trajectory
+from coartic import MotionModel, Movement, execute, load_task, movements_of, trajectory
 from coartic.method import Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
+from coartic.motion import trial
 from coartic.motion.batch import SLOTS, robot_parameters
 from coartic.motion.solution import execute_many
 from coartic.motion.trial import ALL_STOP, Requests, compiled_task, reach, reach_goals
+from coartic.robot import HANDS
+from coartic.tasks.task import hands_of
 from tests.support import reference
 from tests.support.strategies import make_trials, random_solution, sample, uneven_task
 
@@ -136,6 +139,26 @@ def rich_cases(name):
 @pytest.mark.parametrize("door", [by_execute_many, by_trajectory])
 def test_a_solution_of_any_kind_is_the_references(door, name):
     assert assert_due(door, TASKS[name], OTHERS[name], rich_cases(name))
+
+
+def test_counts_of_trials_with_several_targets_for_a_goal():
+    """They are those of the reference, whatever the number of targets."""
+    task, model = TASKS["two-armed-2"], OTHERS["two-armed-2"]
+    hands, targets = sample(task, 12, 0.3, seed=5)
+    twice = np.stack([targets, targets[::-1]], axis=2)
+    codes = [[HANDS.index(hand) for hand in hands_of(letters)] for letters in hands]
+    accounts = trial.make_trials(compiled_task(task, model), np.array(codes), twice)
+    for letters, rows, counts, reward in zip(hands, twice, *accounts[1:], strict=True):
+        solution = [
+            Movement(goal, hand, "learned", target)
+            for goal, (hand, both) in enumerate(zip(hands_of(letters), rows, strict=True), 1)
+            for target in both
+        ]
+        due = reference.execute(task, solution, model)
+        expected = due.ticks, due.iterations, due.corrections, due.reward is None
+        places = trial.TICKS, trial.ITERATIONS, trial.CORRECTIONS, trial.FAILURES
+        assert tuple(counts[[*places]]) == expected
+        assert reward == (trial.NO_REWARD if due.reward is None else due.reward)
 
 
 @pytest.mark.parametrize("name", OTHERS)

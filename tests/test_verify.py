@@ -121,6 +121,13 @@ EDITS = {  # what is said, and what was edited
     ),
     "that its id says": result(FAILED, "run = 60"),
     "its seed is another": result(TINY, "seed = seed + 1"),
+    "listed as a run of ('tiny', 'mine', '')": (
+        "UPDATE cells SET method = 'mine' WHERE task = 'tiny'",
+    ),
+    "not of ('stuck', 'dual-process/EC1', 'noise_sd=0.1')": (
+        "UPDATE cells SET setting = '' WHERE task = 'stuck'",
+    ),
+    "rewards of more or fewer trials": result(LEARNER, "trials = trials - 1"),
     # Of the plan: what it asks for is there.
     "asks for 6 runs, of which the folder has 5": ("DELETE FROM results WHERE rowid = 2",),
 }
@@ -131,6 +138,23 @@ def test_an_edit_is_found(true_folder, tmp_path, words):
     report = checker.check_runs(edited(true_folder, tmp_path, *EDITS[words]))
     said = [*report.wrong, *report.unfinished]
     assert any(words.strip() in sentence for sentence in said), said
+
+
+@pytest.mark.parametrize("value", ["noisy_ticks - 1", "NULL"])
+def test_ticks_with_motor_noise_are_made_again(true_folder, tmp_path, coartic, value):
+    """Of one run of each cell, and of all on request; the cell with one run is found by both."""
+    code, out, _ = coartic("verify", true_folder)
+    assert (code, out.splitlines()[1:]) == (
+        0,
+        ["3 solutions executed with motor noise.", "Nothing differs."],
+    )
+    of_path = edited(true_folder, tmp_path, *result(PATH, f"noisy_ticks = {value}"))
+    code, out, _ = coartic("verify", of_path)
+    assert (code, out.count("noisy_ticks is ")) == (1, 1)
+    edit(of_path, *result(LEARNER, f"noisy_ticks = {value}"))
+    code, out, _ = coartic("verify", of_path, "--noise")
+    assert (code, out.count("noisy_ticks is ")) == (1, 2)
+    assert "4 solutions executed with motor noise." in out
 
 
 def test_the_program_says_what_it_found(true_folder, tmp_path, capsys, monkeypatch):
@@ -167,7 +191,7 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step)
     q, middle, target = np.random.default_rng(seed).uniform(-scale, scale, (3, robot.dof))
     target = q if aim[0] == 0.0 and not on_path else target
     content = {"task": task.model_dump(mode="json"), "model": model._asdict()}
-    content["method"] = {"name": ""}
+    content |= {"method": {"name": "", "defaults": {}}, "parameters": {}}
     judge = checker.stored_task(json.dumps(content))
     points = checker.path(q, [middle, target], model) if on_path else checker.line(q, target, model)
     through = round(aim[0] * (len(points.T) - 1))

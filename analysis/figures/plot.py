@@ -184,7 +184,7 @@ def _saved(drawing: Figure, settings: Any, **how: Any) -> bytes:
     stream, layout, dpi = io.BytesIO(), drawing.get_layout_engine(), drawing.dpi
     canvas = drawing.canvas
     try:
-        with rc_context(settings), environment(_NO_DATE):
+        with environment(_NO_DATE), rc_context(settings):  # also its lock
             if layout is not None:
                 FigureCanvasSVG(drawing)  # measures its fonts
                 layout.execute(drawing)

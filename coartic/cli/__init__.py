@@ -50,7 +50,7 @@ def _options(
 COMMANDS = (
     (read.play, "two-armed-1 --out play.html"),
     (run.list_, "comparison"),
-    (run.run, "comparison --methods EC1,CMA-ES --tasks ascending --runs 5 --out results/mine"),
+    (run.run, "comparison --methods EC1,CMA-ES --runs 5 --out results"),
     (read.report, "results/quick --for-paper"),
     (read.verify, "results/quick --run 1a2b3c"),
     (run.new, "my-search"),
@@ -61,7 +61,8 @@ COMMANDS = (
 """The commands in the order of the help, each with the arguments of its example."""
 for command, example in COMMANDS:
     name = command.__name__.removesuffix("_")
-    app.command(name=name, epilog=f"Example: coartic {name} {example}")(command)
+    # Without \b the help would wrap the command.
+    app.command(name=name, epilog=f"\b\nExample: coartic {name} {example}")(command)
 
 
 def main() -> None:

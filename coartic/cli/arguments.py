@@ -76,9 +76,12 @@ def runs_named(text: str) -> Any:
     return text
 
 
-def names_in(text: str | None) -> list[str]:
-    """Split names at commas, without the blanks around them; None has no names."""
-    return [] if text is None else [name.strip() for name in text.split(",")]
+def names_in(texts: Sequence[str] | None) -> list[str]:
+    """Split the values of an option at commas, without the blanks around names.
+
+    None, for an option that was not given, has no names.
+    """
+    return [name.strip() for text in texts or () for name in text.split(",")]
 
 
 def method_titles(registered: Registry) -> dict[str, str]:

@@ -128,7 +128,7 @@ def say_ranking(study: Study, folder: Path) -> None:
     if notes["own"]:
         known = f"for {listed(notes['own'])} only the best reward of this folder is known"
         all_methods = ",".join(dict.fromkeys([*study.declared, *SEARCHES]))
-        search = f"repeat the command with --methods {quote(all_methods)}"
+        search = f"repeat the command with `--methods {quote(all_methods)}`"
         pairs.append(("", f"{known}; to search for the optimum, {search}"))
     if notes["unknown"]:
         pairs.append(("", f"for {listed(notes['unknown'])} no reward is known"))
@@ -142,14 +142,14 @@ def say_ranking(study: Study, folder: Path) -> None:
         pairs.append(("Failed", f"{notes['failed']} of {counted(notes['runs'], 'run')}: {reasons}"))
     pairs += [("‡", sentence) for sentence in notes["late"]]
     page = folder / "report" / "report.html"
-    say_pairs([*pairs, ("Report", f"coartic report {quote(str(folder))} writes {page}")])
+    say_pairs([*pairs, ("Report", f"`coartic report {quote(str(folder))}` writes {page}")])
 
 
 def verify(
     folder: given.ResultsFolder,
     again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
     run: Annotated[
-        str | None,
+        list[str] | None,
         given.option(
             "ID",
             "Only perform this run again; ID is the beginning of its id.",
@@ -157,62 +157,75 @@ def verify(
             words=completion.runs,
         ),
     ] = None,
+    noise: Annotated[
+        bool,
+        typer.Option(
+            "--noise", help="Execute all solutions with motor noise, not only one of each cell."
+        ),
+    ] = False,
     method_file: given.MethodFiles = None,
 ) -> None:
     """Check stored runs by executing their solutions again.
 
-    Exits with code 1 if a result differs, or if the folder lacks runs. With --run only one run is
-    performed again, and nothing else is checked.
+    Exits with code 1 if a result differs, or if the folder lacks runs. With --run only these runs
+    are performed again, and nothing else is checked.
     """
     from coartic.analysis.verify import check_runs
+    from coartic.benchmarks.reproduce import execute_with_noise_again
     from coartic.runs.store import explain_errors, open_store
 
-    only_one = run is not None
-    if again and only_one:
+    if again and run:
         raise CoarticError("--again has no effect with --run, which performs one run again")
-    if method_file and not (again or only_one):
+    if noise and run:
+        raise CoarticError("--noise has no effect with --run")
+    if method_file and not (again or run):
         raise CoarticError("--method-file has no effect without --again or --run")
     is_right = True
-    if not only_one:
+    if not run:
         with Display() as display, open_store(folder), explain_errors(folder):
             display.show(f"Executing the solutions of {folder}")
             report = check_runs(folder)
-        is_right = not (report.wrong or report.unfinished)
+            executed, wrong = 0, report.wrong
+            if not wrong:
+                display.show(f"Executing solutions of {folder} with motor noise")
+                executed, wrong = execute_with_noise_again(folder, every=noise)
+        is_right = not (wrong or report.unfinished)
         say(
             f"{counted(report.runs, 'run')} checked, "
             f"{counted(report.movements, 'movement')} executed.",
-            *(report.wrong or ["Nothing differs."]),
+            *[f"{counted(executed, 'solution')} executed with motor noise."] * bool(executed),
+            *(wrong or ["Nothing differs."]),
             *report.unfinished,
         )
-    differing = _perform_again(folder, again, run, method_file) if again or only_one else 0
+    differing = _perform_again(folder, again, run, method_file) if again or run else 0
     if differing or not is_right:
         sys.exit(1)
 
 
 def _perform_again(
-    folder: Path, count: int, run_id: str | None, method_file: list[Path] | None
+    folder: Path, count: int, run_ids: list[str] | None, method_file: list[Path] | None
 ) -> int:
     """Perform runs of a folder again, print differences, and return the number of differing runs.
 
-    It is the run whose id begins with ``run_id``, or, for None, at most ``count`` runs.
+    These are the runs whose ids begin with ``run_ids``, or, without ids, at most ``count`` runs.
     """
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again, some_runs
     from coartic.runs.store import open_store
 
     registered = registry(method_file or [])
-    if run_id is None:
+    if run_ids:
+        runs = [find_run(run_id, folder) for run_id in run_ids]
+        methods = [run.cell.method.name for run in runs]
+        if missing := [name for name in methods if name not in registered]:
+            raise CoarticError(f"unknown method {missing[0]!r}: pass --method-file FILE")
+    else:
         runs = some_runs(folder, count, registered)
         with open_store(folder) as store:
             methods = [job.cell.method.name for job in store.plan()]
-    else:
-        runs = [find_run(run_id, folder)]
-        methods = [runs[0].cell.method.name]
-        if methods[0] not in registered:
-            raise CoarticError(f"unknown method {methods[0]!r}: pass --method-file FILE")
     given.check_used(method_file, registered, methods)
-    if run_id is not None:
-        _describe_run(runs[0], registered[methods[0]].code)
+    for run in runs if run_ids else ():
+        _describe_run(run, registered[run.cell.method.name].code)
     differing = 0
     with Display() as display:
         display.show(f"Performing {counted(len(runs), 'run')} again")

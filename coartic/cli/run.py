@@ -59,7 +59,7 @@ def run(
         given.within("--jobs", "Number of processes; by default one for each core.", 1, MOST_JOBS),
     ] = None,
     tasks: Annotated[
-        str | None,
+        list[str] | None,
         given.option(
             "A,B",
             "Only these tasks, such as two-armed-1, or files (TOML).",
@@ -67,7 +67,7 @@ def run(
         ),
     ] = None,
     methods: Annotated[
-        str | None,
+        list[str] | None,
         given.option(
             "X,Y",
             "Only these methods, such as EC4, CMA-ES or 'optimum/*'.",
@@ -144,7 +144,7 @@ def run(
         progress = perform(asked, out, executor=executor, watch=display.update)
     say(str(progress))
     if isinstance(runs, range):
-        part = f"--include {quote(str(out))}, with all other parts, joins them"
+        part = f"`--include {quote(str(out))}`, with all other parts, joins them"
         say_pairs([("Next", f"{out} has runs {runs[0]} to {runs[-1]}: {part}")])
     else:
         say_ranking(load(out), out)

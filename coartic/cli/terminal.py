@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import math
 import os
+import re
 import shutil
 import sys
 import textwrap
@@ -77,21 +78,34 @@ def complain(kind: str, text: str) -> None:
     On a terminal long lines are wrapped.
     """
     width = shutil.get_terminal_size().columns if sys.stderr.isatty() else sys.maxsize
-    wrap = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False).wrap
     for line in text.splitlines():
-        say(*wrap(f"{kind}: {line}"), stream=sys.stderr)
+        say(*_wrap(f"{kind}: {line}", width), stream=sys.stderr)
+
+
+def _wrap(text: str, width: int) -> list[str]:
+    """Return the lines of a text that is wrapped at spaces.
+
+    Commands, which can be copied, stay on one line, however long they are: a text in backticks, and
+    a whole text that begins with ``coartic``. A number and its % stay on one line, too.
+    """
+    fixed = re.sub("`[^`]*`|^coartic .*", lambda found: found[0].replace(" ", "\xa0"), text)
+    wrapped = textwrap.wrap(
+        fixed.replace(" %", "\xa0%"), width, break_long_words=False, break_on_hyphens=False
+    )
+    return [line.replace("\xa0", " ") for line in wrapped]
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
-    """Print pairs of a word and a sentence as two columns, and wrap the second column."""
+    """Print pairs of a word and a sentence as two columns, and wrap the second column.
+
+    Commands are not wrapped (:func:`_wrap`).
+    """
     rows = list(pairs)
     indent = max((len(word) for word, _ in rows), default=0) + 2
     width = max(shutil.get_terminal_size().columns, indent + _READABLE)
     for word, text in rows:
-        unbroken = text.replace(" %", "\xa0%")  # a number and its % stay on one line
-        lines = textwrap.wrap(unbroken, width - indent, break_on_hyphens=False) or [""]
-        for number, line in enumerate(lines):
-            say(f"{'' if number else word:{indent}}{line}".replace("\xa0", " ").rstrip())
+        for number, line in enumerate(_wrap(text, width - indent) or [""]):
+            say(f"{'' if number else word:{indent}}{line}".rstrip())
 
 
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from coartic.errors import CoarticError
-from coartic.internal.text import plain
+from coartic.internal.text import plain, prints
 
 _PART = ".coartic-"  # beginning of the name of a file that is being written
 LISTING = ".coartic-files"
@@ -97,13 +97,15 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         listed = listing.read_text(encoding="utf-8", errors="replace") if listing.exists() else ""
-    listed_files = {*listed.splitlines()}
+    is_whole = all(map(prints, listed.replace("\n", "")))  # a damaged file counts as missing
+    listed_files = {*listed.splitlines()} if is_whole else set[str]()
     for name in sorted({*listed_files, *names}):
         check_inside(folder, folder / name)
     if foreign := [name for name in names if name not in listed_files and (folder / name).exists()]:
         raise CoarticError(
-            f"{folder} contains {plain(', '.join(foreign), 80)}, which was not written by coartic. "
-            "Move it away, or choose another folder."
+            f"{folder} contains {plain(', '.join(foreign), 80)}, which coartic has not listed in "
+            f"{LISTING}. Move it away, or choose another folder. If the folder is a copy, copy "
+            "this hidden file, too."
         )
     return listed_files
 

@@ -22,6 +22,7 @@ from coartic.internal.interruption import ENDING
 
 MOST_JOBS = 10_000
 _POOLS = "OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "NUMBA_NUM", "VECLIB_MAXIMUM"
+_environment_lock = threading.RLock()
 ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
 """Environment variables that give a worker one thread, because threads of workers would compete."""
 
@@ -90,16 +91,17 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
     """Set environment variables during a ``with`` block, for processes that start in it.
 
-    Afterwards the variables have their earlier values.
+    Afterwards the variables have their earlier values. Blocks of other threads wait.
     """
-    old_values = {name: os.environ[name] for name in variables if name in os.environ}
-    os.environ.update(variables)
-    try:
-        yield
-    finally:
-        for name in variables:
-            del os.environ[name]
-        os.environ.update(old_values)
+    with _environment_lock:
+        old_values = {name: os.environ[name] for name in variables if name in os.environ}
+        os.environ.update(variables)
+        try:
+            yield
+        finally:
+            for name in variables:
+                del os.environ[name]
+            os.environ.update(old_values)
 
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:

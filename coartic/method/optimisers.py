@@ -178,10 +178,11 @@ class Objective:
             raise MethodError("infeasible", "the corrective process completes no hand sequence")
         self._hands = sequences[best]
         self.joints = np.tile(explored_joints(session), (session.goals_count, 1))
-        """True for entries that have a target in a point, shape ``(G, dof)``."""
+        """True for entries that have a target in a point, shape ``(G, dof)`` (read-only)."""
         self.configurations: Array = outcomes.reached[best].copy()
         """Configurations in which the corrective process on its own hits the goals, shape ``(G,
-        dof)``."""
+        dof)`` (read-only)."""
+        self.joints.flags.writeable = self.configurations.flags.writeable = False
         self._codes = session.hand_codes(self.hands, 1)
         self._targets = np.full((1, *self.joints.shape), np.nan)
         self._entries = np.flatnonzero(self.joints)

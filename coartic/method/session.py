@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
@@ -102,6 +103,9 @@ class MethodError(CoarticError):
         self.outcome = outcome
         self.details = details or {}
 
+    def __reduce__(self) -> Any:  # for pools, which would wait for ever for an error like this
+        return type(self), (self.outcome, str(self), self.details)
+
 
 @dataclass
 class Meter:
@@ -163,6 +167,12 @@ MOST_COUNT = 2**63 - 1
 """Largest count that can be stored."""
 
 
+_OTHER_PROCESS = (
+    "a session cannot be used in another process, because trials and evaluations would not be "
+    "counted there: make many trials at once by session.trials(hands, targets)"
+)
+
+
 def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
     """Return rewards as an array of 8-byte integers, with :data:`NO_REWARD` in place of None."""
     return array("q", [NO_REWARD if reward is None else reward for reward in rewards])
@@ -174,7 +184,7 @@ class Session:
     The declaration is enforced: a call that uses information of :data:`METERED` which is not in
     ``information`` raises UndeclaredError. Trials and evaluations are counted. A session is not a
     sandbox. Threads can share a session: they make trials one after the other, from the same
-    budget.
+    budget. In a forked process a call that needs declared information raises CoarticError.
 
     Parameters
     ----------
@@ -207,6 +217,7 @@ class Session:
         self._task = task
         self._information = frozenset(information)
         self._used: set[Information] = set()
+        self._process = os.getpid()
         self.seed = seed
         self.rng = np.random.default_rng(seed)
         self.model = model
@@ -336,6 +347,8 @@ class Session:
                 self._use(Information.CORRECTIVE_PROCESS)
 
     def _use(self, *information: Information) -> None:
+        if os.getpid() != self._process:
+            raise CoarticError(_OTHER_PROCESS)
         for item in information:
             if item not in self._information:
                 declared = ", ".join(sorted(self._information)) or "nothing"

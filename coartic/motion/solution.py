@@ -48,6 +48,8 @@ units). Solvers leave smaller differences."""
 class Movement:
     """A movement of a solution (:func:`execute`).
 
+    The arrays of a movement are read-only copies of the arrays that are passed.
+
     Source: paper, section *Generating Movement for Each Goal*.
     """
 
@@ -79,8 +81,10 @@ class Movement:
 
     def __post_init__(self) -> None:
         for name, value in (("target", self.target), ("waypoints", self.waypoints)):
-            if value is not None:
-                real_array(name, value)
+            if value is not None:  # a planner may change its own array later
+                copy = np.array(real_array(name, value))
+                copy.flags.writeable = False
+                object.__setattr__(self, name, copy)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from coartic.errors import CoarticError
+from coartic.internal.limits import brief_value
 from coartic.internal.text import error_line, plain
+from coartic.internal.user_files import import_from
 from coartic.internal.validation import explain
 from coartic.method import Facts, Method, Outline, outline_of
 from coartic.tasks.task import Task
@@ -169,7 +171,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
             f"method {method.name!r}: {problem} (its parameters: {listed})"
         ) from None
     if question == "complete":
-        values = json.loads(json.dumps(typed.model_dump(mode="json")))
+        _plain_parameters(method, typed.model_dump())  # mode json has None for some NaN
+        values = _plain_parameters(method, typed.model_dump(mode="json"))
         return {
             name: value
             for name, value in values.items()
@@ -203,12 +206,32 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return the defaults of parameters as plain data, by name; None if there is no default."""
+    """Return the defaults of parameters as plain data, by name; None if there is no default.
+
+    Raises CoarticError for a default that is infinite or NaN.
+    """
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
         for name, field in method.Parameters.model_fields.items()
     }
-    return dict(json.loads(json.dumps(defaults, default=str)))
+    return _plain_parameters(method, defaults)
+
+
+def _plain_parameters(method: type[Method], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of parameters as plain data, by name.
+
+    Raises CoarticError for a value with infinity or NaN, which JSON does not have.
+    """
+    plain_values = {}
+    for name, value in values.items():
+        try:
+            plain_values[name] = json.loads(json.dumps(value, default=str, allow_nan=False))
+        except ValueError:
+            raise CoarticError(
+                f"method {method.name!r}: {name} is {brief_value(value)}; a parameter must be "
+                "finite: use None for no limit"
+            ) from None
+    return plain_values
 
 
 def load_method(where: str, name: str, code: str = "") -> type[Method]:
@@ -259,12 +282,11 @@ def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
     """Import a method file, and return its module and the names of loaded modules.
 
     The names are those of the other modules that the import has loaded. A process imports the file
-    once for each ``code``, a hash. The folder of the file is added to ``sys.path``. Errors of the
-    file are raised as they are.
+    once for each ``code``, a hash. The file and the user's modules are compiled from their source
+    (:func:`.import_from`). Errors of the file are raised as they are.
     """
     name = f"coartic_method_{path.stem}"
-    if str(path.parent) not in sys.path:
-        sys.path.append(str(path.parent))
+    import_from(path.parent)
     before = {*sys.modules}
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None

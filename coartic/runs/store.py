@@ -292,6 +292,13 @@ class Store:
         query = "SELECT run_id FROM results WHERE substr(run_id, 1, ?) = ?"
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
+    def solved(self) -> dict[str, list[str]]:
+        """Return the ids of all runs in the folder with status ``ok``, by the id of their cell."""
+        by_cell = defaultdict[str, list[str]](list)
+        for cell, run_id in self._rows("SELECT cell, run_id FROM results WHERE status = 'ok'"):
+            by_cell[cell].append(run_id)
+        return dict(by_cell)
+
     def results(self) -> dict[str, str]:
         """Return the hash of the outcome of each run in the folder, by id of the run."""
         return dict(self._rows("SELECT run_id, result FROM results"))
