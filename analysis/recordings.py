@@ -30,7 +30,7 @@ from coartic.analysis.signatures import Solutions
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 from coartic.model import PAPER
-from coartic.motion.movement import LARGEST_ENTRY
+from coartic.motion.kernels.trial import LARGEST_ENTRY
 from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
 from coartic.robot import HANDS, Array, Hand
 

@@ -17,7 +17,7 @@ from coartic.learner.learning import TRIALS
 from coartic.method import MethodError, Parameters, Result, Session
 from coartic.method.optimisers import explored_joints
 from coartic.motion.solution import Movement, movements_of
-from coartic.motion.trial import Trials
+from coartic.motion.trials import Trials
 from coartic.robot import Array
 
 

@@ -1,18 +1,20 @@
 """Every way to make a trial makes that of the step-by-step reference."""
 
 import functools
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import coartic
-from coartic import MotionModel, execute, load_task, movements_of, trajectory
+from coartic import PAPER, MotionModel, execute, load_task, movements_of, trajectory
 from coartic.method import Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
-from coartic.motion.batch import SLOTS, robot_parameters
-from coartic.motion.solution import execute_many
-from coartic.motion.trial import ALL_STOP, Requests, compiled_task, reach, reach_goals
+from coartic.motion.execution import execute_many
+from coartic.motion.kernels.slots import SLOTS, robot_parameters
+from coartic.motion.kernels.trial import Requests
+from coartic.motion.trials import compiled_task, reach, reach_goals
 from tests.support import reference
 from tests.support.strategies import make_trials, random_solution, sample, uneven_task
 
@@ -24,6 +26,7 @@ LIMITS = {  # iterations of the corrective process, spread of the targets
 TASKS = {name: uneven_task() if name == "uneven" else load_task(name) for name in LIMITS}
 MODELS = {name: MotionModel(max_iterations=most) for name, (most, _) in LIMITS.items()}
 BOTH = TASKS["two-armed-2"]
+NOISY = MotionModel(motor_noise=0.1)
 
 
 @functools.cache
@@ -165,10 +168,13 @@ def test_kernels_end_whatever_they_get(bad, where):
     q, targets = np.tile(BOTH.q0, (5, 1)), np.tile(BOTH.q0 + 0.5, (5, 1))
     goals = np.tile(BOTH.goal_array[0], (5, 1))
     {"start": q, "target": targets, "goal": goals}[where][::2, 0] = bad
-    hands, parameters = np.arange(5)[:, None] % 2, robot_parameters(BOTH.robot)
-    for given in (targets, targets * np.nan):
-        arms = Requests(q, hands, given[:, None, None], ALL_STOP, goals[:, None])
-        assert len(reach(BOTH.robot, arms, parameters).rewards) == 5
+    hands, worlds = np.arange(5)[:, None] % 2, (np.arange(5).astype(np.uint64), np.arange(5))
+    actions, paths = np.empty((2, 0, 0, 0), np.int64)
+    for given, model in itertools.product((targets, targets * np.nan), (PAPER, NOISY)):
+        arms = Requests(
+            q, hands, given[:, None, None], actions, paths[..., None], q, goals[:, None], 0, *worlds
+        )
+        assert len(reach(BOTH.robot, arms, robot_parameters(BOTH.robot, model=model)).rewards) == 5
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,7 @@ from coartic.method import (
     Result,
     Session,
 )
+from coartic.model import WORLD
 
 _FIELDS: dict[str, Any] = get_type_hints(ExplorationCondition, include_extras=True)
 del _FIELDS["id"], _FIELDS["hands"]  # parameters cannot change these
@@ -71,6 +72,7 @@ class DualProcess(Method):
     """Trial and error on top of the corrective process (paper, Figure 3)."""
 
     condition: ClassVar[ExplorationCondition]
+    adapts_to = frozenset(WORLD)
     citation = (
         "A. Shah, A. G. Barto, A. H. Fagg (2013). A dual process account of coarticulation "
         "in motor skill acquisition. Journal of Motor Behavior."

@@ -80,7 +80,7 @@ class Cell:
             "task": self.definition,
             "method": asdict(replace(self.method, tuned_on="", where="")),
             "parameters": self.parameters,
-            "model": PAPER.for_radius(self.task.radius)._asdict(),
+            "model": PAPER.stored(self.task.radius),
             "trial_budget": self.trial_budget,
         }
 

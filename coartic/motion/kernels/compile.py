@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from coartic.errors import CoarticError
 from coartic.robot import chain, lever
 
-PACKAGE = Path(__file__).parent.parent
+PACKAGE = Path(__file__).parents[2]
 _KEPT_S = 30 * 24 * 3600.0  # time for which unused machine code of other sources is stored
 _LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
 _TOLD_S = 5.0  # time after which a message names the process that is waited for
@@ -47,7 +47,7 @@ def _hash_of_sources() -> str:
     ``learner`` and ``method``.
     """
     single = (PACKAGE / name for name in ("robot.py", "model.py", "tasks/task.py"))
-    folders = ((PACKAGE / folder).glob("*.py") for folder in ("motion", "learner", "method"))
+    folders = ((PACKAGE / folder).rglob("*.py") for folder in ("motion", "learner", "method"))
     files = sorted([*single, *(path for folder in folders for path in folder)])
     texts = (path.name.encode() + b"\0" + path.read_bytes() for path in files)
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
