@@ -31,13 +31,14 @@ from coartic.model import PAPER, MotionModel, model_from, same_world
 from coartic.motion.execution import execute, execute_noisy, initial_hands, initial_reward
 from coartic.motion.solution import Movement, corrective_movements, next_action
 from coartic.motion.trials import (
-    ANY_WORLD,
     JUDGE,
+    NO_NOISE,
     CompiledTask,
     compiled_task,
     count_trials,
-    reach_from,
+    reach_next,
     world_seed,
+    worlds_of,
 )
 from coartic.robot import HANDS, LARGEST_FIGURE, Array
 from coartic.tasks.catalogue import as_task
@@ -174,8 +175,8 @@ class TaskEnv(gymnasium.Env):
         self.observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
         self.action_space = Box(-1.0, 1.0, (len(hands) - 1 + joints,), np.float32)
         self.number, self.going = -1, False
-        self.world: NDArray[np.uint64] = ANY_WORLD
-        """Seed of the motor noise, shape ``(1,)``."""
+        self.world = 0
+        """Seed of the motor noise."""
         self.draw = -1
         """Number of the draw of the noise in this trial, from 0; -1 before the first trial."""
         self.outcome = np.nan
@@ -345,11 +346,10 @@ class TaskEnv(gymnasium.Env):
         for the second goal. Return an account for each goal. Both movements are made in one call,
         because each call is slow.
         """
-        sides, draws = self._sides[hand][:, : targets.shape[1]], np.array([self.draw])
-        accounts = reach_from(
-            compiled, self.q[None], sides, targets, first=self.goal, seeds=self.world, draws=draws
-        )
-        return accounts.goals[0, :, 0]
+        sides = self._sides[hand][:, : targets.shape[1]]
+        noisy = compiled.model.motor_noise > 0.0
+        worlds = worlds_of(self.world, self.draw) if noisy else NO_NOISE
+        return reach_next(compiled, self.q[None], sides, targets, self.goal, worlds).goals[0, :, 0]
 
     def _reached_by(self, hands: range) -> list[Any]:
         """Return the account of each hand if only the corrective process reaches for the next

@@ -152,17 +152,22 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
 
 
 def check_exact(model: MotionModel, *, radius: float | None = None) -> MotionModel:
-    """Check a model for a function that has no random numbers, and return it unchanged.
+    """Check a model for a function that draws no random numbers, and return it unchanged.
 
-    Raises the errors of :func:`check_model`, and ValueError if the model has motor noise.
+    Raises the errors of :func:`check_model` and of :func:`refuse_noise`.
     """
-    if check_model(model, radius=radius).motor_noise > 0.0:
+    refuse_noise(check_model(model, radius=radius))
+    return model
+
+
+def refuse_noise(model: MotionModel) -> None:
+    """Raise ValueError if a model has motor noise, for functions that draw no random numbers."""
+    if model.motor_noise > 0.0:
         raise ValueError(
             f"model.motor_noise is {model.motor_noise:g}; it must be 0 here, because this function "
             "draws no random numbers: call coartic.execute_noisy, or make trials in a session, an "
             "objective or an environment"
         )
-    return model
 
 
 def model_from(constants: MotionModel | Mapping[str, Any]) -> MotionModel:

@@ -14,7 +14,14 @@ from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
 from coartic.motion.execution import execute_many
 from coartic.motion.kernels.slots import SLOTS, robot_parameters
 from coartic.motion.kernels.trial import Requests
-from coartic.motion.trials import compiled_task, reach, reach_goals
+from coartic.motion.trials import (
+    ALL_MOVE,
+    NO_WAYPOINTS,
+    compiled_task,
+    reach,
+    reach_goals,
+    worlds_of,
+)
 from tests.support import reference
 from tests.support.strategies import make_trials, random_solution, sample, uneven_task
 
@@ -168,13 +175,17 @@ def test_kernels_end_whatever_they_get(bad, where):
     q, targets = np.tile(BOTH.q0, (5, 1)), np.tile(BOTH.q0 + 0.5, (5, 1))
     goals = np.tile(BOTH.goal_array[0], (5, 1))
     {"start": q, "target": targets, "goal": goals}[where][::2, 0] = bad
-    hands, worlds = np.arange(5)[:, None] % 2, (np.arange(5).astype(np.uint64), np.arange(5))
-    actions, paths = np.empty((2, 0, 0, 0), np.int64)
+    hands, worlds = np.arange(5)[:, None] % 2, worlds_of(np.arange(5), 0)
     for given, model in itertools.product((targets, targets * np.nan), (PAPER, NOISY)):
-        arms = Requests(
-            q, hands, given[:, None, None], actions, paths[..., None], q, goals[:, None], 0, *worlds
+        arms = (q, hands, given[:, None, None], ALL_MOVE, NO_WAYPOINTS, goals[:, None], 0, worlds)
+        assert (
+            len(
+                reach(
+                    BOTH.robot, Requests(*arms), robot_parameters(BOTH.robot, model=model)
+                ).rewards
+            )
+            == 5
         )
-        assert len(reach(BOTH.robot, arms, robot_parameters(BOTH.robot, model=model)).rewards) == 5
 
 
 @pytest.mark.parametrize(

@@ -257,7 +257,7 @@ def _learn_together(
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
     learner, rngs = learner_parameters(compiled, condition, initial), addresses(generators)
-    workspace, worlds = workspace_for(runs, task), np.concatenate([*map(world_seed, seeds)])
+    workspace, worlds = workspace_for(runs, task), np.array([*map(world_seed, seeds)], np.uint64)
     count_trials(runs * trials)
     clock = time.perf_counter()
     learn_kernel(compiled.parameters, learner, tables, results, rngs, worlds, workspace)

@@ -13,7 +13,7 @@ from threading import RLock
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value, check_limits, real_array
@@ -25,6 +25,7 @@ from coartic.motion.initial_hands import search_initial_hands
 from coartic.motion.kernels.trial import NO_REWARD, Accounts
 from coartic.motion.solution import Movement, check_targets
 from coartic.motion.trials import (
+    NO_NOISE,
     CompiledTask,
     HandSequences,
     Trials,
@@ -34,6 +35,7 @@ from coartic.motion.trials import (
     make_trials,
     trials_of,
     world_seed,
+    worlds_of,
 )
 from coartic.robot import Array, Configs, Hand, Hands, Robot
 from coartic.tasks.task import Task
@@ -477,8 +479,7 @@ class Session:
         self.check_solution(solution)
         with self.lock:
             self._affordable(1)
-            draw = np.array([self.trials_made])
-            (execution,) = execute_many(self._compiled, [solution], seeds=self._world, draws=draw)
+            (execution,) = execute_many(self._compiled, [solution], self._worlds(1))
             if isinstance(execution, Exception):
                 raise execution
             count_trials(-self._of_run)
@@ -591,9 +592,12 @@ class Session:
         """
         return hand_codes(self._task, hands, count)
 
-    @cached_property
-    def _world(self) -> NDArray[np.uint64]:
-        return world_seed(self.seed)
+    def _worlds(self, count: int, draws: ArrayLike | None = None) -> NDArray[np.uint64]:
+        """Return the worlds of the next ``count`` trials (:func:`worlds_of`)."""
+        if self.model.motor_noise == 0.0:
+            return NO_NOISE
+        numbers = self.trials_made + np.arange(count) if draws is None else draws
+        return worlds_of(world_seed(self.seed), numbers)
 
     def chosen_draws(self, draws: Any, count: int) -> NDArray[np.int64] | None:
         """Return chosen draws as an array, shape ``(count,)``, or None for None.
@@ -627,13 +631,8 @@ class Session:
         hands, 0 (left) or 1 (right), shape ``(N, G)``. The caller checks arguments and budget, and
         holds ``lock``.
         """
-        if self.model.motor_noise == 0.0:
-            accounts = make_trials(self._compiled, codes, targets[:, :, None])
-        else:
-            numbers = self.trials_made + np.arange(len(targets)) if draws is None else draws
-            accounts = make_trials(
-                self._compiled, codes, targets[:, :, None], seeds=self._world, draws=numbers
-            )
+        worlds = self._worlds(len(targets), draws)
+        accounts = make_trials(self._compiled, codes, targets[:, :, None], worlds=worlds)
         count_trials(-len(targets) * self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > until[: len(targets)]

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from coartic.errors import NotApplicableError, SolutionError
 from coartic.internal.limits import MOST_RUN_SEED, MOST_RUNS, brief_value, check_limits
 from coartic.internal.validation import equal_contents
-from coartic.model import PAPER, MotionModel, check_exact, check_model
+from coartic.model import PAPER, MotionModel, check_model, refuse_noise
 from coartic.motion.doors import line_points, path_points
 from coartic.motion.initial_hands import hands_among, search_initial_hands, sequences_with
 from coartic.motion.kernels.move import FOLLOW, MOVE, REPEAT
@@ -35,15 +35,16 @@ from coartic.motion.solution import (
     movements_by_goal,
 )
 from coartic.motion.trials import (
-    ANY_WORLD,
-    FIRST_DRAW,
+    ALL_MOVE,
     JUDGE,
+    NO_NOISE,
+    NO_WAYPOINTS,
     CompiledTask,
-    Movements,
     compiled_task,
     make_trials,
     reason_of_failure,
     world_seed,
+    worlds_of,
 )
 from coartic.robot import HANDS, Array, Configs, Hand, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
@@ -146,9 +147,9 @@ def execute(
     -----
     Source: paper, section *Generating Movement for Each Goal*.
     """
-    chosen = as_task(task)
-    exact = check_exact(model, radius=chosen.radius)
-    (execution,) = execute_many(compiled_task(chosen, exact), [solution])
+    compiled = compiled_task(as_task(task), model)
+    refuse_noise(model)
+    (execution,) = execute_many(compiled, [solution])
     if isinstance(execution, Exception):
         raise execution
     return execution
@@ -157,15 +158,13 @@ def execute(
 def execute_many(
     compiled: CompiledTask,
     solutions: Iterable[Iterable[Movement]],
-    *,
-    seeds: NDArray[np.uint64] = ANY_WORLD,
-    draws: NDArray[np.int64] = FIRST_DRAW,
+    worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> list[Execution | Refused]:
     """Execute and score many solutions of one task, and return a list in their order.
 
     For a solution that cannot be executed, the list has the error that :func:`execute` would raise.
-    Solutions are executed side by side. ``seeds`` and ``draws`` are those of the noise, as in
-    :class:`~coartic.motion.kernels.trial.Requests`, if the model of ``compiled`` has noise.
+    Solutions are executed side by side. If the model of ``compiled`` has noise, ``worlds`` says
+    which (:func:`.worlds_of`).
     """
     executions: list[Plan | Refused] = []
     for solution in solutions:
@@ -174,7 +173,7 @@ def execute_many(
         except (SolutionError, ValueError, TypeError, OverflowError) as error:
             executions.append(error)
     plans = [item for item in executions if isinstance(item, list)]
-    made = iter(_execute_plans(compiled, plans, seeds, draws))
+    made = iter(_execute_plans(compiled, plans, worlds))
     return [next(made) if isinstance(item, list) else item for item in executions]
 
 
@@ -185,8 +184,10 @@ class Requested(NamedTuple):
     """Shape ``(K, G)``, 0 left or 1 right."""
     targets: Configs
     """Shape ``(K, G, M, dof)``, in length units and rad."""
-    movements: Movements
-    """How they are made."""
+    movements: NDArray[np.int64]
+    """How they are made, shape ``(K, G, M, 3)`` (:attr:`.Requests.movements`)."""
+    waypoints: Configs
+    """Waypoints of all paths, shape ``(W, dof)``."""
 
 
 def _with_targets(movements: list[Movement], corrective: float = math.inf) -> list[Movement | None]:
@@ -218,28 +219,28 @@ def _requested(
     rows = [m for movements in goals for m in movements + [None] * (length - len(movements))]
     stay, shape = [math.nan] * compiled.starts.shape[1], (len(aims), -1, length)
     targets = np.array([stay if m is None else m.target for m in rows])
-    actions = np.array([MOVE if m is None else _ACTIONS[m.kind] for m in rows])
-    made = Movements(actions.reshape(shape))
-    if (made.actions == FOLLOW).any():
-        ways: list[Any] = [[] if m is None or m.waypoints is None else m.waypoints for m in rows]
-        ends = np.cumsum([0, *map(len, ways)])
-        paths = np.stack([ends[:-1], ends[1:]], axis=1).reshape(*shape, 2)
-        made = Movements(made.actions, paths, np.concatenate([way for way in ways if len(way)]))
-    return Requested(np.array(hands).reshape(shape[:2]), targets.reshape(*shape, len(stay)), made)
+    requested = np.array(hands).reshape(shape[:2]), targets.reshape(*shape, len(stay))
+    made = [MOVE if m is None else _ACTIONS[m.kind] for m in rows]
+    if made.count(MOVE) == len(made):
+        return Requested(*requested, ALL_MOVE, NO_WAYPOINTS)
+    ways = [NO_WAYPOINTS if m is None or m.waypoints is None else m.waypoints for m in rows]
+    ends = np.cumsum([0, *map(len, ways)])
+    movements = np.stack([made, ends[:-1], ends[1:]], axis=1).reshape(*shape, 3)
+    waypoints = np.concatenate([way for way in ways if len(way)]) if ends[-1] else NO_WAYPOINTS
+    return Requested(*requested, movements, waypoints)
 
 
 def _execute_plans(
     compiled: CompiledTask,
     plans: Sequence[Plan],
-    seeds: NDArray[np.uint64],
-    draws: NDArray[np.int64],
+    worlds: NDArray[np.uint64],
 ) -> list[Execution]:
     """Execute plans side by side, and return the executions in their order."""
     if not plans:
         return []
     aims = [[_with_targets(movements) for movements in plan] for plan in plans]
     requested = _requested(compiled, aims, _hands_of(plans))
-    accounts = make_trials(compiled, *requested, seeds=seeds, draws=draws).goals
+    accounts = make_trials(compiled, *requested, worlds=worlds).goals
     executed = movements_in(accounts, compiled.task.robot.dof, aims)
     trials = zip(plans, executed, accounts[..., 0], strict=True)
     return [_execution_of(compiled, *trial) for trial in trials]
@@ -480,9 +481,7 @@ def execute_noisy(
             "motor_noise says how large the noise is"
         )
     plans = [_plan_of(chosen, k, solution) for k, solution in enumerate(solutions)]
-    seeds = np.array(
-        [world_seed(value, JUDGE).item() for value in _seeds(seed, len(plans))], np.uint64
-    )
+    seeds = np.array([world_seed(value, JUDGE) for value in _seeds(seed, len(plans))], np.uint64)
     if not plans:
         return np.empty((0, int(repeats)))
     aims, ticks = _execute_exactly(compiled_task(chosen, model), plans)
@@ -492,17 +491,13 @@ def execute_noisy(
         return np.repeat(ticks[:, None], repeats, axis=1)
     noisy = model._replace(motor_noise=float(motor_noise))
     compiled = compiled_task(chosen, noisy, grows=bool(signal_dependent))
-    hands, targets, movements = _requested(compiled, aims, _hands_of(plans))
+    hands, targets, movements, waypoints = _requested(compiled, aims, _hands_of(plans))
     count, parts = len(plans) * int(repeats), []
     for begin in range(0, count, _AT_ONCE):
         number, draws = np.divmod(np.arange(begin, min(begin + _AT_ONCE, count)), int(repeats))
-        of_part = movements._replace(
-            actions=movements.actions[number],
-            paths=movements.paths[number] if len(movements.paths) else movements.paths,
-        )
-        accounts = make_trials(
-            compiled, hands[number], targets[number], of_part, seeds=seeds[number], draws=draws
-        )
+        actions = movements[number] if len(movements) else movements
+        of_part = hands[number], targets[number], actions, waypoints
+        accounts = make_trials(compiled, *of_part, worlds_of(seeds[number], draws))
         parts.append(_ticks_of(accounts))
     return np.concatenate(parts).reshape(len(plans), -1)
 

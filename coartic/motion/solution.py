@@ -164,43 +164,34 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
     if waypoints is not None:
         raise SolutionError(f"a {kind} movement cannot have waypoints; only a path can")
     if target is not None:
-        point = _check_target(task, kind, target)
+        point = _check_point(task, target, kind)
         return movement if point is target else replace(movement, target=point)
     if kind != "corrective":
         raise SolutionError(f"a {kind} movement needs a target")
     return movement
 
 
-def _check_target(task: Task, kind: Kind, target: Any) -> Array:
-    """Check a target, whose entries may be NaN, and return it as :func:`_check_point` does.
-
-    Raises ValueError as that function does, and if all entries are NaN.
-    """
-    stays = np.isnan(real_array("target", target))
-    if not stays.any():
-        return _check_point(task, target)
-    if stays.all():
-        raise ValueError(
-            f"the target of a {kind} movement is NaN in all entries, so that nothing would move; "
-            "for a goal at which only the corrective process acts, pass a corrective movement "
-            "without a target"
-        )
-    if stays.shape != task.q0.shape:
-        raise ValueError(f"target has shape {stays.shape}; it must be {task.q0.shape}")
-    return np.where(stays, np.nan, _check_point(task, np.where(stays, task.q0, target)))
-
-
-def _check_point(task: Task, point: Any) -> Array:
-    """Check a configuration, and return it as an array ``(dof,)``.
+def _check_point(task: Task, point: Any, kind: Kind = "path") -> Array:
+    """Check a target of a movement, or a waypoint of a path, and return it as an array ``(dof,)``.
 
     The result is the array that was passed, or a new array if locked base coordinates have to be
-    set to their values at the start. Raises ValueError if ``point`` is not a configuration of the
-    robot, or moves a locked base coordinate by more than 1e-6.
+    set to their values at the start. Entries of a target may be NaN. Raises ValueError if ``point``
+    is not a configuration of the robot, has only NaN, or moves a locked base coordinate by more
+    than 1e-6.
     """
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # The length is quick to compute; with a NaN entry it is not below any limit.
     if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
-        point = configuration(task.robot, point)
+        numbers = real_array("configuration", point)
+        stays = np.isnan(numbers) if kind != "path" else np.zeros(numbers.shape, np.bool_)
+        if stays.all() and numbers.size:
+            raise ValueError(
+                f"the target of a {kind} movement is NaN in all entries, so that nothing would "
+                "move; for a goal at which only the corrective process acts, pass a corrective "
+                "movement without a target"
+            )
+        given = configuration(task.robot, np.where(stays, 0.0, numbers))
+        point = np.where(stays, np.nan, given)
     array: Array = point
     for k in map("xy".index, task.locked_base):
         if array[k] != task.q0[k]:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.limits import brief_value, check_limits
@@ -56,29 +56,34 @@ def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Acco
     )
 
 
-NO_ACTIONS = np.empty((0, 0, 0), dtype=np.int64)
-"""Actions of trials whose movements all end on arrival as well."""
-_NO_PATHS, _NO_WAYPOINTS = np.empty((0, 0, 0, 2), dtype=np.int64), np.empty((0, 0))
-ANY_WORLD = np.zeros(1, dtype=np.uint64)
-"""Seed of trials without noise."""
-FIRST_DRAW = np.zeros(1, dtype=np.int64)
+ALL_MOVE = np.empty((0, 0, 0, 3), dtype=np.int64)
+"""Value of :attr:`Requests.movements` with which all movements end on arrival as well."""
+NO_WAYPOINTS = np.empty((0, 0))
+NO_NOISE = np.zeros((1, 2), dtype=np.uint64)
+"""Value of :attr:`Requests.worlds` for trials without noise."""
 PRACTICE, JUDGE = 0x70726163, 0x6A756467
 """Keys of the worlds among the children of a seed: where a method practises, and where its solution
 is judged. So nobody is judged by the noise in which it has practised."""
 
 
 @lru_cache(maxsize=4096)
-def world_seed(seed: int, world: int = PRACTICE) -> NDArray[np.uint64]:
-    """Return the seed of the noise that belongs to a seed, as an array of shape ``(1,)``.
+def world_seed(seed: int, world: int = PRACTICE) -> int:
+    """Return the seed of the noise that belongs to a seed, from 0 to 2^64 - 1.
 
     It is a child of the seed (``numpy.random.SeedSequence``), so that ``default_rng(seed)`` has
     nothing to do with the noise. ``seed`` is from 0 to 2^128 - 1, ``world`` is :data:`PRACTICE` or
     :data:`JUDGE`.
     """
-    state = np.random.SeedSequence(seed, spawn_key=(world,)).generate_state(1, np.uint64)
-    words = state.astype(np.uint64)
-    words.setflags(write=False)
-    return words
+    return int(np.random.SeedSequence(seed, spawn_key=(world,)).generate_state(1, np.uint64)[0])
+
+
+def worlds_of(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
+    """Return the worlds of N trials (:attr:`Requests.worlds`), shape ``(N, 2)``.
+
+    ``seeds`` comes from :func:`world_seed`; it and ``draws`` are numbers or have shape ``(N,)``.
+    """
+    pairs = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64))
+    return np.stack(np.atleast_1d(*pairs), axis=1)
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
@@ -196,13 +201,11 @@ def reach_goals(
         starts=starts,
         hands=codes[:, None],
         targets=aims[:, None, None],
-        actions=NO_ACTIONS,
-        paths=_NO_PATHS,
-        waypoints=_NO_WAYPOINTS,
+        movements=ALL_MOVE,
+        waypoints=NO_WAYPOINTS,
         goals=finite_array("goals", goals, (count, 2))[:, None],
         first=0,
-        seeds=ANY_WORLD,
-        draws=FIRST_DRAW,
+        worlds=NO_NOISE,
     )
     locked = tuple(locked_base)
     parameters = robot_parameters(robot, radius, locked_base=locked, model=model, checks=checks)
@@ -294,51 +297,40 @@ def trials_outside() -> int:
     return _outside
 
 
-class Movements(NamedTuple):
-    """Movements of trials that do not all end on arrival: entries of :class:`Requests`."""
-
-    actions: NDArray[np.int64] = NO_ACTIONS
-    paths: NDArray[np.int64] = _NO_PATHS
-    waypoints: Configs = _NO_WAYPOINTS
-
-
 def make_trials(
     compiled: CompiledTask,
     hands: Hands,
     targets: Configs,
-    movements: Movements = Movements(),  # noqa: B008  (it cannot be changed)
-    *,
-    seeds: NDArray[np.uint64] = ANY_WORLD,
-    draws: NDArray[np.int64] = FIRST_DRAW,
+    movements: NDArray[np.int64] = ALL_MOVE,
+    waypoints: Configs = NO_WAYPOINTS,
+    worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> Accounts:
     """Make N trials of a task, count them (:func:`count_trials`), and return their accounts.
 
-    All arguments are as in :class:`Requests`. Without noise, seeds and draws have no effect.
+    All arguments are as in :class:`Requests`. Without noise the worlds have no effect.
     """
     count_trials(len(targets))
-    return reach_from(
-        compiled, compiled.starts, hands, targets, movements, seeds=seeds, draws=draws
+    arms = Requests(
+        compiled.starts, hands, targets, movements, waypoints, compiled.goals, 0, worlds
     )
+    return reach(compiled.task.robot, arms, compiled.parameters)
 
 
-def reach_from(
+def reach_next(
     compiled: CompiledTask,
-    starts: Configs,
+    q: Configs,
     hands: Hands,
     targets: Configs,
-    movements: Movements = Movements(),  # noqa: B008
-    *,
-    first: int = 0,
-    seeds: NDArray[np.uint64] = ANY_WORLD,
-    draws: NDArray[np.int64] = FIRST_DRAW,
+    first: int,
+    worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> Accounts:
-    """Let N robots reach for the goals of a task from goal ``first`` on (from 0), without counting
-    the trials.
+    """Let a robot reach for the next goals of a task, from goal ``first`` on (from 0).
 
-    All arguments are as in :class:`Requests`.
+    ``q``, shape ``(1, dof)``, is where it stands; the other arguments are as in :class:`Requests`,
+    for as many goals as there are ``targets``. The trial is not counted.
     """
     goals = compiled.goals[:, first : first + targets.shape[1]]
-    arms = Requests(starts, hands, targets, *movements, goals, first, seeds, draws)
+    arms = Requests(q, hands, targets, ALL_MOVE, NO_WAYPOINTS, goals, first, worlds)
     return reach(compiled.task.robot, arms, compiled.parameters)
 
 

@@ -433,17 +433,17 @@ def _point(
 
 @inlined
 def follow_paths(
-    count: int, offset: int, paths: Any, waypoints: Any, robot: RobotRecord, batch: Batch
+    count: int, offset: int, movements: Any, waypoints: Any, robot: RobotRecord, batch: Batch
 ) -> None:
     """Let each of the first ``count`` runs whose action is to follow a path do so.
 
-    Row ``offset`` + n of ``paths``, shape ``(N, 2)``, has the indices in ``waypoints`` of the first
-    waypoint of run n and of the waypoint after its last.
+    Row ``offset`` + n of ``movements``, shape ``(N, 3)``, has the action of run n, and the indices
+    in ``waypoints`` of its first waypoint and of the waypoint after its last.
     """
     for i in range(count):
         run = batch.runs[i]
         if run.action == FOLLOW:
-            begin, end = paths[offset + i, 0], paths[offset + i, 1]
+            begin, end = movements[offset + i, 1], movements[offset + i, 2]
             follow(run, waypoints[begin:end], robot, batch.slots[0])
 
 

@@ -71,7 +71,7 @@ def account_type(width: int) -> np.dtype[np.void]:
 
 
 @inlined
-def set_off(run: RunRecord, q: Any, seed: Any, draw: int, robot: RobotRecord) -> None:
+def set_off(run: RunRecord, q: Any, seed: Any, draw: Any, robot: RobotRecord) -> None:
     """Start the trial of a run at configuration ``q``, shape ``(dof,)``, in place.
 
     ``going`` becomes True and ``evaluations`` 0. The noise of the trial is that of draw ``draw`` of
@@ -159,12 +159,11 @@ class Requests(NamedTuple):
     """Targets, shape ``(N, G, M, dof)``, in length units and rad; NaN for entries that stay, and
     the last waypoint of a path. The first movement for a goal is always made, further ones only
     while the goal is missed."""
-    actions: NDArray[np.int64]
-    """How a movement is made: :data:`~coartic.motion.kernels.move.MOVE`, ``REPEAT`` or ``FOLLOW``,
-    shape ``(N, G, M)``; empty if all end on arrival as well (``MOVE``)."""
-    paths: NDArray[np.int64]
-    """Indices in ``waypoints`` of the first waypoint of a path and of the one after its last, shape
-    ``(N, G, M, 2)``; empty if there are no paths."""
+    movements: NDArray[np.int64]
+    """How each movement is made, shape ``(N, G, M, 3)``: the action
+    :data:`~coartic.motion.kernels.move.MOVE`, ``REPEAT`` or ``FOLLOW``, and for a path the indices
+    in ``waypoints`` of its first waypoint and of the one after its last. Empty if all movements end
+    on arrival as well (``MOVE``)."""
     waypoints: Configs
     """Waypoints of all paths, shape ``(W, dof)``."""
     goals: Points
@@ -172,11 +171,9 @@ class Requests(NamedTuple):
     goals."""
     first: int
     """Number in the task of the first of the goals, from 0."""
-    seeds: NDArray[np.uint64]
-    """Seed of the world of each trial (:func:`coartic.motion.trials.world_seed`), shape ``(N,)``,
-    or ``(1,)`` if all have the same."""
-    draws: NDArray[np.int64]
-    """Number of the draw of each trial, shape ``(N,)``, or ``(1,)`` if all have the same."""
+    worlds: NDArray[np.uint64]
+    """Seed of the world and number of the draw of each trial, shape ``(N, 2)``, or ``(1, 2)`` if
+    they are the same for all."""
 
 
 NO_REWARD = -(2**63 - 1)
@@ -221,9 +218,9 @@ def _reach_lot(
     """
     for i in range(count):
         n, run = offset + i, batch.runs[i]
-        seed = arms.seeds[min(n, len(arms.seeds) - 1)]
-        draw = arms.draws[min(n, len(arms.draws) - 1)]
-        set_off(run, arms.starts[min(n, len(arms.starts) - 1)], seed, draw, robot)
+        world = arms.worlds[min(n, len(arms.worlds) - 1)]
+        start = arms.starts[min(n, len(arms.starts) - 1)]
+        set_off(run, start, world[0], world[1], robot)
         run.going = _are_within(arms.targets[n])
         counts[n, FAILURES] = not run.going
     for g in range(arms.targets.shape[1]):
@@ -244,13 +241,13 @@ def _reach_lot(
                     aim(run, target)
                 if run.action == MOVE:
                     fill_row(noted, run.target)
-                    if len(arms.actions) > 0:
-                        run.action = arms.actions[n, g, m]
+                    if len(arms.movements) > 0:
+                        run.action = arms.movements[n, g, m, 0]
                 else:
                     fill_row(noted, target)
             move_runs(count, robot, batch)
-            if len(arms.paths) > 0:
-                follow_paths(count, offset, arms.paths[:, g, m], arms.waypoints, robot, batch)
+            if len(arms.waypoints) > 0:
+                follow_paths(count, offset, arms.movements[:, g, m], arms.waypoints, robot, batch)
             for i in range(count):
                 goals[offset + i, g, m].moved = batch.runs[i].ticks
         correct_runs(count, robot, batch)
