@@ -30,9 +30,8 @@ from coartic.analysis.signatures import Solutions
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 from coartic.model import PAPER
-from coartic.motion.kernels.trial import LARGEST_ENTRY
 from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
-from coartic.robot import HANDS, Array, Hand
+from coartic.robot import HANDS, LARGEST_ENTRY, Array, Hand
 
 FAR = 2.0
 """Distance from the centre of a goal (in radii) beyond which a hit does not fit the task."""

@@ -101,6 +101,19 @@ def test_the_package_imports_what_is_asked_for():
     assert "dual-process/" in said
 
 
+def test_kernels_are_read_by_their_doors_alone():
+    """By the learner's kernel and posture-based planning besides, and by what sets Numba up."""
+    others = {
+        "coartic/learner/kernel.py", "coartic/learner/learning.py", "baselines/posture_based.py",
+        "benchmarks/preload.py", "benchmarks/provenance.py",
+    }  # fmt: skip
+    for path in sources():
+        relative = path.relative_to(ROOT).as_posix()
+        if not relative.startswith("coartic/motion/") and relative not in others:
+            names = {name for name in imported(path) if name.startswith("coartic.motion.kernels")}
+            assert not names, f"{relative} imports {names}: read a door of coartic.motion instead"
+
+
 def test_no_module_has_a_name_of_the_package():
     """It would hide what has its name."""
     assert not {module.name for module in iter_modules(coartic.__path__)} & {*coartic.__all__}

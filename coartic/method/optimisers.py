@@ -40,10 +40,9 @@ from coartic.method import (
 )
 from coartic.model import PAPER, MotionModel, same_world
 from coartic.motion.initial_hands import sequences_with, too_many_sequences
-from coartic.motion.kernels.trial import LARGEST_ENTRY, Accounts
 from coartic.motion.solution import Movement, movements_of
-from coartic.motion.trials import HandSequences, compiled_task, make_trials
-from coartic.robot import HANDS, Array, Configs, Hands
+from coartic.motion.trials import Accounts, HandSequences, compiled_task, make_trials
+from coartic.robot import HANDS, LARGEST_ENTRY, Array, Configs, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.optima import KnownOptimum, best_shipped
 from coartic.tasks.task import Task, letters_of

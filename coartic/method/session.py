@@ -22,10 +22,11 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.doors import Correction, correct
 from coartic.motion.execution import Execution, execute_many
 from coartic.motion.initial_hands import search_initial_hands
-from coartic.motion.kernels.trial import NO_REWARD, Accounts
 from coartic.motion.solution import Movement, check_targets
 from coartic.motion.trials import (
     NO_NOISE,
+    NO_REWARD,
+    Accounts,
     CompiledTask,
     HandSequences,
     Trials,

@@ -18,8 +18,7 @@ from coartic.model import PAPER, MotionModel, check_exact
 from coartic.motion.kernels.correct import correct_kernel
 from coartic.motion.kernels.move import move_kernel, path_kernel
 from coartic.motion.kernels.slots import Batch, batch_for, robot_parameters
-from coartic.motion.kernels.trial import LARGEST_ENTRY
-from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
+from coartic.robot import BASE_DOF, HANDS, LARGEST_ENTRY, Array, Hand, Robot
 
 
 class MoveResult(NamedTuple):

@@ -26,7 +26,7 @@ from coartic.motion.doors import line_points, path_points
 from coartic.motion.initial_hands import hands_among, search_initial_hands, sequences_with
 from coartic.motion.kernels.move import FOLLOW, MOVE, REPEAT
 from coartic.motion.kernels.noise import STAYS
-from coartic.motion.kernels.trial import FAILURES, TICKS, Accounts
+from coartic.motion.kernels.trial import FAILURES, TICKS
 from coartic.motion.solution import (
     Movement,
     Plan,
@@ -39,6 +39,7 @@ from coartic.motion.trials import (
     JUDGE,
     NO_NOISE,
     NO_WAYPOINTS,
+    Accounts,
     CompiledTask,
     compiled_task,
     make_trials,

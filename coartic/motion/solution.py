@@ -17,8 +17,7 @@ from coartic.errors import SolutionError
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.validation import equal_contents
 from coartic.motion.doors import configuration
-from coartic.motion.kernels.trial import LARGEST_ENTRY
-from coartic.robot import Array, Configs, Hand
+from coartic.robot import LARGEST_ENTRY, Array, Configs, Hand
 from coartic.tasks.task import Task, hands_of, letters_of
 
 Kind = Literal["learned", "corrective", "planned", "path"]

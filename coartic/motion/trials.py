@@ -27,15 +27,26 @@ from coartic.motion.kernels.trial import (
     EVALUATIONS,
     FAILURES,
     ITERATIONS,
-    LARGEST_ENTRY,
     TICKS,
-    Accounts,
     Requests,
     account_type,
     reach_kernel,
 )
-from coartic.robot import HANDS, Array, Configs, Hands, Points, Robot
+from coartic.motion.kernels.trial import NO_REWARD as NO_REWARD
+from coartic.robot import HANDS, LARGEST_ENTRY, Array, Configs, Hands, Points, Robot
 from coartic.tasks.task import Task, check_hands, hands_of
+
+
+class Accounts(NamedTuple):
+    """Accounts of N trials with G goals."""
+
+    goals: NDArray[np.void]
+    """Accounts of the goals, shape ``(N, G, M)``: records (:func:`account_type`)."""
+    counts: NDArray[np.int64]
+    """Counts of the trials, by :data:`COUNTED`, shape ``(N, 5)``."""
+    rewards: NDArray[np.int64]
+    """Total rewards, shape ``(N,)``; :data:`NO_REWARD` where a trial failed."""
+
 
 SHARE = 14 * SLOTS
 """Smallest number of arms for a thread. Starting a thread takes as long as a hundred trials."""

@@ -30,10 +30,8 @@ from coartic.motion.kernels.correct import correct_runs
 from coartic.motion.kernels.move import CHECK, IDLE, MOVE, follow_paths, move_runs
 from coartic.motion.kernels.noise import hashed
 from coartic.motion.kernels.slots import Batch, RobotRecord, RunRecord
-from coartic.robot import Configs, Hands, Points
+from coartic.robot import LARGEST_ENTRY, Configs, Hands, Points
 
-LARGEST_ENTRY = 1e5
-"""Largest entry of a configuration or goal, in length units or rad."""
 COUNTED = (
     *("movement_ticks", "forward_kinematics", "corrective_iterations"),
     *("corrections", "failed_trials"),
@@ -180,17 +178,6 @@ NO_REWARD = -(2**63 - 1)
 """Reward of a failed trial where rewards are integers."""
 
 
-class Accounts(NamedTuple):
-    """Accounts of N trials with G goals."""
-
-    goals: NDArray[np.void]
-    """Accounts of the goals, shape ``(N, G, M)``: records (:func:`account_type`)."""
-    counts: NDArray[np.int64]
-    """Counts of the trials, by :data:`COUNTED`, shape ``(N, 5)``."""
-    rewards: NDArray[np.int64]
-    """Total rewards, shape ``(N,)``; :data:`NO_REWARD` where a trial failed."""
-
-
 @inlined
 def _are_within(targets: Any) -> bool:
     """Return whether no entry of a trial's targets is beyond :data:`LARGEST_ENTRY` in size.
@@ -266,9 +253,9 @@ REQUESTED = len(Requests._fields)
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any) -> None:
     """Let every arm reach for its goals, as many at once as the batch holds.
 
-    ``goals``, ``counts`` and ``rewards`` are the entries of :class:`Accounts`, filled in place; the
-    caller sets ``counts`` to 0. ``arrays`` are the entries of :class:`Requests`, followed by the
-    entries of a batch.
+    ``goals``, ``counts`` and ``rewards`` are the entries of
+    :class:`~coartic.motion.trials.Accounts`, filled in place; the caller sets ``counts`` to 0.
+    ``arrays`` are the entries of :class:`Requests`, followed by the entries of a batch.
     """
     arms, batch = Requests(*arrays[:REQUESTED]), Batch(*arrays[REQUESTED:])
     count, room = len(arms.targets), len(batch.runs)
