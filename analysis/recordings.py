@@ -18,8 +18,7 @@ from coartic.analysis.signatures import Solutions
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 from coartic.model import PAPER
-from coartic.motion.movement import LARGEST_ENTRY
-from coartic.robot import Array
+from coartic.robot import LARGEST_ENTRY, Array
 
 FAR = 2.0
 """Distance from the centre of a goal (in radii) beyond which a hit does not fit the task."""

@@ -47,7 +47,7 @@ from coartic.estimates import (
     slices,
 )
 from coartic.internal.arguments import Numbers
-from coartic.motion.trial import reach_goals
+from coartic.motion.trials import reach_goals
 from coartic.robot import HANDS, Array
 from coartic.tasks.optima import HASHED_FIELDS
 from coartic.tasks.task import hands_of

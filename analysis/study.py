@@ -28,8 +28,8 @@ from coartic.internal.files import folder_named
 from coartic.internal.text import counted, unknown
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.method import Information
+from coartic.motion.execution import initial_reward
 from coartic.motion.initial_hands import ranked_sequences
-from coartic.motion.solution import initial_reward
 from coartic.robot import Array
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, label_of, size_of

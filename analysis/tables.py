@@ -95,7 +95,7 @@ from coartic.estimates import (
     standard_deviation,
 )
 from coartic.internal.text import counted, one_line
-from coartic.motion.solution import initial_reward
+from coartic.motion.execution import initial_reward
 from coartic.robot import Array
 
 Row = dict[str, Any]

@@ -57,8 +57,11 @@ def need(holds: Any, words: str) -> None:
         raise ValueError(words)
 
 
-# One bit of a hand's position can decide where a movement stops. Therefore lines are computed in
-# the same order and with the same polynomials as in coartic: IEEE arithmetic then gives the same
+WORLD = {"motor_noise": 0.0, "norm": "euclidean", "base_weight": 1.0}
+"""Constants of the paper's world, which cells leave out."""
+
+# One bit of a hand's position can decide where a movement stops. Therefore it is computed in the
+# same order and with the same polynomials as in coartic: IEEE arithmetic then gives the same
 # bits on all computers.
 HIGH, MIDDLE, LOW = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
 S3, S5, S7, S9, S11, S13, S15, S17 = ((-1) ** n / math.factorial(2 * n + 1) for n in range(1, 9))
@@ -83,17 +86,16 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
     return cosine, sine
 
 
-def hand_at(q: Floats, arm: Any, on_path: bool = False) -> tuple[Floats, Floats]:
+def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
     """Return x and y of a hand for n configurations, shape ``(n,)`` each.
 
     ``q`` has the configurations in its columns. ``arm`` has the slice of the arm's joints, the
-    lengths of its links, and the shoulder's position. With ``on_path``, NumPy's cosine is used.
+    lengths of its links, and the shoulder's position.
     """
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
     angles = np.cumsum(q[joints], axis=0)  # a joint's angle is measured from the previous link
-    waves = (np.cos(angles), np.sin(angles)) if on_path else _cosine_and_sine(angles)
-    for length, cosine, sine in zip(links, *waves, strict=True):
+    for length, cosine, sine in zip(links, *_cosine_and_sine(angles), strict=True):
         x, y = x + length * cosine, y + length * sine
     return x, y
 
@@ -108,7 +110,7 @@ def stored_task(content: str) -> Any:
     plain = json.loads(content)
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
     task = cell.task
-    task.model = cell.model
+    task.model = SimpleNamespace(**WORLD | vars(cell.model))
     method, given = plain["method"], plain["parameters"]
     changed = [f"{name}={x}" for name, x in given.items() if x != method["defaults"].get(name)]
     task.labels = task.name, method["name"], ", ".join(changed)
@@ -125,13 +127,24 @@ def stored_task(content: str) -> Any:
     return task
 
 
+def scaled(changes: Floats, model: Any) -> Floats:
+    """Return the sizes of changes, shape ``(..., dof)``, whose norm is the length of a movement."""
+    sizes = np.abs(changes)
+    sizes[..., :2] *= model.base_weight
+    return sizes
+
+
 def line(q: Floats, target: Floats, model: Any) -> Floats:
     """Return the points of a straight movement from ``q`` to a target, shape ``(dof, points)``.
 
-    They are a step of ``model`` apart in joint space; the last step can be shorter.
+    They are spaced by a step of ``model`` in joint space; the last step can be shorter. Entries of
+    the target that are NaN stay.
     """
+    target = np.where(np.isnan(target), q, target)
     difference = target - q
-    distance = math.sqrt(np.cumsum(difference * difference)[-1])
+    sizes = scaled(difference, model)
+    is_euclidean = model.norm == "euclidean"
+    distance = math.sqrt(np.cumsum(sizes * sizes)[-1]) if is_euclidean else sizes.max()
     fractions = np.arange(math.ceil(distance / model.step) + 1) * model.step / (distance or 1.0)
     points: Floats = q[:, None] + fractions * difference[:, None]
     points[:, -1] = target
@@ -145,7 +158,10 @@ def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
     path; the last point is its end.
     """
     corners = np.array([q, *waypoints])
-    ends = np.append(0.0, np.cumsum(np.sqrt((np.diff(corners, axis=0) ** 2).sum(axis=1))))
+    sizes = scaled(np.diff(corners, axis=0), model)
+    is_euclidean = model.norm == "euclidean"
+    lengths = np.sqrt((sizes**2).sum(axis=1)) if is_euclidean else sizes.max(axis=1)
+    ends = np.append(0.0, np.cumsum(lengths))
     along = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
     points = np.array([np.interp(along, ends, joint) for joint in corners.T])
     points[:, -1] = corners[-1]
@@ -160,11 +176,11 @@ def make(
     The movement starts at ``q``. ``corners`` has a row with the target, or a row for each waypoint
     of a path.
     """
-    model, arm, on_path = task.model, task.arms[hand], kind == "path"
-    points = path(q, corners, model) if on_path else line(q, corners[-1], model)
-    x, y = hand_at(points, arm, on_path)
+    model, is_path = task.model, kind == "path"
+    points = path(q, corners, model) if is_path else line(q, corners[-1], model)
+    x, y = hand_at(points, task.arms[hand])
     dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
-    hits = (np.hypot(dx, dy) if on_path else np.sqrt(dx * dx + dy * dy)) <= task.radius
+    hits = np.sqrt(dx * dx + dy * dy) <= task.radius
     stops = hits.copy()
     if kind in ("learned", "planned"):
         dx, dy = x[-1] - x, y[-1] - y
@@ -197,7 +213,7 @@ def _recompute(task: Any, movements: list[list[Any]]) -> tuple[int, str, int, fl
         for _, same_hand, kind, stored, text in to_goal:
             need(same_hand == hand, f"goal {goal} has two hands")
             corners = np.atleast_2d(np.array(json.loads(text), dtype=np.float64))
-            is_locked = (corners == task.q0)[:, task.locked].all()
+            is_locked = ((corners == task.q0) | np.isnan(corners))[:, task.locked].all()
             need(is_locked, "a movement moves a locked base")
             end, ticks, hits = make(task, q, goal, hand, kind, corners)
             if hit or (kind == "corrective" and hits and ticks == 1):

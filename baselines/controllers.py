@@ -22,8 +22,8 @@ from coartic import Movement, Task
 from coartic.baselines.cascade import Solution, solve_cascade
 from coartic.baselines.posture_graph import KINEMATICS
 from coartic.method import Information, Method, MethodError, Outline, Parameters, Result, Session
+from coartic.motion.doors import follow
 from coartic.motion.initial_hands import changes_of_hand
-from coartic.motion.movement import follow
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.task import beyond_reach, letters_of
 
@@ -146,7 +146,7 @@ class Controller(ABC):
             The solver fails.
         """
         (hand, goal), name = aims[0], f"goal {aims[0].goal + 1}: the {aims[0].hand} hand"
-        model, radius = self.session.model, self.task.radius
+        model, radius = self.session.model.without_noise(), self.task.radius
         _, tolerance = model.tolerances(radius)
         short = beyond_reach(self.task, hand, self.task.goals[goal], tolerance)
         if short > radius:

@@ -55,6 +55,7 @@ class OptimumSearch(Method):
     title = "optimum search"
     facts = Facts(works=("betts1998",), solvers=IPOPT, algorithm="optimum")
     information = REWARD_INFORMATION
+    adapts_to = frozenset({"motor_noise", "base_weight"})
     stochastic = False
     Parameters = OptimumParameters
     quick = QUICK
@@ -71,7 +72,13 @@ class OptimumSearch(Method):
         still = parameters.other_arm == "still"
         task = with_locks(session.reveal(*self.information), parameters.base)
         with session.building():
-            problem = trajectory_problem(task.robot, task.hands, len(task.goals), "path-length")
+            problem = trajectory_problem(
+                task.robot,
+                task.hands,
+                len(task.goals),
+                "path-length",
+                session.model.base_weight,
+            )
         with session.solving():
             starts = cheapest_chains(
                 session,

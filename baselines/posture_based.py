@@ -42,7 +42,7 @@ from coartic import Movement
 from coartic.baselines.posture_graph import KINEMATICS, HandSequence, Layers
 from coartic.method import Facts, Information, Method, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import explored_joints
-from coartic.motion.compile import chain_by, entry, joint_lever
+from coartic.motion.kernels.compile import chain_by, entry, joint_lever
 from coartic.robot import BASE_DOF, Array, Hand
 
 Mask = NDArray[np.bool_]

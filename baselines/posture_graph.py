@@ -135,7 +135,9 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
     return layers, spent
 
 
-def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain]:
+def chains_of(
+    task: Task, layers: Layers, most: int | None = None, base_weight: float = 1.0
+) -> list[Chain]:
     """Find the cheapest chain of nodes of each hand sequence.
 
     Parameters
@@ -146,6 +148,8 @@ def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain
     most : int, optional
         Width of the beam search: at each goal the search continues with this many cheapest
         beginnings of sequences. By default it continues with all.
+    base_weight : float
+        Weight of the base in the length of a movement (:class:`.MotionModel`).
 
     Returns
     -------
@@ -156,7 +160,7 @@ def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain
     start = dict.fromkeys(HANDS, np.array(task.q0)[None, :])
     beam = [Beginning((), start, np.zeros((1, 1)), ())]
     for _ in range(len(task.goals)):
-        longer = [extended for begun in beam for extended in _extend(task, layers, begun)]
+        longer = [more for begun in beam for more in _extend(task, layers, begun, base_weight)]
         ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
         beam = [longer[i] for i in sorted(ranked[:most])]
     chains: list[Chain] = []
@@ -178,7 +182,9 @@ def chains_of(task: Task, layers: Layers, most: int | None = None) -> list[Chain
     return chains
 
 
-def _extend(task: Task, layers: Layers, begun: Beginning) -> Iterator[Beginning]:
+def _extend(
+    task: Task, layers: Layers, begun: Beginning, base_weight: float
+) -> Iterator[Beginning]:
     """Yield ``begun`` extended by one goal, for each hand that has a node at this goal."""
     hands, nodes, cost, back = begun
     goal = len(hands)
@@ -187,7 +193,7 @@ def _extend(task: Task, layers: Layers, begun: Beginning) -> Iterator[Beginning]
         if not len(layer):
             continue
         last = hands[-1] if hands else hand
-        base = _squared_distances(nodes[last], layer, slice(0, BASE_DOF))
+        base = base_weight**2 * _squared_distances(nodes[last], layer, slice(0, BASE_DOF))
         arm = _squared_distances(nodes[hand], layer, task.robot.joints(hand))
         # A hand comes from its own node. If it was used last, (i, j) leads to (k, j) by the
         # minimum over i, else to (k, i) by the minimum over j.
@@ -253,7 +259,7 @@ def cheapest_chains(
                 f"goal {min(missing) + 1}: the search found no posture with the "
                 f"{' or the '.join(task.hands)} hand inside its disc",
             )
-        for hands, configurations in chains_of(task, layers, most):
+        for hands, configurations in chains_of(task, layers, most, session.model.base_weight):
             yielded += 1
             yield hands, configurations
             if spread and len(task.hands) > 1:

@@ -38,7 +38,7 @@ from coartic.baselines.shortest_paths import (
 )
 from coartic.baselines.trajectory_problem import IPOPT, trajectory_problem
 from coartic.method import Facts, Method, Parameters, Result, Session
-from coartic.motion.movement import segment_lengths
+from coartic.motion.doors import segment_lengths
 from coartic.robot import BASE_DOF, HANDS
 from coartic.tasks.task import MOST_GOALS, Start
 
@@ -76,6 +76,7 @@ class RecedingHorizon(Method):
         short="receding horizon",
     )
     information = REWARD_INFORMATION
+    adapts_to = frozenset({"motor_noise", "base_weight"})
     stochastic = False
     Parameters = RecedingHorizonParameters
     quick = QUICK
@@ -86,6 +87,7 @@ class RecedingHorizon(Method):
         Raises MethodError if no path is found.
         """
         task, parameters = session.reveal(*self.information), self.parameters
+        exact = session.model.without_noise()
         rng = np.random.default_rng(0)  # the same graphs for all seeds
         windows: list[ShortestPlans] = []
         solution: list[Movement] = []
@@ -96,7 +98,9 @@ class RecedingHorizon(Method):
             start = Start(base=tuple(q[:BASE_DOF].tolist()), **angles)
             window = task.model_copy(update={"goals": ahead, "start": start})
             with session.building():
-                problem = trajectory_problem(task.robot, task.hands, len(ahead), "path-length")
+                problem = trajectory_problem(
+                    task.robot, task.hands, len(ahead), "path-length", exact.base_weight
+                )
             with session.solving():
                 chains = cheapest_chains(
                     session,
@@ -109,7 +113,7 @@ class RecedingHorizon(Method):
                 )
                 ranked = sorted(
                     chains,
-                    key=lambda chain: segment_lengths(np.vstack([q, chain[1]])).sum(),
+                    key=lambda chain: segment_lengths(np.vstack([q, chain[1]]), exact).sum(),
                 )
                 starts = ranked[: parameters.starts]
                 plans = shortest_plans(session, window, problem, starts, still=False)

@@ -124,6 +124,7 @@ def fewest_ticks(
     """
     best: PlanInTicks | None = None
     fewest: tuple[float, float] = math.inf, math.inf  # ticks and corrections of the best
+    exact = session.model.without_noise()
 
     def worth(ticks: int) -> bool:
         return ticks < fewest[0]
@@ -140,7 +141,7 @@ def fewest_ticks(
                 if not worth(rounded.ticks):
                     continue
                 planned = movements(session, task, instance, rounded.configurations, rounded.steps)
-                execution = execute(task, planned, model=session.model)
+                execution = execute(task, planned, model=exact)
                 session.spend(forward_kinematics=execution.evaluations)
                 spent = execution.ticks, execution.corrections
                 if execution.completed and spent < fewest:

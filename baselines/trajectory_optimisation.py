@@ -43,7 +43,7 @@ from coartic.baselines.trajectory_problem import (
 )
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Facts, Information, Method, MethodError, Parameters, Result, Session
-from coartic.motion.movement import follow, segment_lengths
+from coartic.motion.doors import follow, segment_lengths
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
@@ -157,7 +157,9 @@ class TrajectoryOptimisation(Method):
         """
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
-            problem = trajectory_problem(task.robot, task.hands, len(task.goals), self.cost)
+            problem = trajectory_problem(
+                task.robot, task.hands, len(task.goals), self.cost, session.model.base_weight
+            )
         # A target this near to a goal's centre is sure to hit. A plan for path length is rounded to
         # whole control ticks instead, and goes through the rims.
         inside = task.radius - session.model.tolerances(task.radius)[0]
@@ -266,6 +268,7 @@ class PathLength(TrajectoryOptimisation):
         short="shortest path",
     )
     information = MODEL_BASED | {Information.REWARD_FORMULA}
+    adapts_to = frozenset({"motor_noise", "base_weight"})
     cost = "path-length"
 
 
@@ -362,14 +365,15 @@ def path_movements(
     """
     paths: list[Movement] = []
     q, rest = np.array(task.q0), np.empty((0, task.robot.dof))
+    exact = session.model.without_noise()
     for goal, (hand, piece) in enumerate(zip(instance.hands, path, strict=True)):
         waypoints = np.where(instance.held[goal], q, np.vstack([rest, piece]))
         followed = follow(
-            task.robot, q, waypoints, hand, task.goals[goal], task.radius, model=session.model
+            task.robot, q, waypoints, hand, task.goals[goal], task.radius, model=exact
         )
         session.spend(forward_kinematics=followed.evaluations)
         paths.append(Movement(goal + 1, hand, "path", waypoints[-1], waypoints=waypoints))
         ends = np.cumsum(segment_lengths(np.vstack([q, waypoints])))
         steps_made = followed.ticks - 1
-        q, rest = followed.q, waypoints[ends > steps_made * session.model.step]
+        q, rest = followed.q, waypoints[ends > steps_made * exact.step]
     return tuple(paths)

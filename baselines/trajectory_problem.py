@@ -10,13 +10,14 @@ Here Δ_g is the change of the configuration on the way to goal g, q_g = q_0 + �
 configuration at goal g, h_g is the hand chosen for it, p_h is the position of hand h, c_g is the
 centre of the goal and r its radius. The cost f is one of::
 
-    path length          Σ_g l_g  with  |Δ_g|² <= l_g²
+    path length          Σ_g l_g  with  |W Δ_g|² <= l_g²
     squared displacement Σ_g |Δ_g|²
     acceleration         ∫ |d²q/dt²|² dt
     jerk                 ∫ |d³q/dt³|² dt
     hand jerk            ∫ |d³p/dt³|² + w |d³q/dt³|² dt
 
-The l_g are bounds on the lengths of the segments, which are variables, and w is ``JOINT_WEIGHT``.
+The l_g are bounds on the lengths of the segments, which are variables. W multiplies the base's
+coordinates by their weight in the motion model, and w is ``JOINT_WEIGHT``.
 The last three costs are integrals over a movement from rest to rest. The durations between goals
 are free, and their sum is constant.
 
@@ -47,8 +48,9 @@ from numpy.typing import NDArray
 
 from coartic.baselines.posture_graph import KINEMATICS
 from coartic.method import Information
-from coartic.motion.movement import segment_lengths
-from coartic.robot import HANDS, Array, Hand, Robot
+from coartic.model import MotionModel
+from coartic.motion.doors import scale_base, segment_lengths
+from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
 
 MODEL_BASED = KINEMATICS | {Information.KINEMATIC_MODEL}
@@ -169,6 +171,8 @@ class PathPlan:
     ``(derivatives, G + 1, dof)``. Without rates ``derivatives`` is 0."""
     spent: dict[str, int] = field(default_factory=dict)
     """Counters of the solver, as keywords for ``Session.spend``."""
+    base_weight: float = 1.0
+    """Weight of the base in the length of a movement (:class:`.MotionModel`)."""
 
     def lengths(self) -> Array:
         """Return the straight joint-space distances from start to goal 1 and from goal to goal.
@@ -176,18 +180,27 @@ class PathPlan:
         Returns
         -------
         ndarray, shape (G,)
-            Distances, in a mix of length units and rad. They are straight even if the plan is
-            curved.
+            Distances with the weight of the base, in a mix of length units and rad. They are
+            straight even if the plan is curved.
         """
-        return segment_lengths(np.vstack([self.instance.q0, self.configurations]))
+        model = MotionModel(base_weight=self.base_weight)
+        return segment_lengths(np.vstack([self.instance.q0, self.configurations]), model)
 
 
 class TrajectoryProblem:
     """Compiled programme of a cost, for all tasks with one robot, hands and number of goals."""
 
-    def __init__(self, robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        hands: tuple[Hand, ...],
+        goals: int,
+        cost: Cost,
+        base_weight: float = 1.0,
+    ) -> None:
         import casadi  # slow to import, and most commands do not need it
 
+        self._model = MotionModel(base_weight=base_weight)
         self._dof, self._goals, self._cost = robot.dof, goals, cost
         self._order = _RATES.get(cost, 0)
         dof, order = robot.dof, self._order
@@ -214,7 +227,11 @@ class TrajectoryProblem:
             limits.append(casadi.sumsqr(position - centres[:, g]) - (rim - deep[g] * depth) ** 2)
         if cost == "path-length":
             # min Σ l subject to |Δ|² <= l², which is smooth where the norm of Δ is not.
-            limits += [casadi.sumsqr(steps[:, g]) - lengths[g] ** 2 for g in range(goals)]
+            weighted = steps
+            if base_weight != 1.0:
+                weights_of = [base_weight] * BASE_DOF + [1.0] * (dof - BASE_DOF)
+                weighted = casadi.diag(casadi.DM(weights_of)) @ steps
+            limits += [casadi.sumsqr(weighted[:, g]) - lengths[g] ** 2 for g in range(goals)]
             objective = weights[0] * casadi.sum1(lengths) - weights[1] * depth
         else:
             ends = [[(r[:, g], r[:, g + 1]) for r in rates] for g in range(goals)]
@@ -285,7 +302,7 @@ class TrajectoryProblem:
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
         steps[instance.held] = 0.0
         free = np.where(instance.held, 0.0, np.inf).ravel()
-        distances = np.sqrt((steps**2).sum(axis=1))
+        distances = np.sqrt((scale_base(steps, self._model) ** 2).sum(axis=1))
         # Start, lower bound and upper bound of each variable.
         initial, lower, upper = bounds = np.zeros((3, at["rates"].stop))
         bounds[:, at["steps"]] = steps.ravel(), -free, free
@@ -343,6 +360,7 @@ class TrajectoryProblem:
                 "hessians": statistics.get("n_call_nlp_hess_l", 0),
                 "solver_iterations": statistics["iter_count"],
             },
+            base_weight=self._model.base_weight,
         )
 
 
@@ -426,11 +444,14 @@ def _hand_jerks(
 
 @lru_cache(maxsize=32)
 def trajectory_problem(
-    robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost
+    robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost, base_weight: float = 1.0
 ) -> TrajectoryProblem:
-    """Return the compiled problem; a process caches the 32 problems that it used last."""
+    """Return the compiled problem; a process caches the 32 problems that it used last.
+
+    ``base_weight`` is the weight of the base in path length (:class:`.MotionModel`).
+    """
     with _ONE_AT_A_TIME:
-        return TrajectoryProblem(robot, hands, goals, cost)
+        return TrajectoryProblem(robot, hands, goals, cost, base_weight)
 
 
 def spline(plan: PathPlan, samples: int) -> list[Array]:

@@ -16,7 +16,7 @@ from pydantic import Field
 from coartic.method import TRIALS, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import explored_joints
 from coartic.motion.solution import Movement, movements_of
-from coartic.motion.trial import Trials
+from coartic.motion.trials import Trials
 from coartic.robot import Array
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from coartic import Movement, Task
 from coartic.baselines.trajectory_problem import Instance, PathPlan, TrajectoryProblem
 from coartic.method import Session
-from coartic.motion.movement import move
+from coartic.motion.doors import move, scale_base
 from coartic.robot import Array
 
 MOST_ROUNDINGS = 64  # roundings of a plan that are tried; up to seven goals have no more
@@ -238,7 +238,7 @@ def movements(
     tuple of Movement
     """
     planned: list[Movement] = []
-    q, model = np.array(task.q0), session.model
+    q, model = np.array(task.q0), session.model.without_noise()
     for goal, hand in enumerate(instance.hands):
         wanted = np.where(instance.held[goal], q, configurations[goal])
         if steps is not None and not steps[goal]:
@@ -246,7 +246,8 @@ def movements(
             continue
         targets = [wanted]
         if steps is not None:
-            beyond = model.step / max(float(np.linalg.norm(wanted - q)), model.step)
+            length = float(np.linalg.norm(scale_base(wanted - q, model)))
+            beyond = model.step / max(length, model.step)
             through = (q + (wanted - q) * (1.0 + k * beyond) for k in _BEYOND)
             targets = [*through, wanted]
         for target in targets:

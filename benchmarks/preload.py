@@ -6,7 +6,7 @@ while its parent ends does not print a traceback. :func:`show_errors` connects t
 
 import os
 
-from coartic.motion.compile import import_numba
+from coartic.motion.kernels.compile import import_numba
 
 import_numba()
 _ERRORS = os.dup(2)

@@ -23,7 +23,7 @@ from coartic.benchmarks.pool import process_pool
 from coartic.benchmarks.processes import CONTEXT
 from coartic.internal.text import LONGEST_LINE, plain
 from coartic.internal.threads import threads_for, worker_variables
-from coartic.motion.compile import PACKAGE, hash_of_files, python_files
+from coartic.motion.kernels.compile import PACKAGE, hash_of_files, python_files
 
 _LIBRARIES = ("casadi", "daqp", "llvmlite", "numba", "numpy", "pandas", "pydantic", "scipy")
 """Libraries that results may depend on."""

@@ -9,8 +9,7 @@ import numpy as np
 
 from coartic.benchmarks.provenance import current_environment, now
 from coartic.internal.text import LONGEST_REASON, plain
-from coartic.motion.noise import execute_noisy
-from coartic.motion.solution import Execution, other_arm_travel
+from coartic.motion.execution import Execution, execute_noisy, other_arm_travel
 from coartic.runs.plan import Job
 from coartic.runs.record import (
     MOTOR_NOISE,

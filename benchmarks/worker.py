@@ -28,7 +28,7 @@ from coartic.method import (
     UndeclaredError,
     outline_of,
 )
-from coartic.motion.trial import trials_outside
+from coartic.motion.trials import trials_outside
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job
 from coartic.runs.record import PARTS, Outcome, Times, movement_data, movement_from

@@ -23,18 +23,16 @@ if TYPE_CHECKING:
     from coartic.method import BudgetError, MethodError, UndeclaredError
     from coartic.method.optimisers import Objective, Optimiser, objective
     from coartic.model import PAPER, MotionModel
-    from coartic.motion.correction import Correction, correct
-    from coartic.motion.movement import MoveResult, move
-    from coartic.motion.noise import execute_noisy
-    from coartic.motion.solution import (
+    from coartic.motion.doors import Correction, MoveResult, correct, move
+    from coartic.motion.execution import (
         Execution,
-        Movement,
         corrective_trial,
         execute,
+        execute_noisy,
         hand_sequences,
         initial_hands,
-        movements_of,
     )
+    from coartic.motion.solution import Movement, movements_of
     from coartic.pictures.trajectories import Trajectory, trajectory
     from coartic.robot import Arm, Hand, Robot
     from coartic.tasks.catalogue import builtin_tasks, load_task
@@ -98,13 +96,12 @@ _HOMES = {
     "learner.learning_run": ("LearningRun",),
     "method": ("BudgetError", "MethodError", "UndeclaredError"),
     "model": ("PAPER", "MotionModel"),
-    "motion.correction": ("Correction", "correct"),
-    "motion.movement": ("MoveResult", "move"),
-    "motion.noise": ("execute_noisy",),
-    "motion.solution": (
-        *("Execution", "Movement", "corrective_trial", "execute"),
-        *("hand_sequences", "initial_hands", "movements_of"),
+    "motion.doors": ("Correction", "MoveResult", "correct", "move"),
+    "motion.execution": (
+        *("Execution", "corrective_trial", "execute", "execute_noisy"),
+        *("hand_sequences", "initial_hands"),
     ),
+    "motion.solution": ("Movement", "movements_of"),
     "method.optimisers": ("Objective", "Optimiser", "objective"),
     "robot": ("Arm", "Hand", "Robot"),
     "tasks.catalogue": ("builtin_tasks", "load_task"),

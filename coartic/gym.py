@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import pickle
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
 from pathlib import Path
@@ -27,10 +27,19 @@ from coartic.estimates import Estimate, mean
 from coartic.internal.limits import MOST_CELLS, brief_value, check_limits, real_array
 from coartic.method import Method, MethodError, run_method
 from coartic.method.optimisers import FAILED
-from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion.batch import robot_parameters
-from coartic.motion.solution import execute, initial_reward
-from coartic.motion.trial import ALL_STOP, Requests, count_trials, reach
+from coartic.model import PAPER, MotionModel, model_from, same_world
+from coartic.motion.execution import execute, execute_noisy, initial_hands, initial_reward
+from coartic.motion.solution import Movement, corrective_movements, next_action
+from coartic.motion.trials import (
+    JUDGE,
+    NO_NOISE,
+    CompiledTask,
+    compiled_task,
+    count_trials,
+    reach_next,
+    world_seed,
+    worlds_of,
+)
 from coartic.robot import HANDS, LARGEST_FIGURE, Array
 from coartic.tasks.catalogue import as_task, builtin_tasks
 from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
@@ -46,6 +55,8 @@ except ImportError:
 
 REACH = 0.5
 """Half width of the box of targets, in length units (base) and rad (angles)."""
+JUDGED = 100
+"""Number of draws of the motor noise by which :func:`score` judges in a world with noise."""
 IDS: dict[str, dict[str, Any]] = {
     f"coartic/{name.title().replace('-', '')}-v2": {"task": name} for name in builtin_tasks()
 } | {"coartic/Task-v2": {}}
@@ -64,7 +75,8 @@ class TaskEnv(gymnasium.Env):
     An episode is a trial. A step reaches for the next goal, so a trial has at most as many steps as
     there are goals. The reward of a step is minus the number of its ticks. If the corrective
     process fails, the reward is -1,000,000 and the trial ends. Trials are never truncated. Nothing
-    is random except the draw of an instance of a family.
+    is random except the draw of an instance of a family, and the motor noise of a model that has
+    it: ``reset(seed=n)`` begins draw 0 of the noise of seed n, ``reset()`` the next draw.
 
     Parameters
     ----------
@@ -81,8 +93,9 @@ class TaskEnv(gymnasium.Env):
         Year of the fresh instances, such as 2027.
     ahead : int
         Number of goals in view after the next goal.
-    model : MotionModel
-        Constants of movement.
+    model : MotionModel or dict
+        The world: constants of movement, or a dict of those that differ from the paper's, such as
+        ``{"motor_noise": 0.01}``.
     render_mode : {"rgb_array"}, optional
         ``"rgb_array"`` to make :meth:`render` return pictures.
 
@@ -128,13 +141,13 @@ class TaskEnv(gymnasium.Env):
         count: int | None = None,
         year: int | None = None,
         ahead: int = 1,
-        model: MotionModel = PAPER,
+        model: MotionModel | Mapping[str, Any] = PAPER,
         render_mode: str | None = None,
     ) -> None:
         check_limits("ahead", ahead, 0, MOST_GOALS)
+        self.model, self.render_mode = model_from(model), render_mode
         instances = {"split": split, "count": count, "year": year}
-        self.options = {"task": task, "ahead": ahead, "model": check_model(model)} | instances
-        self.model, self.render_mode = model, render_mode
+        self.options = {"task": task, "ahead": ahead, "model": self.model} | instances
         self.tasks: list[Task | str]  # tasks, or names of instances
         if _is_family(task):
             family = load_family(str(task))
@@ -158,6 +171,10 @@ class TaskEnv(gymnasium.Env):
         self.observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
         self.action_space = Box(-1.0, 1.0, (len(hands) - 1 + joints,), np.float32)
         self.number, self.going = -1, False
+        self.world = 0
+        """Seed of the motor noise."""
+        self.draw = -1
+        """Number of the draw of the noise in this trial, from 0; -1 before the first trial."""
         self.outcome = np.nan
         """Total reward of the last trial that ended (in ticks); NaN if it failed or took 1,000,000
         ticks or more."""
@@ -170,8 +187,8 @@ class TaskEnv(gymnasium.Env):
         Parameters
         ----------
         seed : int, optional
-            Seed of the generator that draws instances. By default the generator is not seeded
-            again.
+            Seed of the generator that draws instances, and of the motor noise, which begins with
+            draw 0. By default neither is seeded again, and the trial meets the next draw.
         options : dict, optional
             ``{"task": k}`` begins a trial of instance k of a family, from 0. By default the
             instance is drawn.
@@ -190,6 +207,9 @@ class TaskEnv(gymnasium.Env):
             The option or the instance does not exist.
         """
         super().reset(seed=seed)
+        if seed is not None or self.draw < 0:
+            self.world, self.draw = world_seed(max(int(self.np_random_seed), 0)), -1
+        self.draw += 1
         drawn, options = self.np_random.integers(len(self.tasks)), {**(options or {})}
         number = options.pop("task", drawn)
         check_limits("options['task']", number, 0, len(self.tasks) - 1)
@@ -250,14 +270,17 @@ class TaskEnv(gymnasium.Env):
         target = (q if (posture := postures[hand]) is None else posture).tolist()
         for joint, entry in self._moves:
             target[joint] += REACH * min(max(entries[entry], -1.0), 1.0)
-        targets = self._no_targets[:, : len(self._goals) - self.goal].copy()
+        # With noise the postures at the next goal are sought on their own, without it.
+        reached = 1 if self.model.motor_noise > 0.0 else len(self._goals) - self.goal
+        targets = self._no_targets[:, :reached].copy()
         targets[0, 0, 0] = target
-        account, *next_account = self._reach(hand, targets)
+        account, *next_account = self._reach(self._compiled, hand, targets)
         self.q, hit = account["q"][:dof].copy(), account["hit"].item()
         self.goal += hit
         self.going = hit and self.goal < len(self._goals)
         if self.going:
-            self._found = next_account + self._reached_by(range(1, len(self._sides)))
+            rest = range(len(next_account), len(self._sides))
+            self._found = next_account + self._reached_by(rest)
         reward = -float(account["ticks"].item() if hit else FAILED)
         self._total += reward
         if not self.going:
@@ -291,7 +314,8 @@ class TaskEnv(gymnasium.Env):
     def _load(self, number: int) -> None:
         """Prepare trials of the task with index ``number``."""
         self.tasks[number] = task = as_task(self.tasks[number])
-        check_model(self.model, radius=task.radius)
+        self._compiled = compiled_task(task, self.model, checks=False)
+        self._exact = compiled_task(task, self.model.without_noise(), checks=False)
         self.task, self.number, self._goals = task, number, task.goal_array
         indices = {name: k for k, name in enumerate(task.robot.joint_names)}
         locked = [f"base_{axis}" for axis in task.locked_base]
@@ -306,28 +330,27 @@ class TaskEnv(gymnasium.Env):
         sides = [HANDS.index(hand) for hand in task.hands]
         self._sides = [np.array([[side, sides[0]]]) for side in sides]
         self._no_targets = np.full((1, 2, 1, task.robot.dof), np.nan)
-        self._parameters = robot_parameters(
-            task.robot, task.radius, locked_base=task.locked_base, model=self.model, checks=False
-        )
         self.q, self.goal = task.q0.copy(), 0
         self._found_at_start = self._reached_by(range(len(sides)))
 
-    def _reach(self, hand: int, targets: Array) -> NDArray[np.void]:
+    def _reach(self, compiled: CompiledTask, hand: int, targets: Array) -> NDArray[np.void]:
         """Reach for the next goal with a hand, and perhaps for the goal after it.
 
-        ``hand`` is the index of a hand in ``task.hands``. ``targets`` has shape ``(1, goals, 1,
-        dof)``, for one or two goals; without a target (NaN) only the corrective process moves the
-        arm. The first hand of the task reaches for the second goal. Return an account for each
-        goal. Both movements are made in one call, because each call is slow.
+        ``compiled`` is the task with or without noise, and ``hand`` the index of a hand in
+        ``task.hands``. ``targets`` has shape ``(1, goals, 1, dof)``, for one or two goals; without
+        a target (NaN) only the corrective process moves the arm. The first hand of the task reaches
+        for the second goal. Return an account for each goal. Both movements are made in one call,
+        because each call is slow.
         """
-        goals = self._goals[None, self.goal : self.goal + targets.shape[1]]
-        arms = Requests(self.q[None], self._sides[hand], targets, ALL_STOP, goals)
-        return reach(self.task.robot, arms, self._parameters).goals[0, :, 0]
+        sides = self._sides[hand][:, : targets.shape[1]]
+        noisy = compiled.model.motor_noise > 0.0
+        worlds = worlds_of(self.world, self.draw) if noisy else NO_NOISE
+        return reach_next(compiled, self.q[None], sides, targets, self.goal, worlds).goals[0, :, 0]
 
     def _reached_by(self, hands: range) -> list[Any]:
         """Return the account of each hand if only the corrective process reaches for the next
-        goal."""
-        return [self._reach(hand, self._no_targets[:, :1])[0] for hand in hands]
+        goal, without noise."""
+        return [self._reach(self._exact, hand, self._no_targets[:, :1])[0] for hand in hands]
 
     def _seen(self) -> NDArray[np.float32]:
         q, goals = self.q.tolist(), self._goals[self.goal :][: self._view].tolist()
@@ -437,7 +460,7 @@ def score(
         A row for each policy, for uniformly random actions, for the corrective process with the
         initial hands of each task, and for the best known solution. Columns:
 
-        - ``reward``: mean over tasks (in ticks);
+        - ``reward``: mean over tasks (in ticks), in a model with motor noise over 100 draws;
         - ``gap``: difference from the best known reward as a share of it, mean over the tasks whose
           best reward is known;
         - ``gap_low``, ``gap_high``: 95 % interval of the gap (BCa bootstrap) over tasks, or over
@@ -461,6 +484,12 @@ def score(
         normalised twice.
     OSError
         The file of ``vec_normalize`` cannot be read.
+
+    Notes
+    -----
+    In a model with motor noise each row is judged by the same 100 draws of each task, in which
+    nobody has practised, random actions included. Planners and the corrective process are executed
+    as :func:`coartic.execute_noisy` does. In models other than the paper's no best reward is known.
 
     Warns
     -----
@@ -506,21 +535,33 @@ def score(
     if isinstance(vec_normalize, str | Path):
         vec_normalize = pickle.loads(Path(vec_normalize).read_bytes())
     rewards: dict[str, Any] = {}
+    draws = JUDGED if setting.model.motor_noise > 0.0 else 1
     for name, agent in policies.items():
         if isinstance(agent, Method):
-            rewards[name] = [[_reward_of(agent, task, seed, setting.model)] for task in tasks]
+            rewards[name] = [_rewards_of(agent, task, seed, setting.model) for task in tasks]
         elif agent is not None and wrappers:
             act = _actions_of(agent, env, wrappers, vec_normalize)
-            rewards[name] = [[_wrapped_trial(act, env, n, seed)] for n in range(len(tasks))]
+            rewards[name] = [
+                [_wrapped_trial(act, env, n, seed, draw) for draw in range(draws)]
+                for n in range(len(tasks))
+            ]
         elif agent is not None:
             act = _actions_of(agent, setting, [], vec_normalize)
-            rewards[name] = _trials(act, setting)
+            rewards[name] = _trials(act, setting, draws, seed)
     rng, shape = np.random.default_rng(seed), setting.action_space.shape
     rewards["random actions"] = _trials(
-        lambda seen: rng.uniform(-1, 1, (len(seen), *shape)), setting, episodes
+        lambda seen: rng.uniform(-1, 1, (len(seen), *shape)),
+        setting,
+        draws if setting.model.motor_noise > 0.0 else episodes,
+        seed,
     )
-    rewards["corrective process"] = [[initial_reward(task, setting.model)] for task in tasks]
-    optima = [best_shipped(task) if setting.model == PAPER else None for task in tasks]
+    rewards["corrective process"] = [
+        _corrective_rewards(task, seed, setting.model) for task in tasks
+    ]
+    optima = [
+        best_shipped(task) if same_world(setting.model, PAPER, task.radius) else None
+        for task in tasks
+    ]
     rewards["best known"] = [[None if optimum is None else optimum.reward] for optimum in optima]
     return _table({name: np.array(values, np.float64) for name, values in rewards.items()})
 
@@ -620,14 +661,18 @@ def _actions_of(
     return lambda seen: policy.predict(see(seen), deterministic=True)[0]
 
 
-def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int = 1) -> Array:
+def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int, seed: int) -> Array:
     """Make trials side by side on each task of an environment.
 
-    ``act`` returns actions ``(n, A)`` for observations ``(n, O)``. The result, shape ``(tasks,
-    trials)``, has the total rewards (in ticks), and NaN for trials that failed.
+    ``act`` returns actions ``(n, A)`` for observations ``(n, O)``. Trial k of a task meets draw k
+    of the judge's noise. The result, shape ``(tasks, trials)``, has the total rewards (in ticks),
+    and NaN for trials that failed.
     """
     robots = [copy(setting) for _ in range(trials * len(setting.tasks))]
-    seen = [robot.reset(options={"task": n // trials})[0] for n, robot in enumerate(robots)]
+    seen = []
+    for n, robot in enumerate(robots):
+        seen.append(robot.reset(options={"task": n // trials})[0])
+        robot.world, robot.draw = world_seed(seed, JUDGE), n % trials
     while going := [n for n, robot in enumerate(robots) if robot.going]:
         actions = np.asarray(act(np.array([seen[n] for n in going])))
         if len(actions) != len(going):
@@ -640,8 +685,12 @@ def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int = 1) 
     return np.reshape([robot.outcome for robot in robots], (-1, trials))
 
 
-def _wrapped_trial(act: Callable[[Any], ArrayLike], env: Any, number: int, seed: int) -> float:
+def _wrapped_trial(
+    act: Callable[[Any], ArrayLike], env: Any, number: int, seed: int, draw: int
+) -> float:
     """Make one trial in a wrapped environment, and return its total reward (in ticks).
+
+    The trial meets draw ``draw`` of the judge's noise.
 
     ``act`` maps observations ``(N, O)`` to actions ``(N, A)``. In a vector environment the first
     environment makes the trial. The result is NaN if the trial failed or was truncated. ``number``
@@ -660,6 +709,7 @@ def _wrapped_trial(act: Callable[[Any], ArrayLike], env: Any, number: int, seed:
             raise TypeError(
                 "a wrapper of env does not pass the options of reset to the environment"
             )
+        inner.world, inner.draw = world_seed(seed, JUDGE), draw
         inner.outcome, ended = np.nan, False
         while not ended:
             actions = np.asarray(act(np.asarray(seen)[None] if is_one else seen))
@@ -687,12 +737,33 @@ def _not_learning(env: Any) -> Iterator[None]:
             setattr(layer, name, value)
 
 
-def _reward_of(method: Method, task: Task, seed: int, model: MotionModel) -> float | None:
-    """Return the reward of a method's solution of a task; None if it finds no valid solution."""
+def _rewards_of(method: Method, task: Task, seed: int, model: MotionModel) -> Any:
+    """Return the rewards of a method's solution of a task, one for each draw of the noise.
+
+    Without noise there is one reward. A reward is NaN if no valid solution is found, or if an
+    execution fails.
+    """
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)
-        return execute(task, result.solution, model=model).reward
-    return None
+        return _judged(task, result.solution, seed, model)
+    return [np.nan] * (JUDGED if model.motor_noise > 0.0 else 1)
+
+
+def _corrective_rewards(task: Task, seed: int, model: MotionModel) -> Any:
+    """Return the rewards of the corrective process with a task's initial hands, as
+    :func:`_rewards_of` does."""
+    with suppress(NotApplicableError):
+        movements = corrective_movements(initial_hands(task, model=model))
+        return _judged(task, movements, seed, model)
+    return [np.nan] * (JUDGED if model.motor_noise > 0.0 else 1)
+
+
+def _judged(task: Task, solution: Sequence[Movement], seed: int, model: MotionModel) -> Any:
+    """Return the rewards of a solution, one for each draw of the noise; one without noise."""
+    if model.motor_noise == 0.0:
+        return [execute(task, solution, model=model).reward]
+    noise, exact = model.motor_noise, model.without_noise()
+    return -execute_noisy(task, [next_action(solution)], noise, JUDGED, seed, exact)[0]
 
 
 def _table(rewards: Mapping[str, Array]) -> pd.DataFrame:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple, get_args
 
 from coartic.internal.limits import brief_value, check_limits
 
@@ -11,6 +12,10 @@ MODEL_VERSION = 1
 scoring. Every change of the code that changes results raises this number."""
 PAPER_RADIUS = 0.1
 """θ^g of the paper's tasks (in length units)."""
+Norm = Literal["euclidean", "maximum"]
+WORLD = ("motor_noise", "norm", "base_weight")
+"""Constants of the *world*: what a movement costs, and how well it ends where it aims. The others
+belong to the rules of the paper's robot."""
 
 
 class MotionModel(NamedTuple):
@@ -43,6 +48,21 @@ class MotionModel(NamedTuple):
     """Largest number of iterations of the corrective process for a goal (our bound). A trial that
     needs more fails."""
 
+    motor_noise: float = 0.0
+    """s: standard deviation of the distance by which a movement misses its target, in length units
+    (base) and rad (joints). The paper's robot has none. ``docs/model.md`` has the rule."""
+
+    norm: Norm = "euclidean"
+    """Norm of joint space in which a step has the length ``step``:
+
+    - ``"euclidean"`` (published);
+    - ``"maximum"``: the coordinate that moves farthest moves by ``step``."""
+
+    base_weight: float = 1.0
+    """w: a length unit of the base counts as much as w rad of a joint in the length of a movement.
+    Only the price of moving the base changes: exploration, corrective process and tolerances do
+    not."""
+
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
         """Return a copy with the tolerances for goals of a given radius.
 
@@ -64,6 +84,24 @@ class MotionModel(NamedTuple):
             tenth if correction is None else correction,
         )
 
+    def without_noise(self) -> MotionModel:
+        """Return a copy in which movements end where they aim."""
+        return self if self.motor_noise == 0.0 else self._replace(motor_noise=0.0)
+
+    def stored(self, radius: float) -> dict[str, Any]:
+        """Return the constants for goals of ``radius`` (in length units) by name, as files have
+        them.
+
+        Constants of the world are left out if they are the paper's, so that ids of runs do not
+        change when a constant is added.
+        """
+        constants = self.for_radius(radius)._asdict()
+        return {
+            name: value
+            for name, value in constants.items()
+            if name not in WORLD or value != MotionModel._field_defaults[name]
+        }
+
 
 PAPER = MotionModel()
 _BOUNDS = {
@@ -72,6 +110,8 @@ _BOUNDS = {
     "gain": (1e-6, 1e6),
     "correction_tolerance": (1e-6, 1e6),
     "max_iterations": (0, 10**9),
+    "motor_noise": (0.0, 100.0),
+    "base_weight": (1e-6, 1e6),
 }
 
 
@@ -98,6 +138,10 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
         value = getattr(model, name)
         if value is not None or not name.endswith("_tolerance"):
             check_limits(f"model.{name}", value, least, largest)
+    if model.norm not in get_args(Norm):
+        raise ValueError(
+            f"model.norm is {brief_value(model.norm)}; it must be 'euclidean' or 'maximum'"
+        )
     if radius is not None and (model.correction_tolerance or 0.0) >= radius:
         raise ValueError(
             f"model.correction_tolerance is {model.correction_tolerance}; it must be below the "
@@ -105,3 +149,50 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
             "stands for a tenth of the radius)"
         )
     return model
+
+
+def check_exact(model: MotionModel, *, radius: float | None = None) -> MotionModel:
+    """Check a model for a function that draws no random numbers, and return it unchanged.
+
+    Raises the errors of :func:`check_model` and of :func:`refuse_noise`.
+    """
+    refuse_noise(check_model(model, radius=radius))
+    return model
+
+
+def refuse_noise(model: MotionModel) -> None:
+    """Raise ValueError if a model has motor noise, for functions that draw no random numbers."""
+    if model.motor_noise > 0.0:
+        raise ValueError(
+            f"model.motor_noise is {model.motor_noise:g}; it must be 0 here, because this function "
+            "draws no random numbers: call coartic.execute_noisy, or make trials in a session, an "
+            "objective or an environment"
+        )
+
+
+def model_from(constants: MotionModel | Mapping[str, Any]) -> MotionModel:
+    """Return the model whose constants are the paper's, except those in a mapping by name.
+
+    A MotionModel is checked and returned unchanged. Raises TypeError for another value, and
+    ValueError for an unknown constant or a value out of bounds.
+    """
+    if isinstance(constants, MotionModel) or not isinstance(constants, Mapping):
+        return check_model(constants)
+    if others := [name for name in constants if name not in MotionModel._fields]:
+        raise ValueError(
+            f"model has no constant {brief_value(others[0])}; it has "
+            f"{', '.join(MotionModel._fields)}"
+        )
+    return check_model(MotionModel(**constants))
+
+
+def same_world(first: MotionModel, second: MotionModel, radius: float) -> bool:
+    """Return whether two models are the same for goals of a radius (in length units)."""
+    return first.for_radius(radius) == second.for_radius(radius)
+
+
+def differences(model: MotionModel) -> dict[str, Any]:
+    """Return the constants of a model's world that are not the paper's, by name."""
+    return {
+        name: getattr(model, name) for name in WORLD if getattr(model, name) != getattr(PAPER, name)
+    }

@@ -35,6 +35,8 @@ Points = NDArray[np.float64]
 """Points in the plane, shape ``(..., 2)``: x and y in length units."""
 Hands = NDArray[np.int64]
 """Hands as indices in :data:`HANDS`: 0 left, 1 right."""
+LARGEST_ENTRY = 1e5
+"""Largest entry of a configuration or goal, in length units or rad."""
 LARGEST_FIGURE = 1e4  # largest number in a task or a robot, in length units or rad
 MOST_LINKS = 100  # of an arm
 Finite = Annotated[

@@ -10,7 +10,7 @@ from pkgutil import iter_modules
 import pytest
 
 import coartic
-from coartic.motion.compile import KERNEL_FILES
+from coartic.motion.kernels.compile import KERNEL_FILES
 from tests.support.processes import ROOT, python
 
 PACKAGES = ("coartic", "baselines", "benchmarks", "analysis")
@@ -103,6 +103,19 @@ def test_the_package_imports_what_is_asked_for():
     assert "dual-process/" in said
 
 
+def test_kernels_are_read_by_their_doors_alone():
+    """By the learner's kernel and posture-based planning besides, and by what sets Numba up."""
+    others = {
+        "coartic/learner/kernel.py", "coartic/learner/learning.py", "baselines/posture_based.py",
+        "benchmarks/preload.py", "benchmarks/provenance.py",
+    }  # fmt: skip
+    for path in sources():
+        relative = path.relative_to(ROOT).as_posix()
+        if not relative.startswith("coartic/motion/") and relative not in others:
+            names = {name for name in imported(path) if name.startswith("coartic.motion.kernels")}
+            assert not names, f"{relative} imports {names}: read a door of coartic.motion instead"
+
+
 def test_no_module_has_a_name_of_the_package():
     """It would hide what has its name."""
     assert not {module.name for module in iter_modules(coartic.__path__)} & {*coartic.__all__}
@@ -110,7 +123,7 @@ def test_no_module_has_a_name_of_the_package():
 
 def test_one_kinematic_module():
     """No cosine or sine is taken outside the robot, the functions handed to it, and the referee."""
-    home = {"coartic/robot.py", "coartic/motion/trigonometry.py", "analysis/verify.py"}
+    home = {"coartic/robot.py", "coartic/motion/kernels/trigonometry.py", "analysis/verify.py"}
     pattern = re.compile(r"\b(np|numpy|math|casadi|ca|cs)\.(cos|sin|tan|exp)\(|\b(cosine|sine)\(")
     for path in sources():
         if path.relative_to(ROOT).as_posix() not in home:
@@ -204,7 +217,7 @@ def test_the_hash_of_kernels_covers_the_files_that_they_consist_of_and_no_others
             assert files <= covered, (
                 f"kernel {name} of {path} reads {files - covered}: define kernels, and the numbers "
                 "that they read, in coartic/motion or coartic/learner, beside other kernels, or "
-                "add the file to KERNEL_FILES of coartic/motion/compile.py"
+                "add the file to KERNEL_FILES of coartic/motion/kernels/compile.py"
             )
     assert covered == needed, f"take {covered - needed} out of KERNEL_FILES: no kernel reads it"
 

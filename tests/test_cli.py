@@ -262,7 +262,7 @@ SETTINGS = """if True:
         main()
     except SystemExit:
         import matplotlib
-    from coartic.motion.compile import import_numba
+    from coartic.motion.kernels.compile import import_numba
     import_numba()
     with open(".numba_config.yaml", "w") as file:
         file.write("cache_dir: kept\\ndisable_jit: 1\\n")

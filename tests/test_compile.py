@@ -13,7 +13,7 @@ from tests.support.processes import ROOT, apart, forget
 pytestmark = pytest.mark.process
 
 KERNEL = """
-from coartic.motion.compile import entry, joint_lever
+from coartic.motion.kernels.compile import entry, joint_lever
 
 @entry
 def across(xs, ys):
@@ -66,8 +66,8 @@ def test_what_is_kept_follows_changes_and_survives_damage(tmp_path):
 
 SLOTS = """
 from coartic import Robot
-from coartic.motion.compile import entry, inner
-from coartic.motion.batch import batch_for
+from coartic.motion.kernels.compile import entry, inner
+from coartic.motion.kernels.slots import batch_for
 
 @inner
 def add_links(slots):

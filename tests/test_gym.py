@@ -9,10 +9,13 @@ import pytest
 
 import coartic
 from coartic import (
+    PAPER,
     MotionModel,
+    Movement,
     correct,
     corrective_trial,
     execute,
+    execute_noisy,
     initial_hands,
     load_task,
 )
@@ -22,7 +25,10 @@ from coartic.method.optimisers import FAILED
 from coartic.motion.solution import movements_of
 from coartic.tasks.optima import best_shipped
 from coartic.tasks.task import address_of
+from tests.support import reference
+from tests.support.noise import World
 from tests.support.strategies import tiny_task
+from tests.support.worlds import WORLDS, named
 
 gymnasium = pytest.importorskip("gymnasium")
 
@@ -45,9 +51,10 @@ def test_the_checkers_find_nothing(task, ahead):
     checker.check_env(gymnasium.make("coartic/Task-v2", task=task, ahead=ahead).unwrapped)
 
 
-def due_movement(task, q, goal, action, moves, links):
+def due_movement(task, q, goal, action, moves, links, model=PAPER):
     """The hand and the target that an action says, from what the documentation says."""
-    ends = {h: correct(task.robot, q, h, goal, locked_base=task.locked_base).q for h in task.hands}
+    how = {"locked_base": task.locked_base, "model": model}
+    ends = {hand: correct(task.robot, q, hand, goal, **how).q for hand in task.hands}
     nearer, *others = sorted(task.hands, key=lambda hand: np.linalg.norm(ends[hand] - q))
     hand = others[0] if others and action[0] > 0.5 else nearer
     target, entries = ends[hand].copy(), 0.5 * np.clip(action[len(others) :], -1, 1)
@@ -107,6 +114,52 @@ def test_a_trial_is_the_execution_of_its_targets(name, moves, ahead):
         assert len(hands) == len(task.goals)
         assert info == {"task": task.name, "is_success": True}
     assert len(locks) == (3 if name == MIXED else 1)
+
+
+@pytest.mark.parametrize("world", WORLDS, ids=named)
+def test_a_trial_in_any_world_is_that_of_the_slow_implementation(world):
+    """``reset(seed=n)`` begins draw 0 of the world of seed n, ``reset()`` the next one."""
+    world = world._replace(max_iterations=5000)
+    env, task, seen = TaskEnv("two-armed-2", model=world), load_task("two-armed-2"), []
+    for seed, draw in ((4, 0), (4, 1), (4, 2), (5, 0), (4, 0)):
+        env.reset(seed=None if draw else seed)
+        noise, q, hands, targets, rewards = World(world, seed, draw), task.q0, "", [], []
+        rng = np.random.default_rng(draw)
+        for goal in task.goals:
+            action = 0.1 * rng.uniform(-1, 1, env.action_space.shape)
+            hand, target = due_movement(task, q, goal, action, "xy", 4, world.without_noise())
+            hands, targets = hands + hand, [*targets, target]
+            _, reward, ended, _, _ = env.step(action)
+            rewards.append(reward)
+            so_far = task.model_copy(update={"goals": task.goals[: len(hands)]})
+            due = reference.execute(so_far, movements_of(hands, targets), world, noise)
+            if ended:
+                break
+            q = due.hits[-1]
+        assert sum(rewards) == due.reward or (due.reward is None and not env.outcome > -np.inf)
+        seen.append(sum(rewards))
+    assert seen[0] == seen[-1]
+    assert (len({*seen[:3]}) > 1) or world.motor_noise == 0.0
+
+
+def test_score_judges_100_draws():
+    """Of the same noise for all, in which nobody has practised."""
+    model = {"motor_noise": 0.02, "norm": "maximum"}
+    exact = MotionModel(norm="maximum")
+    rows = {"still": lambda seen: np.zeros((len(seen), 6)), "planner": ALONE[0]()}
+    table = score("coartic/Ascending-v2", rows, model=model, seed=3)
+    alone = [Movement(n, "right", "corrective") for n in (1, 2, 3)]
+    due = -execute_noisy("ascending", [alone], 0.02, 100, 3, exact).mean()
+    assert table.reward["corrective process"] == table.reward["planner"] == due
+    assert table.completed["still"] == 1.0
+    assert table.reward["still"] != due  # it aims, and is corrected where it misses
+    assert np.isnan(table.reward["best known"])
+    again = score("coartic/Ascending-v2", rows, model=model, seed=3)
+    pd.testing.assert_frame_equal(table, again)
+    by_id = gymnasium.make("coartic/Ascending-v2", model=model)
+    assert by_id.unwrapped.model == MotionModel(**model)
+    with pytest.raises(ValueError, match="model has no constant 'sd'"):
+        TaskEnv("ascending", model={"sd": 0.1})
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from coartic import (
 from coartic.learner.conditions import EVERY_CONDITION
 from coartic.learner.method import METHODS
 from coartic.method import Information, Session
-from coartic.motion.batch import SLOTS
+from coartic.motion.kernels.slots import SLOTS
 from coartic.robot import HANDS, Robot
 from tests.support import reference
 from tests.support.strategies import (
@@ -40,6 +40,7 @@ from tests.support.strategies import (
     uneven_task,
 )
 from tests.support.suites import suite_of
+from tests.support.worlds import WORLDS, named
 
 
 def _tenths(values):
@@ -91,6 +92,12 @@ def assert_equals_reference(task, condition, trials, seed=11, model=SOON_FAILED,
     best = slow.rewards[slow.completed].max(initial=-(10**9)) if slow.completed.any() else None
     assert fast.reward == (replayed if condition.learned == "replay" else best)
     return slow
+
+
+@pytest.mark.parametrize("world", WORLDS, ids=named)
+@pytest.mark.parametrize(("name", "condition"), [("ascending", "EC1"), ("two-armed-2", "EC4")])
+def test_equals_the_loop_in_every_world(name, condition, world):
+    assert_equals_reference(load_task(name), CONDITIONS[condition], 6, model=world)
 
 
 def shown(movements):

@@ -1,15 +1,31 @@
 """Sessions: what a method is told, what is taken and refused, and what is counted."""
 
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 
 import numpy as np
 import pytest
 
-from coartic import Movement, corrective_trial, load_task
-from coartic.method import BudgetError, Information, Session, UndeclaredError
+from coartic import (
+    MotionModel,
+    Movement,
+    NotApplicableError,
+    corrective_trial,
+    execute,
+    load_task,
+)
+from coartic.method import (
+    MODULES,
+    BudgetError,
+    Information,
+    Session,
+    UndeclaredError,
+    outline_of,
+    run_method,
+)
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.motion.solution import movements_of
-from tests.support.strategies import make_trials, sample
+from tests.support.strategies import make_trials, sample, tiny_task
 
 BLIND = frozenset({Information.REWARD_BY_TRIAL})
 
@@ -108,3 +124,46 @@ def test_a_session_is_shared_by_threads():
     with ThreadPoolExecutor(8) as pool:
         rewards = [*pool.map(work, range(300))]
     assert rewards.count(-319) == session.meter.trials == len(session.rewards) == 100
+
+
+METHODS = {method.name: method for name in MODULES for method in import_module(name).METHODS}
+ANY_WORLD = [MotionModel(motor_noise=0.01), MotionModel(norm="maximum"), MotionModel(base_weight=4)]
+REFUSED = {  # how many of these three worlds a method refuses
+    "dual-process/EC4": 0, "dual-process/EC4-informed": 0, "cma-es/bandit": 0, "random-search": 0,
+    "corrective-alone/best-hands": 0, "optimum/search": 1, "receding-horizon": 1,
+    "trajectory-optimisation/path-length": 1, "trajectory-optimisation/jerk": 2,
+    "nullspace-qp/least-motion": 2, "posture-based/one-goal": 2, "posture-qp/current-goal": 2,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_method_refuses_worlds_whose_lengths_it_does_not_know(name):
+    """Noise is no reason to refuse; a planner that counts the paper's lengths would be wrong."""
+    reasons = [METHODS[name].refuses(model) for model in ANY_WORLD]
+    assert reasons[0] is None
+    assert sum(reason is not None for reason in reasons) == REFUSED[name]
+    for reason, constant in zip(reasons, ("motor_noise", "norm", "base_weight"), strict=True):
+        assert reason is None or f"model.{constant} is " in reason
+
+
+def test_a_planner_that_counts_lengths_itself_is_not_run_in_another_world():
+    method = METHODS["posture-based/one-goal"]()
+    with pytest.raises(NotApplicableError, match="model.base_weight is 4; .* leave the constant"):
+        run_method(method, "ascending", model=MotionModel(base_weight=4))
+    with pytest.raises(ValueError, match="model.norm is 'taxi'; it must be 'euclidean' or"):
+        run_method(method, "ascending", model=MotionModel(norm="taxi"))
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_solves_a_task_in_noise(name):
+    """A planner by its own computations, without noise; any other by noisy trials."""
+    method = METHODS[name]
+    parameters = dict(method.quick)
+    if "trials" in method.Parameters.model_fields:
+        parameters["trials"] = 60
+    task = tiny_task(goals=[[4.0, 1.0], [3.5, 1.5]])
+    made = method(method.Parameters(**parameters))
+    if made.why_not(outline_of(task)) is None:
+        result, session = run_method(made, task, model=MotionModel(motor_noise=0.01))
+        assert execute(task, result.solution).completed
+        assert session.model.motor_noise == 0.01

@@ -23,10 +23,10 @@ from coartic import (
 )
 from coartic.baselines.corrective_alone import BestHands
 from coartic.method import MethodError, Session
-from coartic.motion.compile import chain_by, entry, joint_lever
-from coartic.motion.correction import project
-from coartic.motion.movement import clear_steps, largest_square
-from coartic.motion.trigonometry import cosine, sine
+from coartic.motion.kernels.compile import chain_by, entry, joint_lever
+from coartic.motion.kernels.correct import project
+from coartic.motion.kernels.move import clear_steps, largest_square
+from coartic.motion.kernels.trigonometry import cosine, sine
 from coartic.robot import HANDS
 from tests.support import reference
 from tests.support.strategies import TIED, UNEVEN, configurations

@@ -1,11 +1,14 @@
 """The search for the optimum: what is shipped is found again."""
 
+import numpy as np
 import pytest
 
-from coartic import load_task
+from coartic import MotionModel, execute, load_task
 from coartic.baselines.optimum import OptimumSearch, with_locks
+from coartic.baselines.receding_horizon import RecedingHorizon
+from coartic.baselines.trajectory_optimisation import PathLength
 from coartic.method import MethodError
-from coartic.motion.solution import other_arm_travel
+from coartic.motion.execution import other_arm_travel
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, solve, tiny_task
 
@@ -50,3 +53,19 @@ def test_a_hand_that_is_there_already_saves_a_tick():
     assert execution.hands == "RL"
     assert execution.ticks_by_goal()[1] == 0
     assert execution.corrections == 0
+
+
+@pytest.mark.parametrize("method", [OptimumSearch, PathLength, RecedingHorizon])
+def test_shortest_paths_are_those_of_the_world(method):
+    """Where the base is dear it moves less, and each world's plan is the better one there."""
+    task = tiny_task(goals=[[5.0, 1.0], [4.0, -1.5]], hands=["right"])
+    few = {"graphs": 1, "chains": 2, "nodes": 40}
+    worlds = [MotionModel(base_weight=weight, motor_noise=0.01) for weight in (0.25, 4.0)]
+    solutions = [solve(method, task, model=world, **few)[0].solution for world in worlds]
+    ways = []
+    for own, world in enumerate(worlds):
+        made = [execute(task, each, model=world.without_noise()) for each in solutions]
+        assert made[own].ticks < made[1 - own].ticks
+        corners = np.vstack([task.q0, made[own].configurations])
+        ways.append(np.linalg.norm(np.diff(corners[:, :2], axis=0), axis=1).sum())
+    assert ways[0] > 1.5 * ways[1]

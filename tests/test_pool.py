@@ -69,7 +69,7 @@ HANDLED = {
     "allocates": ("kept = [np.empty(10**8) for _ in range(10**6)]", "crashed", "MemoryError"),
     "nothing": ("return None", "solver-failed", "returned NoneType"),
     "nan": ("return Result((Movement(1, 'right', 'planned', session.q0 * np.nan),) * 3)",
-            "solver-failed", "finite"),
+            "solver-failed", "NaN in all entries"),
     "many": ("return Result(corrected(session) * 4000)", "solver-failed", "movements; at most"),
     "details": ("return Result(corrected(session), {'call': print})",
                 "solver-failed", "cannot be stored: TypeError"),

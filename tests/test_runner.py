@@ -27,7 +27,7 @@ from coartic.benchmarks.runner import perform
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.worker import fail
 from coartic.method import Meter
-from coartic.motion.batch import SLOTS
+from coartic.motion.kernels.slots import SLOTS
 from coartic.runs.plan import Job, run_seed
 from coartic.runs.record import MOTOR_NOISE, Outcome, Times
 from coartic.runs.store import open_store

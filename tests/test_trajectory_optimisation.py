@@ -18,7 +18,7 @@ from coartic.baselines.trajectory_problem import (
 )
 from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Session
-from coartic.motion.solution import other_arm_travel
+from coartic.motion.execution import other_arm_travel
 from coartic.tasks.task import hands_of
 from tests.support.strategies import changed, least_cost, steps_from
 
@@ -39,28 +39,35 @@ def small_task(**change):
 
 
 @pytest.mark.parametrize(
-    ("cost", "hands", "still"),
+    ("cost", "hands", "still", "weight"),
     [
-        ("path-length", ("right", "left"), False),
-        ("path-length", ("left", "right"), True),
-        ("squared-displacement", ("right", "right"), False),
-        ("squared-displacement", ("right", "left"), True),
+        ("path-length", ("right", "left"), False, 1.0),
+        ("path-length", ("left", "right"), True, 1.0),
+        ("path-length", ("right", "left"), False, 4.0),
+        ("path-length", ("right", "right"), False, 0.25),
+        ("squared-displacement", ("right", "right"), False, 1.0),
+        ("squared-displacement", ("right", "left"), True, 1.0),
     ],
 )
-def test_plans_agree_with_another_optimiser(cost, hands, still):
+def test_plans_agree_with_another_optimiser(cost, hands, still, weight):
     task = small_task()
     instance = Instance.of(task, hands, still=still, radius=task.radius)
     layers, _ = sample_layers(task, 60, np.random.default_rng(0))
-    chain = dict(chains_of(task, layers))[hands]
-    problem = trajectory_problem(task.robot, task.hands, 2, cost)
+    chain = dict(chains_of(task, layers, base_weight=weight))[hands]
+    problem = trajectory_problem(task.robot, task.hands, 2, cost, weight)
     plan = problem.solve(instance, chain)
     assert plan.converged, plan.reason
     free, square = ~instance.held, cost == "squared-displacement"
     start = steps_from(task.q0, chain)[free]
     start += 0.1 * np.random.default_rng(1).standard_normal(start.shape)
-    least = least_cost(task, hands, free, [start], radius=task.radius, square=square)
+    least = least_cost(
+        task, hands, free, [start], radius=task.radius, square=square, base_weight=weight
+    )
     moved = steps_from(task.q0, plan.configurations)
-    squares = (moved**2).sum(axis=1)
+    weighted = moved * np.where(np.arange(task.robot.dof) < 2, weight, 1.0)
+    squares = (weighted**2).sum(axis=1)
+    if not square:
+        assert plan.lengths() == pytest.approx(np.sqrt(squares), abs=1e-9)
     assert plan.cost <= least + 1e-5
     assert plan.cost == pytest.approx((squares if square else np.sqrt(squares)).sum(), abs=1e-5)
     for q, hand, goal in zip(plan.configurations, hands, task.goals, strict=True):

@@ -1,19 +1,28 @@
 """Every way to make a trial makes that of the step-by-step reference."""
 
 import functools
+import itertools
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import coartic
-from coartic import MotionModel, Movement, execute, load_task, movements_of, trajectory
+from coartic import PAPER, MotionModel, Movement, execute, load_task, movements_of, trajectory
 from coartic.method import Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, explored_joints
-from coartic.motion import trial
-from coartic.motion.batch import SLOTS, robot_parameters
-from coartic.motion.solution import execute_many
-from coartic.motion.trial import ALL_STOP, Requests, compiled_task, reach, reach_goals
+from coartic.motion import trials
+from coartic.motion.execution import execute_many
+from coartic.motion.kernels.slots import SLOTS, robot_parameters
+from coartic.motion.kernels.trial import CORRECTIONS, FAILURES, ITERATIONS, TICKS, Requests
+from coartic.motion.trials import (
+    ALL_MOVE,
+    NO_WAYPOINTS,
+    compiled_task,
+    reach,
+    reach_goals,
+    worlds_of,
+)
 from coartic.robot import HANDS
 from coartic.tasks.task import hands_of
 from tests.support import reference
@@ -27,6 +36,7 @@ LIMITS = {  # iterations of the corrective process, spread of the targets
 TASKS = {name: uneven_task() if name == "uneven" else load_task(name) for name in LIMITS}
 MODELS = {name: MotionModel(max_iterations=most) for name, (most, _) in LIMITS.items()}
 BOTH = TASKS["two-armed-2"]
+NOISY = MotionModel(motor_noise=0.1)
 
 
 @functools.cache
@@ -147,7 +157,7 @@ def test_counts_of_trials_with_several_targets_for_a_goal():
     hands, targets = sample(task, 12, 0.3, seed=5)
     twice = np.stack([targets, targets[::-1]], axis=2)
     codes = [[HANDS.index(hand) for hand in hands_of(letters)] for letters in hands]
-    accounts = trial.make_trials(compiled_task(task, model), np.array(codes), twice)
+    accounts = trials.make_trials(compiled_task(task, model), np.array(codes), twice)
     for letters, rows, counts, reward in zip(hands, twice, *accounts[1:], strict=True):
         solution = [
             Movement(goal, hand, "learned", target)
@@ -156,9 +166,9 @@ def test_counts_of_trials_with_several_targets_for_a_goal():
         ]
         due = reference.execute(task, solution, model)
         expected = due.ticks, due.iterations, due.corrections, due.reward is None
-        places = trial.TICKS, trial.ITERATIONS, trial.CORRECTIONS, trial.FAILURES
+        places = TICKS, ITERATIONS, CORRECTIONS, FAILURES
         assert tuple(counts[[*places]]) == expected
-        assert reward == (trial.NO_REWARD if due.reward is None else due.reward)
+        assert reward == (trials.NO_REWARD if due.reward is None else due.reward)
 
 
 @pytest.mark.parametrize("name", OTHERS)
@@ -188,10 +198,17 @@ def test_kernels_end_whatever_they_get(bad, where):
     q, targets = np.tile(BOTH.q0, (5, 1)), np.tile(BOTH.q0 + 0.5, (5, 1))
     goals = np.tile(BOTH.goal_array[0], (5, 1))
     {"start": q, "target": targets, "goal": goals}[where][::2, 0] = bad
-    hands, parameters = np.arange(5)[:, None] % 2, robot_parameters(BOTH.robot)
-    for given in (targets, targets * np.nan):
-        arms = Requests(q, hands, given[:, None, None], ALL_STOP, goals[:, None])
-        assert len(reach(BOTH.robot, arms, parameters).rewards) == 5
+    hands, worlds = np.arange(5)[:, None] % 2, worlds_of(np.arange(5), 0)
+    for given, model in itertools.product((targets, targets * np.nan), (PAPER, NOISY)):
+        arms = (q, hands, given[:, None, None], ALL_MOVE, NO_WAYPOINTS, goals[:, None], 0, worlds)
+        assert (
+            len(
+                reach(
+                    BOTH.robot, Requests(*arms), robot_parameters(BOTH.robot, model=model)
+                ).rewards
+            )
+            == 5
+        )
 
 
 @pytest.mark.parametrize(

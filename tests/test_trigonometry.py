@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from coartic.motion.compile import entry
-from coartic.motion.trigonometry import LARGEST, cosine, sine
+from coartic.motion.kernels.compile import entry
+from coartic.motion.kernels.trigonometry import LARGEST, cosine, sine
 
 
 @entry

@@ -2,10 +2,10 @@
 
 The module implements the paper's section *The Learning Process* and Figure 3. At each goal of a
 trial the learner chooses a hand, perturbs the stored target configuration and moves there. If the
-goal was missed, the corrective process **A** finishes (:mod:`coartic.motion.trial`). If the trial
-is better than any earlier trial that passed through the same state and hand, it replaces the value
-and the target that are stored for this state and hand. Trials are compared by their total reward
-or, in an ablation, by the return of the goal.
+goal was missed, the corrective process **A** finishes (:mod:`coartic.motion.kernels.trial`). If the
+trial is better than any earlier trial that passed through the same state and hand, it replaces the
+value and the target that are stored for this state and hand. Trials are compared by their total
+reward or, in an ablation, by the return of the goal.
 
 One call of a compiled kernel, by :mod:`coartic.learner.learning`, makes many runs side by side,
 goal by goal and trial by trial. Each run draws from its own NumPy generator (``default_rng(seed)``,
@@ -19,7 +19,7 @@ PCG64), in this order:
 4. if a target is stored: a standard normal number per explored joint, in the order of ``q``.
 
 Runs share nothing, so that the result of a run depends neither on the other runs nor on their
-number.
+number. Motor noise is no part of this sequence (:mod:`coartic.motion.kernels.noise`).
 """
 
 from __future__ import annotations
@@ -32,17 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.learner.conditions import ExplorationCondition
-from coartic.motion.batch import (
-    Batch,
-    RobotRecord,
-    RunRecord,
-    arm_of,
-    batch_for,
-    load,
-    squared_distance,
-    width_of,
-)
-from coartic.motion.compile import (
+from coartic.motion.kernels.compile import (
     chain_by,
     entry,
     fill_row,
@@ -52,26 +42,32 @@ from coartic.motion.compile import (
     joint_lever,
     record_type,
 )
-from coartic.motion.correction import correct_slots, project
-from coartic.motion.solution import Movement
-from coartic.motion.trial import (
+from coartic.motion.kernels.correct import correct_runs, correct_slots, project, pull_runs
+from coartic.motion.kernels.move import MOVE, move_runs
+from coartic.motion.kernels.slots import (
+    Batch,
+    RobotRecord,
+    RunRecord,
+    arm_of,
+    batch_for,
+    load,
+    squared_distance,
+    width_of,
+)
+from coartic.motion.kernels.trial import (
     CORRECTIONS,
     COUNTED,
     ITERATIONS,
-    MOVE,
     TICKS,
-    CompiledTask,
     account,
     begin,
     count_goal,
-    find_corrections,
-    find_pulled_corrections,
-    make_corrections,
-    move_runs,
     set_off,
 )
-from coartic.motion.trial import aim as aim_at
-from coartic.motion.trigonometry import cosine, sine
+from coartic.motion.kernels.trial import aim as aim_at
+from coartic.motion.kernels.trigonometry import cosine, sine
+from coartic.motion.solution import Movement
+from coartic.motion.trials import CompiledTask
 from coartic.robot import HANDS, Array, Configs, Hands, Points
 from coartic.tasks.task import Task
 
@@ -140,7 +136,7 @@ class Results(NamedTuple):
     was completed."""
     counts: NDArray[np.int64]
     """Counts of all trials without the replay, in the order of
-    :data:`coartic.motion.trial.COUNTED`, shape ``(N, 5)``."""
+    :data:`coartic.motion.kernels.trial.COUNTED`, shape ``(N, 5)``."""
     corrections: NDArray[np.int64]
     """Corrective movements in trial 0 and in each tenth of the later trials, shape ``(N, 11)``."""
     initial_accounts: NDArray[np.void]
@@ -263,7 +259,7 @@ def _nearest_posture(
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
     for hand in learner.hands:
-        run.hand = hand
+        run.hand, run.iterations = hand, 0
         fill_row(run.target, run.q)
         load(batch.slots[0], 0, n, run, arm_of(robot, hand))
         correct_slots(batch, 1, robot)
@@ -423,25 +419,25 @@ def aim(
 
 @inlined
 def make_trial(
-    initial: bool,
+    trial: int,
     explore: bool,
     robot: RobotRecord,
     learner: LearnerParameters,
     tables: Any,
     accounts: Any,
     rngs: Any,
+    seeds: Any,
     workspace: _Workspace,
 ) -> None:
-    """Make one trial in each of N runs. A trial ends at the first goal that is missed.
+    """Make trial number ``trial``, from 0, in each of N runs. It ends at the first goal missed.
 
-    This function fills ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. If
-    ``initial`` is True, the trial is trial 0, with the hands and targets of ``learner``. If
-    ``explore`` is False, the trial is greedy, without drift and noise. Other arguments are as in
-    :func:`learn_kernel`.
+    This function fills ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. Trial 0 has
+    the hands and targets of ``learner``. If ``explore`` is False, the trial is greedy, without
+    drift and noise of exploration. Other arguments are as in :func:`learn_kernel`.
     """
-    batch, counts, runs = workspace.batch, workspace.counts, len(tables)
+    batch, counts, runs, initial = workspace.batch, workspace.counts, len(tables), trial == 0
     for n in range(runs):
-        set_off(batch.runs[n], learner.start)
+        set_off(batch.runs[n], learner.start, seeds[n], trial, robot)
         if explore and not initial:
             choices, rng = len(learner.drifts), generator_at(rngs, n)
             kappa = learner.drifts[int(rng.random() * choices) if choices > 1 else 0]
@@ -451,7 +447,7 @@ def make_trial(
     for number in range(len(learner.goals)):
         for n in range(runs):
             run = batch.runs[n]
-            begin(run, learner.goals[number])
+            begin(run, number, learner.goals[number])
             if initial:
                 run.hand = learner.first_hands[number]
                 if run.going:
@@ -466,10 +462,9 @@ def make_trial(
             if batch.runs[n].action == MOVE:
                 fill_row(accounts[n, number].target, batch.runs[n].target)
         if initial or learner.pull == 0.0:
-            find_corrections(runs, robot, batch)
+            correct_runs(runs, robot, batch)
         else:
-            find_pulled_corrections(runs, robot, batch)
-        make_corrections(runs, robot, batch)
+            pull_runs(runs, robot, batch)
         for n in range(runs):
             account(batch.runs[n], accounts[n, number].moved, accounts[n, number])
             count_goal(accounts[n, number], counts[n])
@@ -546,7 +541,7 @@ def _learn_from(
 
 @entry
 def learn_kernel(
-    robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, workspace: Any
+    robot: Any, learner: Any, tables: Any, results: Any, rngs: Any, seeds: Any, workspace: Any
 ) -> None:
     """Make all trials of N runs, then the replay of each run.
 
@@ -564,12 +559,15 @@ def learn_kernel(
         :class:`Results` of zeros with ``best_trial`` -1, filled in place.
     rngs
         The runs' own generators (:func:`addresses`).
+    seeds
+        Seed of the world of each run (:func:`.world_seed`), shape ``(N,)``. Trial k meets the noise
+        of draw k, the replay that of the draw after the last trial.
     workspace
         From :func:`workspace_for`.
     """
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last trial is the replay, which is not part of the runs
-        initial, explore, accounts = number == 0, number < trials, results.last_accounts
-        make_trial(initial, explore, robot[0], learner, tables, accounts, rngs, workspace)
+        explore, accounts = number < trials, results.last_accounts
+        make_trial(number, explore, robot[0], learner, tables, accounts, rngs, seeds, workspace)
         if number < trials:
             _learn_from(number, learner, tables, results, workspace)

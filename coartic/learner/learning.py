@@ -33,19 +33,19 @@ from coartic.learner.kernel import (
 from coartic.learner.learning_run import LearningRun
 from coartic.method import TRIALS, Meter
 from coartic.model import PAPER, MotionModel
-from coartic.motion.batch import SLOTS
-from coartic.motion.compile import addresses
-from coartic.motion.correction import correct
-from coartic.motion.movement import move
-from coartic.motion.solution import (
-    Movement,
-    corrective_movements,
-    hands_in,
-    initial_hands,
-    movements_by_goal,
-    movements_in,
+from coartic.motion.doors import correct, move
+from coartic.motion.execution import initial_hands, movements_in
+from coartic.motion.kernels.compile import addresses
+from coartic.motion.kernels.slots import SLOTS
+from coartic.motion.kernels.trial import COUNTED
+from coartic.motion.solution import Movement, corrective_movements, hands_in, movements_by_goal
+from coartic.motion.trials import (
+    compiled_task,
+    count_trials,
+    empty_accounts,
+    make_trials,
+    world_seed,
 )
-from coartic.motion.trial import COUNTED, compiled_task, count_trials, empty_accounts, make_trials
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, letters_of
 
@@ -256,10 +256,10 @@ def _learn_together(
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
     learner, rngs = learner_parameters(compiled, condition, initial), addresses(generators)
-    workspace = workspace_for(runs, task)
+    workspace, worlds = workspace_for(runs, task), np.array([*map(world_seed, seeds)], np.uint64)
     count_trials(runs * trials)
     clock = time.perf_counter()
-    learn_kernel(compiled.parameters, learner, tables, results, rngs, workspace)
+    learn_kernel(compiled.parameters, learner, tables, results, rngs, worlds, workspace)
     wall = time.perf_counter() - clock
 
     requested = [[[Movement(1, "right", "learned")]] * len(task.goals)] * runs

@@ -14,7 +14,8 @@ from coartic.internal.validation import equal_contents
 from coartic.learner.conditions import ExplorationCondition
 from coartic.method import Meter
 from coartic.model import MotionModel
-from coartic.motion.solution import Execution, Movement, execute, hands_in
+from coartic.motion.execution import Execution, execute
+from coartic.motion.solution import Movement, hands_in
 from coartic.robot import Array
 from coartic.tasks.task import Task
 
@@ -115,11 +116,11 @@ class LearningRun:
         return int(self.rewards[0]) if self.completed[0] else None
 
     def execute(self) -> Execution:
-        """Execute the learned solution again, without the learner.
+        """Execute the learned solution again, without the learner and without motor noise.
 
-        The execution has the reward :attr:`reward`. Raises CoarticError if there is no learned
-        solution.
+        If the model has no motor noise, the execution has the reward :attr:`reward`. Raises
+        CoarticError if there is no learned solution.
         """
         if not self.learned:
             raise CoarticError(f"nothing to execute: {self.reason}")
-        return execute(self.task, self.learned, model=self.model)
+        return execute(self.task, self.learned, model=self.model.without_noise())

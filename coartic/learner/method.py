@@ -33,6 +33,7 @@ from coartic.method import (
     Result,
     Session,
 )
+from coartic.model import WORLD
 
 _FIELDS: dict[str, Any] = get_type_hints(ExplorationCondition, include_extras=True)
 del _FIELDS["id"], _FIELDS["hands"]  # parameters cannot change these
@@ -75,6 +76,7 @@ class DualProcess(Method):
 
     condition: ClassVar[ExplorationCondition]
     facts = Facts(works=("shah2013",), algorithm="learner")
+    adapts_to = frozenset(WORLD)
     tuned_on = "nothing: the paper's values"
 
     def rules(self) -> ExplorationCondition:

@@ -17,7 +17,7 @@ from coartic.errors import NotApplicableError
 from coartic.internal.limits import MOST_RUN_SEED, check_limits
 from coartic.internal.validation import in_sentences
 from coartic.method.session import Information, MethodError, Session
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, WORLD, MotionModel, check_model, differences
 from coartic.motion.initial_hands import too_many_sequences
 from coartic.motion.solution import Movement
 from coartic.robot import Hand
@@ -140,6 +140,11 @@ class Method(ABC):
     """Tasks on which the method's parameters were chosen, and among which values; empty if that is
     not known. It tells readers whether results are of tasks that are new to the method. It is not a
     part of the id of a run."""
+    adapts_to: ClassVar[frozenset[str] | None] = None
+    """Constants of the world (:data:`.WORLD`: ``motor_noise``, ``norm`` and ``base_weight``) that
+    may differ from the paper's. By default (None) these are all three, but only ``motor_noise`` if
+    the method declares the reward as a formula or the kinematic model: it may compute with the
+    paper's lengths itself."""
     stochastic: ClassVar[bool] = True
     """True if the seed matters. If False, the method is run once."""
     Parameters: ClassVar[type[Parameters]] = Parameters
@@ -165,6 +170,22 @@ class Method(ABC):
 
         By default a method applies to every task.
         """
+        return None
+
+    @classmethod
+    def refuses(cls, model: MotionModel) -> str | None:
+        """Return a sentence on a constant of a world that the method cannot work with, or None."""
+        adapts_to = cls.adapts_to
+        if adapts_to is None:
+            knows = {Information.REWARD_FORMULA, Information.KINEMATIC_MODEL} & cls.information
+            adapts_to = frozenset({"motor_noise"} if knows else WORLD)
+        for name, value in differences(model).items():
+            if name not in {"motor_noise", *adapts_to}:
+                paper = getattr(PAPER, name)
+                return (
+                    f"model.{name} is {value!r}; method {cls.name!r} plans with the paper's "
+                    f"{name} {paper!r}: leave the constant out, or choose another method"
+                )
         return None
 
     @abstractmethod
@@ -270,7 +291,7 @@ def run_method(
     UndeclaredError
         The method uses information that it does not declare.
     NotApplicableError
-        The method does not apply to the task, or finds no initial hands.
+        The method does not apply to the task or to the model, or finds no initial hands.
     SolutionError
         The solution is not a sequence.
     TaskError, TypeError
@@ -279,7 +300,9 @@ def run_method(
         The seed is not an integer from 0 to 2^128 - 1.
     """
     chosen = as_task(task)
-    if (reason := method.why_not(outline_of(chosen))) is not None:
+    check_model(model, radius=chosen.radius)
+    reason = method.refuses(model) or method.why_not(outline_of(chosen))
+    if reason is not None:
         raise NotApplicableError(reason)
     built_in = (getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES)
     is_ours = any(type(method) in methods for methods in built_in)

@@ -17,7 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from coartic.errors import CoarticError
-from coartic.internal.limits import MOST_TRIALS, WIDTHS, brief_value, check_limits, real_array
+from coartic.internal.limits import (
+    MOST_RUN_SEED,
+    MOST_TRIALS,
+    WIDTHS,
+    brief_value,
+    check_limits,
+    real_array,
+)
 from coartic.internal.text import counted
 from coartic.method import (
     MOST_COUNT,
@@ -31,15 +38,11 @@ from coartic.method import (
     Session,
     UndeclaredError,
 )
-from coartic.model import PAPER, MotionModel
+from coartic.model import PAPER, MotionModel, same_world
 from coartic.motion.initial_hands import sequences_with, too_many_sequences
-from coartic.motion.movement import LARGEST_ENTRY
-from coartic.motion.solution import (
-    Movement,
-    movements_of,
-)
-from coartic.motion.trial import Accounts, HandSequences, compiled_task, make_trials
-from coartic.robot import HANDS, Array, Configs, Hands
+from coartic.motion.solution import Movement, movements_of
+from coartic.motion.trials import Accounts, HandSequences, compiled_task, make_trials
+from coartic.robot import HANDS, LARGEST_ENTRY, Array, Configs, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.optima import KnownOptimum, best_shipped
 from coartic.tasks.task import Task, letters_of
@@ -108,6 +111,9 @@ class Objective:
       acts, which costs nothing if the hand is in the goal already. A movement to a target always
       takes at least one tick.
     - A trial fails if its point has an entry beyond 100,000.
+    - In a model with motor noise a point has another cost in each trial; :attr:`best_cost` is the
+      lowest, and therefore partly luck. Costs under the same draws compare points fairly
+      (:meth:`many`).
 
     The first trials are made when the objective is created. In them only the corrective process
     acts, with ``hands`` or with as many sequences of :func:`sequences_of` as the budget allows. The
@@ -221,7 +227,8 @@ class Objective:
     @property
     def _optimum(self) -> KnownOptimum | None:
         task = self.task
-        return best_shipped(task) if self._session.model == PAPER else None
+        is_published = same_world(self._session.model, PAPER, task.radius)
+        return best_shipped(task) if is_published else None
 
     @property
     def best_known(self) -> int | None:
@@ -364,8 +371,8 @@ class Objective:
     def movements(self, x: ArrayLike, hands: str | None = None) -> tuple[Movement, ...]:
         """Return the movements of the trial of a point, for :func:`coartic.execute`.
 
-        The execution takes as many ticks as the point costs, if the cost is below ``FAILED``. No
-        evaluation is counted.
+        Without motor noise the execution takes as many ticks as the point costs, if the cost is
+        below ``FAILED``. No evaluation is counted.
 
         Parameters
         ----------
@@ -380,7 +387,7 @@ class Objective:
             A movement for each goal. A movement has no target if the entries of its goal are NaN.
             Otherwise its target has all joints: a joint without an entry in the point keeps its
             value. If the trial fails at a goal, such joints have their values at the start in the
-            targets of later goals.
+            targets of later goals. With motor noise such joints have NaN, with which they stay.
 
         Raises
         ------
@@ -395,6 +402,8 @@ class Objective:
         self._check(point[None])
         chosen = self.hands if hands is None else hands
         codes, targets = self._session.hand_codes(chosen, 1), self._targets_of(point[None])
+        if self._session.model.motor_noise > 0.0:
+            return movements_of(chosen, targets[0])
         accounts = make_trials(compiled_task(task, self._session.model), codes, targets[:, :, None])
         has_target = ~np.isnan(targets[0]).all(axis=1, keepdims=True)
         targets = self._targets_in(accounts, 0)
@@ -450,7 +459,13 @@ class Objective:
                 self._note_best(cost, self._evaluations, point, self._codes[0], accounts, 0)
         return cost
 
-    def many(self, points: ArrayLike, hands: HandSequences | None = None) -> Array:
+    def many(
+        self,
+        points: ArrayLike,
+        hands: HandSequences | None = None,
+        *,
+        draws: ArrayLike | None = None,
+    ) -> Array:
         """Make a trial for each of many points, and return the costs (in ticks).
 
         The trials are made side by side.
@@ -464,6 +479,10 @@ class Objective:
         hands : str or sequence of str, optional
             One hand sequence for all points (``"RRLR"``), or a sequence for each; by default
             :attr:`hands`.
+        draws : array_like of int, shape (N,), optional
+            Number of the draw of the motor noise that each point meets (:meth:`.Session.trials`).
+            Points with the same draw meet the same noise. A method declares
+            ``Information.NOISE_DRAWS`` to choose draws.
 
         Returns
         -------
@@ -472,6 +491,8 @@ class Objective:
 
         Raises
         ------
+        UndeclaredError
+            A method chooses draws, and does not declare ``Information.NOISE_DRAWS``.
         BudgetError
             Fewer trials are left than there are points. The trials that are left are made first,
             for the first points.
@@ -488,13 +509,18 @@ class Objective:
             raise ValueError(f"points has shape {array.shape}; it must be (N, {self.dim})")
         self._check(array)
         codes = self._session.hand_codes(self.hands if hands is None else hands, len(array))
+        chosen = self._session.chosen_draws(draws, len(array))
         costs = np.empty(len(array))
         with self._session.lock:
             left = self._trials_left(len(array))
             for start in range(0, left, CHUNK):
                 part = slice(start, min(start + CHUNK, left))
                 part_costs, hand_codes, points = costs[part], codes[part], array[part]
-                accounts = self._session._make_trials(hand_codes, self._targets_of(points))
+                accounts = self._session._make_trials(
+                    hand_codes,
+                    self._targets_of(points),
+                    draws=None if chosen is None else chosen[part],
+                )
                 np.minimum(-accounts.rewards, FAILED, out=part_costs)
                 if part_costs.min() < self._best_cost:
                     best_costs = np.minimum.accumulate(np.append(self._best_cost, part_costs))[:-1]
@@ -521,7 +547,10 @@ class Objective:
         is evaluation number ``evaluations`` (from 1), and trial ``trial`` (from 0) of ``accounts``.
         """
         self._best_cost, self._best_x = cost, point.copy()
-        self._best_targets = self._targets_in(accounts, trial)
+        if self._session.model.motor_noise > 0.0:  # a joint that keeps still has no noise
+            self._best_targets = self._targets_of(point[None])[0]
+        else:
+            self._best_targets = self._targets_in(accounts, trial)
         self._best_hands = letters_of([HANDS[code] for code in codes])
         self._improvements.append((evaluations, cost))
 
@@ -586,6 +615,7 @@ def objective(
     half_width: float = HALF_WIDTH,
     model: MotionModel = PAPER,
     budget: int | None = None,
+    seed: int = 0,
 ) -> Objective:
     """Return the cost of a task's trial as a function for scipy and other libraries.
 
@@ -598,9 +628,12 @@ def objective(
     half_width : float
         Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
     model : MotionModel
+        The world, such as ``MotionModel(motor_noise=0.01)``.
     budget : int, optional
         Largest number of trials, including the trials by which hands are chosen. Further trials
         raise BudgetError.
+    seed : int
+        Seed of the motor noise, from 0 to 2^128 - 1.
 
     Returns
     -------
@@ -617,6 +650,7 @@ def objective(
         - ``hands`` do not fit the task;
         - ``half_width`` is not from 1e-9 to 100;
         - a constant of the model is out of bounds;
+        - ``seed`` is out of bounds;
         - ``budget`` is not from 1 to 10,000,000, or is less than the number of hand sequences to
           choose among.
     TypeError
@@ -637,7 +671,9 @@ def objective(
             f"budget is {budget}; it takes {counted(count, 'trial')} to choose among the hand "
             f"sequences of task {chosen.name!r}: raise the budget, or pass the hands to use"
         )
-    session = Session(chosen, 0, OPTIMISER_INFORMATION, model=model)
+    check_limits("seed", seed, 0, MOST_RUN_SEED)
+    information = OPTIMISER_INFORMATION | {Information.NOISE_DRAWS}
+    session = Session(chosen, int(seed), information, model=model)
     return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)
 
 

@@ -14,16 +14,18 @@ from threading import RLock
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value, check_limits, real_array
 from coartic.internal.text import counted
 from coartic.model import PAPER, MotionModel
-from coartic.motion.correction import Correction, correct
+from coartic.motion.doors import Correction, correct
+from coartic.motion.execution import Execution, execute_many
 from coartic.motion.initial_hands import search_initial_hands
-from coartic.motion.solution import Execution, Movement, check_targets, execute_many
-from coartic.motion.trial import (
+from coartic.motion.solution import Movement, check_targets
+from coartic.motion.trials import (
+    NO_NOISE,
     NO_REWARD,
     Accounts,
     CompiledTask,
@@ -34,6 +36,8 @@ from coartic.motion.trial import (
     hand_codes,
     make_trials,
     trials_of,
+    world_seed,
+    worlds_of,
 )
 from coartic.robot import Array, Configs, Hand, Hands, Robot
 from coartic.tasks.task import Task
@@ -57,6 +61,8 @@ class Information(StrEnum):
     """Reward of each goal of a trial, after the trial is made."""
     KINEMATIC_MODEL = "kinematic model"
     """The kinematics as formulas, with all derivatives."""
+    NOISE_DRAWS = "draws of the noise"
+    """Which draw of the motor noise a trial meets. By default trial k meets draw k."""
     REWARD_FORMULA = "reward as a formula"
     """The rule that a movement costs reward in proportion to its path in joint space."""
     SECONDARY_OBJECTIVES = "secondary objectives"
@@ -71,6 +77,7 @@ METERED = frozenset(
         Information.CORRECTIVE_PROCESS,
         Information.REWARD_BY_TRIAL,
         Information.KINEMATIC_MODEL,
+        Information.NOISE_DRAWS,
     }
 )
 """Information whose use a session can see. The use of other information is declared, but not
@@ -193,6 +200,8 @@ class Session:
     information : iterable of Information
         The information that the method declares.
     model : MotionModel
+        The world in which trials are made. The seed of its motor noise follows from ``seed``;
+        :attr:`rng` does not depend on the noise.
     trial_budget : int, optional
         Largest number of trials; None for no limit.
     trusted : bool
@@ -200,7 +209,7 @@ class Session:
         set the counts themselves.
     of_run : bool
         True for the session of a run. Trials that a process makes outside such sessions are counted
-        separately (:func:`coartic.motion.trial.trials_outside`).
+        separately (:func:`coartic.motion.trials.trials_outside`).
     """
 
     def __init__(
@@ -444,7 +453,7 @@ class Session:
             hand,
             self._task.goals[goal - 1],
             locked_base=self._task.locked_base,
-            model=self.model.for_radius(self._task.radius),
+            model=self.model.without_noise().for_radius(self._task.radius),
         )
         self._meter.add(
             corrective_iterations=correction.iterations,
@@ -457,7 +466,8 @@ class Session:
         """Make one physical trial of a solution, and count it.
 
         Its ticks, evaluations, iterations and corrections are counted as well. The corrective
-        process acts if a goal is missed, and its ticks count.
+        process acts if a goal is missed, and its ticks count. In a model with motor noise, trial k
+        meets draw k of the noise.
 
         Parameters
         ----------
@@ -483,7 +493,7 @@ class Session:
         self.check_solution(solution)
         with self.lock:
             self._affordable(1)
-            (execution,) = execute_many(self._compiled, [solution])
+            (execution,) = execute_many(self._compiled, [solution], self._worlds(1))
             if isinstance(execution, Exception):
                 raise execution
             count_trials(-self._of_run)
@@ -501,7 +511,9 @@ class Session:
             execution, movements=tuple(solution), configurations=execution.configurations[:0]
         )
 
-    def trials(self, hands: HandSequences, targets: Any, *, until: Any = None) -> Trials:
+    def trials(
+        self, hands: HandSequences, targets: Any, *, until: Any = None, draws: Any = None
+    ) -> Trials:
         """Make N physical trials at once.
 
         The corrective process acts if a goal is missed, and its ticks count. The counts are the
@@ -520,6 +532,10 @@ class Session:
         until : array_like, shape (N,), optional
             A reward for each trial. The first trial whose reward exceeds its entry is the last one
             that is counted and returned.
+        draws : array_like of int, shape (N,), optional
+            Number of the draw of the motor noise that each trial meets, from 0 to 2^53. Trials with
+            the same draw meet the same noise (*common random numbers*). By default trial k of the
+            session meets draw k. Without noise draws have no effect.
 
         Returns
         -------
@@ -532,7 +548,8 @@ class Session:
         ------
         UndeclaredError
             ``Information.REWARD_BY_TRIAL`` is not declared. Or a goal has no targets and
-            ``Information.CORRECTIVE_PROCESS`` is not declared.
+            ``Information.CORRECTIVE_PROCESS`` is not declared. Or draws are chosen and
+            ``Information.NOISE_DRAWS`` is not declared.
         BudgetError
             N is above 0, and the budget has no trial left.
         ValueError
@@ -548,9 +565,11 @@ class Session:
         until = None if until is None else real_array("until", until)
         if until is not None and until.shape != (count,):
             raise ValueError(f"until has shape {until.shape}; it must be ({count},)")
+        chosen = self.chosen_draws(draws, count)
         with self.lock:
             left = self._affordable(count)
-            accounts = self._make_trials(codes[:left], configurations[:left], until)
+            drawn = None if chosen is None else chosen[:left]
+            accounts = self._make_trials(codes[:left], configurations[:left], until, drawn)
         trials = trials_of(accounts, self.dof)
         if Information.CORRECTIVE_PROCESS in self._information:
             return trials
@@ -587,14 +606,47 @@ class Session:
         """
         return hand_codes(self._task, hands, count)
 
-    def _make_trials(self, codes: Hands, targets: Configs, until: Array | None = None) -> Accounts:
+    def _worlds(self, count: int, draws: ArrayLike | None = None) -> NDArray[np.uint64]:
+        """Return the worlds of the next ``count`` trials (:func:`worlds_of`)."""
+        if self.model.motor_noise == 0.0:
+            return NO_NOISE
+        numbers = self.trials_made + np.arange(count) if draws is None else draws
+        return worlds_of(world_seed(self.seed), numbers)
+
+    def chosen_draws(self, draws: Any, count: int) -> NDArray[np.int64] | None:
+        """Return chosen draws as an array, shape ``(count,)``, or None for None.
+
+        Raises UndeclaredError if ``Information.NOISE_DRAWS`` is not declared, and ValueError if
+        ``draws`` is not an array of ``count`` integers from 0 to 2^53.
+        """
+        if draws is None:
+            return None
+        self._use(Information.NOISE_DRAWS)
+        numbers = real_array("draws", draws)
+        if numbers.shape != (count,):
+            raise ValueError(f"draws has shape {numbers.shape}; it must be ({count},)")
+        if not ((numbers >= 0) & (numbers <= 2**53) & (numbers == np.floor(numbers))).all():
+            raise ValueError(
+                f"draws is {brief_value(numbers.tolist())}; each entry must be an integer from 0 "
+                "to 2^53"
+            )
+        return np.asarray(draws, np.int64)
+
+    def _make_trials(
+        self,
+        codes: Hands,
+        targets: Configs,
+        until: Array | None = None,
+        draws: NDArray[np.int64] | None = None,
+    ) -> Accounts:
         """Make and count N trials, and return their accounts.
 
         With ``until`` fewer trials may be counted and returned (:meth:`trials`). ``codes`` are the
         hands, 0 (left) or 1 (right), shape ``(N, G)``. The caller checks arguments and budget, and
         holds ``lock``.
         """
-        accounts = make_trials(self._compiled, codes, targets[:, :, None])
+        worlds = self._worlds(len(targets), draws)
+        accounts = make_trials(self._compiled, codes, targets[:, :, None], worlds=worlds)
         count_trials(-len(targets) * self._of_run)
         if until is not None:
             better = trials_of(accounts, self.dof).rewards > until[: len(targets)]

@@ -12,9 +12,8 @@ import numpy as np
 from coartic.errors import NotApplicableError
 from coartic.internal.limits import brief_value
 from coartic.model import PAPER, MotionModel
-from coartic.motion.trial import (
-    COUNTED,
-    FAILURES,
+from coartic.motion.kernels.trial import COUNTED, FAILURES
+from coartic.motion.trials import (
     compiled_task,
     count_trials,
     hand_codes,
@@ -38,6 +37,7 @@ def ranked_sequences(
     sequences : collection of str
         Hand sequences, such as ``"RRLR"``.
     model : MotionModel
+        The trials are made without its motor noise.
 
     Returns
     -------
@@ -51,7 +51,8 @@ def ranked_sequences(
         - then by the number of changes of hand, the fewest first;
         - then as in ``sequences``.
     """
-    compiled, codes = compiled_task(task, model), hand_codes(task, [*sequences], len(sequences))
+    exact = model.without_noise()
+    compiled, codes = compiled_task(task, exact), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
     accounts = make_trials(compiled, codes, targets)
     trials = []
@@ -138,6 +139,7 @@ def search_initial_hands(
     hands : tuple of {"left", "right"}, optional
         Hands among which a policy chooses; the task's by default.
     model : MotionModel
+        The search is made without its motor noise.
 
     Returns
     -------
@@ -158,7 +160,8 @@ def search_initial_hands(
     if not task.initial_is_policy:
         return task.initial_hands, {}
     ordered = tuple(hand for hand in HANDS if hand in allowed)
-    sequence, counts = _search_by_policy(task.model_dump_json(), ordered, model)
+    exact = model.without_noise()
+    sequence, counts = _search_by_policy(task.model_dump_json(), ordered, exact)
     count_trials(counts["initial_trials"])
     return sequence, counts
 

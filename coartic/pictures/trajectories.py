@@ -16,8 +16,8 @@ from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import check_limits
 from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel
-from coartic.motion.movement import line_points, path_points
-from coartic.motion.solution import Execution, Movement, execute
+from coartic.motion.execution import Execution, execute, sample_execution
+from coartic.motion.solution import Movement
 from coartic.robot import HANDS, Array, Hand
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, hands_of
@@ -194,25 +194,15 @@ def trajectory(
     SolutionError
         The solution breaks the task's rules, or does not hit every goal.
     ValueError
-        A constant of the model is out of bounds.
+        A constant of the model is out of bounds, or the model has motor noise.
     """
     task = as_task(task)
     execution = execute(task, movements, model=model)
     if not execution.completed:
         raise SolutionError(f"task {task.name!r}: {execution.reason}")
-    q, rows = np.array(task.q0), [np.empty((0, task.robot.dof))]
+    rows = sample_execution(task, execution.movements, model)
     elapsed = np.zeros(len(task.goals), dtype=np.int64)
     for movement in execution.movements:
-        target, ticks = movement.target, movement.ticks
-        assert target is not None
-        assert ticks is not None
-        if movement.waypoints is not None:
-            points = path_points(task.robot, q, movement.waypoints, model)[:ticks]
-        else:
-            points = line_points(q, target, model)[:ticks]
-        if len(points):
-            q = points[-1]
-            rows.append(points)
-        elapsed[movement.goal - 1 :] += ticks
+        elapsed[movement.goal - 1 :] += movement.ticks or 0
     hits = np.maximum(elapsed - 1, 0)
-    return Trajectory(task, execution, np.concatenate(rows), hits)
+    return Trajectory(task, execution, rows, hits)

@@ -12,7 +12,7 @@ const BASE_DOF = 2;
 const MOST_LINKS = 100;
 const MOST_SEQUENCES = 4096; // largest number of hand sequences that are all tried
 
-/* coartic/motion/batch.py; `task` is a task of the package as plain data. The model is the default of coartic/model.py. */
+/* coartic/motion/kernels/slots.py; `task` is a task of the package as plain data. The model is the default of coartic/model.py. */
 function problem_of(task) {
   const { robot, goals, radius, start: { base, left, right } } = task;
   const model = { step: 0.01, arrival_tolerance: radius / 10, gain: 0.05, correction_tolerance: radius / 10, max_iterations: 20000 };
@@ -40,7 +40,7 @@ function movable({ start, free, arms }, hands) {
 
 /* ---- Kinematics ---- */
 
-/* coartic/motion/trigonometry.py */
+/* coartic/motion/kernels/trigonometry.py */
 const LARGEST = 1e5;
 const [HIGH, MIDDLE, LOW] = [1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21];
 const PER_QUARTER = 2 / Math.PI;
@@ -124,7 +124,7 @@ function distance_to_goal(problem, q, number, hand) {
 const CLEARANCE = 1e-9; // for rounding
 const between = [];
 
-/* coartic/motion/movement.py: move, changing `q` itself; return the ticks, negative for a miss. The hand moves by at
+/* coartic/motion/kernels/move.py: move, changing `q` itself; return the ticks, negative for a miss. The hand moves by at
    most `speed` per step; steps at which it is certainly outside both discs are skipped. */
 function move(problem, q, target, number, hand, stop_on_arrival) {
   const { model, radius } = problem;
@@ -178,7 +178,7 @@ function move(problem, q, target, number, hand, stop_on_arrival) {
   }
 }
 
-/* coartic/motion/correction.py: correct, changing `q` itself; return whether **A** converges. */
+/* coartic/motion/kernels/correct.py: correct, changing `q` itself; return whether **A** converges. */
 function correct(problem, q, number, hand) {
   const { model } = problem;
   const [free_x, free_y] = problem.free;
@@ -208,7 +208,7 @@ function correct(problem, q, number, hand) {
 
 const RANK = 1e-12; // squared ratio of singular values up to which the smaller one counts as 0
 
-/* coartic/motion/correction.py: project joint changes, in place, onto the null space of a Jacobian, a row for each joint. */
+/* coartic/motion/kernels/correct.py: project joint changes, in place, onto the null space of a Jacobian, a row for each joint. */
 function project(v, rows) {
   let [a, b, c, along_x, along_y] = [0, 0, 0, 0, 0];
   rows.forEach(([x, y], i) => {
@@ -252,7 +252,7 @@ class Trial {
     return signed > 0;
   }
 
-  /* coartic/motion/trial.py: **A** corrects a goal that was missed; return whether it hits. */
+  /* coartic/motion/kernels/trial.py: **A** corrects a goal that was missed; return whether it hits. */
   corrects(goal, hand) {
     const target = this.q.slice();
     this.going = correct(this.problem, target, goal, hand);
@@ -273,7 +273,7 @@ class Trial {
     this.hands.push(hand);
   }
 
-  /* coartic/motion/trial.py: reach for a goal, with a target or only by **A**. */
+  /* coartic/motion/kernels/trial.py: reach for a goal, with a target or only by **A**. */
   reaches(goal, hand, target) {
     const hit = target ? this.moves(goal, hand, "learned", target) : this.looks(goal, hand);
     this.going = hit || this.corrects(goal, hand);
@@ -285,7 +285,7 @@ class Trial {
   }
 }
 
-/* coartic/motion/trial.py, one trial: a joint whose target is NaN keeps its value; a goal without
+/* coartic/motion/kernels/trial.py, one trial: a joint whose target is NaN keeps its value; a goal without
    any target (null) is left to **A**. */
 function make_trial(problem, hands, targets) {
   const trial = new Trial(problem);

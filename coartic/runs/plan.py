@@ -83,7 +83,7 @@ class Cell:
             "task": self.definition,
             "method": method,
             "parameters": self.parameters,
-            "model": PAPER.for_radius(self.task.radius)._asdict(),
+            "model": PAPER.stored(self.task.radius),
             "trial_budget": self.trial_budget,
         }
 

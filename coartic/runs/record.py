@@ -19,9 +19,10 @@ from coartic.errors import SolutionError
 from coartic.internal.limits import real_array
 from coartic.method import CORRECTIONS_BY_TENTH, MOST_COUNT, Meter
 from coartic.model import PAPER
-from coartic.motion.movement import segment_lengths
-from coartic.motion.solution import Execution, Movement, execute_many
-from coartic.motion.trial import compiled_task
+from coartic.motion.doors import segment_lengths
+from coartic.motion.execution import Execution, execute_many
+from coartic.motion.solution import Movement
+from coartic.motion.trials import compiled_task
 from coartic.runs.plan import Cell, Job
 from coartic.tasks.task import Task
 
@@ -345,6 +346,8 @@ def movement_data(movement: Movement) -> list[Any]:
             )
         path = m.waypoints
     numbers = None if path is None else (real_array("a path", path) + 0.0).tolist()
+    if numbers is not None and m.waypoints is None:  # an entry that stays is null
+        numbers = [None if math.isnan(number) else number for number in numbers]
     text = None if numbers is None else json.dumps(numbers, separators=(",", ":"))
     return [int(m.goal), str(m.hand), str(m.kind), m.ticks and int(m.ticks), text]
 

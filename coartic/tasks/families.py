@@ -14,7 +14,8 @@ The structure is drawn once: how many goals and links, the base, the kind of sta
 angles are drawn again until they break no rule (:func:`broken_rule`). Rejection therefore does not
 change the shares of structures. Positions and angles are drawn as integers, in thousandths.
 Geometric rules compare integers; the other rules use the compiled kernels, which need only IEEE
-arithmetic (:mod:`coartic.motion.trigonometry`). No rejection depends on a machine's library.
+arithmetic (:mod:`coartic.motion.kernels.trigonometry`). No rejection depends on a machine's
+library.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ from coartic.internal.limits import MOST_CELLS, check_limits
 from coartic.internal.text import BACKWARDS, Line, counted, plain, unknown
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.motion.doors import move
 from coartic.motion.initial_hands import ranked_sequences, search_initial_hands
-from coartic.motion.movement import move
 from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, hash_key
 from coartic.tasks.task import (

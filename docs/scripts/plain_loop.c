@@ -1,7 +1,7 @@
 /* A trial of coartic.motion as a programmer would first write it in C: a loop over control steps.
  *
  * With bounds it skips the steps in which the hand provably stays outside the goal and away from the
- * end of the movement, as coartic.motion.movement.clear_steps does. */
+ * end of the movement, as coartic.motion.kernels.move.clear_steps does. */
 
 #include <math.h>
 #include <string.h>

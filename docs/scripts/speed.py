@@ -23,7 +23,7 @@ from coartic.gym import TaskEnv
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.learner.learning import warm_up
 from coartic.method import TRIALS, Session
-from coartic.motion.batch import SLOTS
+from coartic.motion.kernels.slots import SLOTS
 from coartic.motion.solution import movements_of
 
 

@@ -16,11 +16,12 @@ import pandas as pd
 
 from coartic.analysis import verify
 from coartic.model import PAPER
-from coartic.motion.correction import Correction
-from coartic.motion.movement import MoveResult
-from coartic.motion.solution import Movement, initial_hands
+from coartic.motion.doors import Correction, MoveResult
+from coartic.motion.execution import initial_hands
+from coartic.motion.solution import Movement
 from coartic.robot import HANDS
 from coartic.tasks.task import hands_of
+from tests.support.noise import World
 
 ReferenceRun = namedtuple(
     "ReferenceRun",
@@ -60,14 +61,16 @@ Outcome = namedtuple("Outcome", "reward ticks corrections iterations hits moveme
 """Result of an execution. ``reward`` is None if it failed; ``rows`` are configurations by tick."""
 
 
-def execute(task, solution, model=PAPER):
+def execute(task, solution, model=PAPER, world=None):
     """Execute a solution as :func:`coartic.execute`, movement after movement.
 
-    Joints whose target is NaN do not move.
+    Joints whose target is NaN do not move. With noise, ``world`` is that of the trial.
     """
     q, hits, made, model = np.array(task.q0), [], [], model.for_radius(task.radius)
+    world = world or World(model)
     rows, corrections, iterations = [np.empty((0, len(q)))], 0, 0
     for number, goal in enumerate(task.goals, 1):
+        world.begin(number - 1)
         due = [movement for movement in solution if movement.goal == number]
         hand = due[0].hand
         where = hand, goal, task.radius
@@ -75,24 +78,26 @@ def execute(task, solution, model=PAPER):
         for index, movement in enumerate([*due, Movement(number, hand, "corrective")]):
             if hit and (index > 0 or movement.kind == "corrective"):
                 continue
-            target, way = movement.target, ()
-            if movement.kind == "path":
-                way = movement.waypoints
-                target = way[-1]
-            elif target is None:
-                locked = task.locked_base
-                found = correct(task.robot, q, hand, goal, locked_base=locked, model=model)
-                target, iterations = found.q, iterations + found.iterations
-                if not found.converged:
-                    break
-            target = np.where(np.isnan(target), q, target)
+            if movement.kind != "path" and movement.target is None:
+                fixed = correct_until_hit(task, q, hand, goal, model, world)
+                iterations, corrections = iterations + fixed.iterations, corrections + fixed.count
+                q, hit = fixed.q, fixed.hit
+                if fixed.count:
+                    made.append(replace(movement, target=fixed.found, ticks=fixed.ticks))
+                    rows += fixed.rows
+                break
+            is_path = movement.kind == "path"
+            corners = world.end_of(q, movement.waypoints if is_path else [movement.target])
+            way = corners if is_path else ()
             stops = movement.kind != "corrective"
-            points = verify.path(q, way, model) if len(way) else verify.line(q, target, model)
+            points = path_of(q, way, corners[-1], model)
             q, ticks, hit, _ = move(
-                task.robot, q, target, *where, stop_on_arrival=stops, model=model, waypoints=way
-            )
+                task.robot, q, corners[-1], *where, stop_on_arrival=stops, model=model,
+                waypoints=way,
+            )  # fmt: skip
             rows.append(points.T[:ticks])
             corrections += movement.kind == "corrective"
+            target = movement.waypoints[-1] if is_path else movement.target
             made.append(replace(movement, target=target, ticks=ticks))
         if not hit:
             break
@@ -104,8 +109,87 @@ def execute(task, solution, model=PAPER):
     return Outcome(reward, ticks, corrections, iterations, hits, made, np.concatenate(rows))
 
 
+def executed_noisily(task, solution, model, seed, draw, grows=False):
+    """Ticks of one execution of :func:`coartic.execute_noisy`; NaN if it fails."""
+    exact = model._replace(motor_noise=0.0).for_radius(task.radius)
+    world = World(model, seed, draw, judge=True, grows=grows)
+    made = execute(task, _without_process(task, solution, exact), model, world)
+    return np.nan if made.reward is None else made.ticks
+
+
+def _without_process(task, solution, model):
+    """Return a solution without the corrective movements that the process makes itself.
+
+    These are the ones without a target, or with that of the process in the execution without noise,
+    and all movements for the goal after them.
+    """
+    q, failed, kept = np.array(task.q0), False, []
+    for number, goal in enumerate(task.goals, 1):
+        due, before = [movement for movement in solution if movement.goal == number], len(kept)
+        hand = due[0].hand
+        where = hand, goal, task.radius
+        hit = due[0].kind == "corrective" and move(task.robot, q, q, *where, model=model).hit
+        for movement in [*due, Movement(number, hand, "corrective")]:
+            found = correct(task.robot, q, hand, goal, locked_base=task.locked_base, model=model)
+            if movement.kind == "corrective":
+                own = movement.target is not None and not hit and not failed
+                if own and found.converged:
+                    own = np.nanmax(np.abs(found.q - movement.target)) > 1e-9
+                if not own:
+                    failed = failed or (not hit and not found.converged)
+                    if not hit and not failed:
+                        q = move(
+                            task.robot, q, found.q, *where, model=model, stop_on_arrival=False
+                        ).q
+                    break
+            kept.append(movement)
+            if not hit and not failed:
+                way = movement.waypoints if movement.kind == "path" else ()
+                target = way[-1] if len(way) else np.where(np.isnan(t := movement.target), q, t)
+                stops = movement.kind in ("learned", "planned")
+                q, _, hit, _ = move(
+                    task.robot, q, target, *where, stop_on_arrival=stops, model=model, waypoints=way
+                )
+        if len(kept) == before:
+            kept.append(Movement(number, hand, "corrective"))
+    return kept
+
+
+def path_of(q, way, target, model):
+    """Points of a movement along a way, or straight to a target."""
+    return verify.path(q, way, model) if len(way) else verify.line(q, target, model)
+
+
+def correct_until_hit(task, q, hand, goal, model, world, **how):
+    """Correct a miss by the corrective process: once, or with noise until the goal is hit.
+
+    After 50 corrections, or where the process does not converge, the goal is missed.
+    """
+    free = np.zeros(len(q), dtype=np.bool_)
+    free[:2] = ["x" not in task.locked_base, "y" not in task.locked_base]
+    free[task.robot.joints(hand)] = True
+    result = SimpleNamespace(q=q, hit=False, count=0, ticks=0, iterations=0, found=None, rows=[])
+    for _ in range(50 if world.sd else 1):
+        found = correct(
+            task.robot, result.q, hand, goal, locked_base=task.locked_base, model=model, **how
+        )
+        result.iterations += found.iterations
+        if not found.converged:
+            break
+        end = world.end_of_correction(result.q, found.q, free)
+        points = verify.line(result.q, end, model)
+        result.q, ticks, result.hit, _ = move(
+            task.robot, result.q, end, hand, goal, task.radius, stop_on_arrival=False, model=model
+        )
+        result.found, result.ticks, result.count = found.q, result.ticks + ticks, result.count + 1
+        result.rows.append(points.T[:ticks])
+        if result.hit:
+            break
+    return result
+
+
 def correct(robot, q, hand, goal, *, locked_base=(), model=PAPER, pull=0.0, preferred=None):
-    """Correct a posture as :func:`coartic.motion.correction.correct`.
+    """Correct a posture as :func:`coartic.motion.doors.correct`.
 
     The Jacobian is a matrix. Each iteration adds β N(x) (p − x) with the pull β and a preferred
     posture p.
@@ -192,6 +276,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
             direction = condition.direction if condition.pull else "next-goal"
             greedy = {"hand_exploration": "none", "drift": 0.0, "noise_sd": 0.0}
             condition, counted = replace(condition, direction=direction, **greedy), iterations
+        world = World(model, seed, trial)
         drift = condition.drifts[0]
         if trial and len(condition.drifts) > 1:
             drift = condition.drifts[int(rng.random() * len(condition.drifts))]
@@ -201,6 +286,7 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
         visited = []
         subtasks = []
         for number, goal in enumerate(task.goals):
+            world.begin(number)
             state = (number, previous)
             spent_before = total
             if trial == 0:
@@ -215,26 +301,21 @@ def learn(task, condition, *, seed, trials, model=PAPER, start=()):
                     target = _explore(task, condition, q, hand, targets[state, hand], rng, drift, p)
                 else:
                     target = start[number].target
-                result = move(task.robot, q, target, hand, goal, task.radius, model=model)
+                (end,) = world.end_of(q, [target])
+                result = move(task.robot, q, end, hand, goal, task.radius, model=model)
                 q, total, hit = result.q, total - result.ticks, result.hit
             else:
                 hit = _distance(task.robot.forward_kinematics(q, hand), goal) <= task.radius
             if not hit:
                 if has_target and not condition.corrects:
                     break
-                correction = correct(
-                    task.robot, q, hand, goal, locked_base=task.locked_base, model=model,
-                    pull=condition.pull if trial else 0.0, preferred=p,
-                )  # fmt: skip
-                iterations += correction.iterations
-                if not correction.converged:
+                pull = condition.pull if trial else 0.0
+                fixed = correct_until_hit(task, q, hand, goal, model, world, pull=pull, preferred=p)
+                iterations += fixed.iterations
+                q, total = fixed.q, total - fixed.ticks
+                by_trial[trial] += fixed.count
+                if not fixed.hit:
                     break
-                result = move(
-                    task.robot, q, correction.q, hand, goal, task.radius,
-                    stop_on_arrival=False, model=model,
-                )  # fmt: skip
-                q, total = result.q, total - result.ticks
-                by_trial[trial] += 1
             visited.append((state, hand, q))
             subtasks.append(total - spent_before)
             previous = hand

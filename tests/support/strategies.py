@@ -175,11 +175,14 @@ def random_solution(task, model, rng):
 
 
 def solve(method, task, seed=0, *, budget=None, model=PAPER, **parameters):
-    """Run a built-in method on a task, and return its result, the execution, and the session."""
+    """Run a built-in method on a task, and return its result, the execution, and the session.
+
+    The solution is executed without the motor noise of the model.
+    """
     options = {"trial_budget": budget, "model": model, "trusted": True}
     session = Session(as_task(task), seed, method.information, **options)
     result = method(method.Parameters(**parameters)).solve(session)
-    return result, execute(task, result.solution), session
+    return result, execute(task, result.solution, model=model.without_noise()), session
 
 
 def make_trials(task, hands, targets, model=PAPER):
@@ -192,13 +195,15 @@ def steps_from(q, configurations):
     return np.diff(np.vstack([q, *configurations]), axis=0)
 
 
-def least_cost(task, hands, moving, starts, *, radius, square=False):
+def least_cost(task, hands, moving, starts, *, radius, square=False, base_weight=1.0):
     """Return the smallest length of steps in joint space with which hands hit all goals.
 
     With ``square``, it is the smallest sum of squares. The minimum is found by SLSQP from
     ``starts``, over the steps of the joints that are ``moving``, shape (G, dof). All other steps
-    are 0.
+    are 0. Steps of the base count ``base_weight`` times.
     """
+
+    weights = np.where(np.arange(task.robot.dof) < 2, base_weight, 1.0)
 
     def steps(x):
         steps = np.zeros(moving.shape)
@@ -206,7 +211,7 @@ def least_cost(task, hands, moving, starts, *, radius, square=False):
         return steps
 
     def cost(x):
-        squares = (steps(x) ** 2).sum(axis=1)
+        squares = ((steps(x) * weights) ** 2).sum(axis=1)
         return squares.sum() if square else np.sqrt(squares + 1e-14).sum()
 
     def room(x):

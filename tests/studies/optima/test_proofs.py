@@ -11,7 +11,8 @@ import pytest
 from scipy.spatial import KDTree
 
 from coartic import PAPER, corrective_trial, execute, load_task
-from coartic.motion.solution import Movement, hand_sequences
+from coartic.motion.execution import hand_sequences
+from coartic.motion.solution import Movement
 from coartic.tasks.task import hands_of
 from tests.support.processes import programs
 from tests.support.strategies import (

@@ -10,7 +10,7 @@ import pytest
 
 from coartic import CoarticError, execute, load_task
 from coartic.baselines.optimum import OptimumSearch
-from coartic.motion.solution import corrective_trial, other_arm_travel
+from coartic.motion.execution import corrective_trial, other_arm_travel
 from coartic.runs.shipped import open_shipped
 from coartic.tasks import optima
 from coartic.tasks.families import shipped_families

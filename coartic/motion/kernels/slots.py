@@ -14,19 +14,21 @@ kernel.
 from __future__ import annotations
 
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.model import PAPER, PAPER_RADIUS, MotionModel
-from coartic.motion.compile import chain_by, inlined, inner, record_type
-from coartic.motion.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
+from coartic.model import PAPER, PAPER_RADIUS, MotionModel, Norm
+from coartic.motion.kernels.compile import chain_by, inlined, inner, record_type
+from coartic.motion.kernels.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
 from coartic.robot import BASE_DOF, HANDS, Arm, Robot
 
 SLOTS = 72
 """Number of slots of a batch: few enough to stay in the processor's innermost cache."""
 _VECTOR = 8  # number of slots in a vector; SLOTS is a multiple of it
+NORMS = get_args(Norm)
+"""Norms of joint space; kernels know a norm by its index."""
 GOING = 0.0
 """Status of a slot whose movement or correction goes on."""
 RobotRecord = Any
@@ -63,7 +65,8 @@ def _parameters_type(links: int) -> np.dtype[np.void]:
     """Return the NumPy type of the record of :func:`robot_parameters` for ``links`` per arm."""
     arm = {"first_joint": np.int64, "count": np.int64, "links": (np.float64, links)}
     shoulder = dict.fromkeys(("shoulder_x", "shoulder_y"), np.float64)
-    model = dict.fromkeys(MotionModel._fields, np.float64) | {"max_iterations": np.int64}
+    model: dict[str, Any] = dict.fromkeys(MotionModel._fields, np.float64)
+    model |= {"max_iterations": np.int64, "norm": np.int64}  # index in NORMS
     fields = {
         "arms": (record_type(arm | shoulder), len(HANDS)),
         "model": record_type(model),
@@ -71,6 +74,7 @@ def _parameters_type(links: int) -> np.dtype[np.void]:
         "free_x": np.bool_,  # True if the corrective process moves the base in x
         "free_y": np.bool_,
         "checks": np.bool_,  # True if an arm without a target stays if its hand is in the goal
+        "grows": np.bool_,  # True if the noise of aimed movements grows with their length
     }
     return record_type(fields)
 
@@ -83,6 +87,7 @@ def robot_parameters(
     locked_base: tuple[str, ...] = (),
     model: MotionModel = PAPER,
     checks: bool = True,
+    grows: bool = False,
 ) -> NDArray[np.void]:
     """Return robot, constants and options as a record for kernels.
 
@@ -99,6 +104,8 @@ def robot_parameters(
     checks : bool
         True if an arm without a target stays when its hand is in the goal already; False if the
         corrective process begins at once.
+    grows : bool
+        True if the motor noise of aimed movements grows with their length.
 
     Returns
     -------
@@ -118,8 +125,9 @@ def robot_parameters(
         arm["first_joint"], arm["count"] = first_joint, len(links)
         arm["links"][: len(links)] = links
         arm["shoulder_x"], arm["shoulder_y"] = shoulder
-    parameters["model"] = model.for_radius(radius)
-    parameters["radius"], parameters["checks"] = radius, checks
+    constants = model.for_radius(radius)
+    parameters["model"] = tuple(constants._replace(norm=NORMS.index(model.norm)))  # type: ignore[arg-type]
+    parameters["radius"], parameters["checks"], parameters["grows"] = radius, checks, grows
     for axis in "xy":
         parameters[f"free_{axis}"] = axis not in locked_base
     return parameters
@@ -161,20 +169,26 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
     width = width_of(robot)
     fields = {
         "q": (np.float64, width),  # where the robot is, in length units and rad
-        "target": (np.float64, width),  # of a movement; where a correction has ended
+        "target": (np.float64, width),  # of a movement, as asked for; where A has ended
+        "end": (np.float64, width),  # where the movement ends unless it stops: target with noise
         "preferred": (np.float64, width),  # preferred posture, in length units and rad
         "drift": np.float64,  # share of the path to it by which the mean of exploration moves
         "pull": np.float64,  # share of that path in an iteration of the corrective process
         "goal": (np.float64, 2),  # x and y, in length units
         "hand": np.int64,  # the hand that is to hit the goal: 0 left, 1 right
-        "action": np.int64,  # the next action: see coartic.motion.trial
+        "world": np.uint64,  # key of the noise: see coartic.motion.kernels.noise
+        "number": np.int64,  # of the goal, from 0
+        "made": np.int64,  # movements made for this goal
+        "action": np.int64,  # the next action: see coartic.motion.kernels.trial
         "corrects": np.bool_,  # True if the corrective process acts where a movement misses
         "going": np.bool_,  # True if the run has hit every goal so far
         "acting": np.bool_,  # True if the run is among those that are moved or corrected next
         "hit": np.bool_,  # True if the hand is within the goal's radius
         "converged": np.bool_,  # True if the corrective process has converged
-        "ticks": np.int64,  # of the movement
-        "iterations": np.int64,  # of the corrective process
+        "ticks": np.int64,  # of the movement, or of all corrections for the goal
+        "spent": np.int64,  # of these, of the corrections before the present one
+        "corrections": np.int64,  # corrective movements made for the goal
+        "iterations": np.int64,  # of the corrective process for the goal
         "evaluations": np.int64,  # of forward kinematics, since the last account
     }
     record, corrected, moved = layout(_links_for(robot))
@@ -213,7 +227,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "rate": (links,),  # of the absolute link angles, in rad per step
         "base_rate": (2,),
         "end": (2,),  # position to which the target would bring the hand
-        "distance": (),  # from start to target (its square before divide_steps)
+        "distance": (),  # length of the movement (its square before divide_steps)
         **dict.fromkeys(("step", "last", "slowness", "bend", "clearance"), ()),
         "x": (links + 1,),  # of shoulder, joints and hand
         "y": (links + 1,),
@@ -262,7 +276,10 @@ def load(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) ->
 
 @inlined
 def squared_distance(run: RunRecord) -> float:
-    """Return the squared joint-space distance from a run's configuration to its target."""
+    """Return the squared Euclidean distance from a run's configuration to its target.
+
+    By this distance postures are chosen, in every world.
+    """
     square = 0.0
     for j in range(len(run.q)):
         delta = run.target[j] - run.q[j]
@@ -271,16 +288,36 @@ def squared_distance(run: RunRecord) -> float:
 
 
 @inlined
-def start(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) -> None:
+def squared_length(run: RunRecord, model: Any) -> float:
+    """Return the squared length of the movement from a run's configuration to its ``end``.
+
+    The length is in the norm of ``model``, with its weight of the base. A movement of this length
+    takes as many steps as the length has parts of ``model.step``.
+    """
+    square = 0.0
+    for j in range(len(run.q)):
+        delta = run.end[j] - run.q[j]
+        if j < BASE_DOF:
+            delta *= model.base_weight
+        if model.norm == 0:
+            square += delta * delta
+        else:
+            square = max(square, delta * delta)
+    return square
+
+
+@inlined
+def start(slots: SlotArrays, slot: int, number: int, run: RunRecord, robot: RobotRecord) -> None:
     """Load a run into a slot for a movement, in place.
 
-    In addition to what :func:`load` does, this function copies start and target and the squared
-    joint-space distance between them, so that :func:`move_slots` can make the movement.
+    In addition to what :func:`load` does, this function copies start and end and the squared length
+    of the movement, so that :func:`move_slots` can make the movement.
     """
+    arm = arm_of(robot, run.hand)
     load(slots, slot, number, run, arm)
     _copy_arm(slots.start, slot, run.q, arm)
-    _copy_arm(slots.target, slot, run.target, arm)
-    slots.distance[slot] = squared_distance(run)
+    _copy_arm(slots.target, slot, run.end, arm)
+    slots.distance[slot] = squared_length(run, robot.model)
 
 
 @inlined

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from coartic.errors import CoarticError
 from coartic.robot import chain, lever
 
-PACKAGE = Path(__file__).parent.parent
+PACKAGE = Path(__file__).parents[2]
 _KEPT_S = 30 * 24 * 3600.0  # time for which unused machine code of other sources is stored
 _LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
 _TOLD_S = 5.0  # time after which a message names the process that is waited for

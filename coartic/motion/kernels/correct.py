@@ -12,15 +12,16 @@ The kernels make the iterations of the process for many arms side by side.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion import trigonometry
-from coartic.motion.batch import (
+from coartic.motion.kernels import trigonometry
+from coartic.motion.kernels.compile import entry, fill_row, inlined, inner, joint_lever, shared
+from coartic.motion.kernels.move import largest_square, move_acting
+from coartic.motion.kernels.noise import MAX_CORRECTIONS, miss_correction
+from coartic.motion.kernels.slots import (
     GOING,
     Batch,
     RobotRecord,
@@ -31,28 +32,13 @@ from coartic.motion.batch import (
     have_small_angles,
     load,
     padded_count,
-    robot_parameters,
     store,
     winding,
 )
-from coartic.motion.compile import entry, inlined, inner, joint_lever, shared
-from coartic.motion.movement import largest_square, one_run
-from coartic.robot import BASE_DOF, Array, Hand, Robot
+from coartic.robot import BASE_DOF
 
 _RANK = 1e-12  # squared ratio of singular values up to which the smaller one counts as 0
 _AT_GOAL, _FAILED, _STUCK = 1.0, 2.0, 3.0  # status of a slot whose correction has ended
-
-
-class Correction(NamedTuple):
-    """Result of the corrective process (:func:`correct`)."""
-
-    q: Array
-    """Configuration found, shape ``(dof,)``, in length units and rad; the last iterate if
-    ``converged`` is False."""
-    converged: bool
-    """True if the hand is within ``MotionModel.correction_tolerance`` of the goal's centre."""
-    iterations: int
-    """Iterations made, with one Jacobian each."""
 
 
 @inner
@@ -124,9 +110,9 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
     or no longer changes, or after ``max_iterations``. The slots are loaded by :func:`load`, and
     free afterwards. In the record of each run
 
-    - ``converged`` and ``iterations`` are set;
+    - ``converged`` is set, and ``iterations`` grows;
     - ``target`` gets base and arm of the last iterate; the entries of the other arm stay;
-    - ``evaluations`` grows by ``iterations`` + 1.
+    - ``evaluations`` grows by these iterations + 1.
 
     ``pull`` is None or a kernel ``pull(slots, count, robot, runs)``. The kernel sets ``slots.pull``
     to what the next iteration adds to ``slots.q`` in addition to α Jᵀ e, 0 for locked coordinates
@@ -148,8 +134,9 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
                 run = batch.runs[slots.run[slot]]
                 store(slots, slot, run.target)
                 run.converged = slots.status[slot] == _AT_GOAL
-                run.iterations = iteration + (slots.status[slot] == _STUCK)
-                run.evaluations += run.iterations + 1
+                made = iteration + (slots.status[slot] == _STUCK)
+                run.iterations += made
+                run.evaluations += made + 1
                 count -= 1
                 compact(batch.corrected, slot, count)
                 ended -= 1
@@ -234,73 +221,81 @@ def correct_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
     descend_to_goals(batch, count, robot, None)
 
 
+@inlined
+def _find_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> int:
+    """Let a corrective process set the ``target`` of each run that it applies to.
+
+    The process applies to those of the first ``count`` runs that missed the goal, go on and may be
+    corrected. ``descend`` is the kernel of the process **A**. In each of the first ``count`` runs
+    ``converged`` becomes True if **A** converged, and ``iterations`` grows. Return to how many runs
+    the process applied.
+    """
+    slots, slot = batch.slots[0], 0
+    for i in range(count):
+        run = batch.runs[i]
+        run.acting, run.converged = run.corrects and run.going and not run.hit, False
+        if run.acting:
+            fill_row(run.target, run.q)
+            load(slots, slot, i, run, arm_of(robot, run.hand))
+            slot += 1
+    applied = slot
+    descend(batch, slot, robot)
+    return applied
+
+
+@inlined
+def _correct_by(count: int, robot: RobotRecord, batch: Batch, descend: Any) -> None:
+    """Correct the first ``count`` runs: phase 4, *correct*.
+
+    The process **A**, kernel ``descend``, looks for a configuration that hits the goal, and the
+    robot moves there; the movement ends as soon as the hand is in the goal. Without noise a run is
+    corrected once. With noise the movement misses, and the run is corrected until it hits the goal,
+    at most 50 times, unless **A** does not converge. ``ticks``, ``corrections`` and ``iterations``
+    of a run become sums over its corrections, 0 if there is none, and ``target`` becomes the
+    configuration that **A** found last.
+    """
+    for i in range(count):
+        run = batch.runs[i]
+        run.ticks, run.corrections, run.iterations = 0, 0, 0
+    noisy = robot.model.motor_noise > 0.0
+    for _ in range(MAX_CORRECTIONS if noisy else 1):
+        if _find_by(count, robot, batch, descend) == 0:
+            break
+        for i in range(count):
+            run = batch.runs[i]
+            run.acting = run.converged
+            run.corrects = run.converged  # if A does not converge, the trial has failed
+            run.spent, run.corrections = run.ticks, run.corrections + run.converged
+            if run.converged and noisy:
+                miss_correction(run, robot)
+            elif run.converged:
+                fill_row(run.end, run.target)
+        move_acting(count, False, robot, batch)
+        for i in range(count):
+            run = batch.runs[i]
+            if run.acting:
+                run.ticks += run.spent
+
+
+@shared
+def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
+    """Correct runs that missed the goal by the paper's corrective process (:func:`_correct_by`)."""
+    _correct_by(count, robot, batch, correct_slots)
+
+
+@shared
+def pull_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
+    """Correct runs as :func:`correct_runs` does, with **A** pulled to preferred postures."""
+    _correct_by(count, robot, batch, pull_slots)
+
+
 @entry
-def _correct_kernel(robot: NDArray[np.void], batch: Batch) -> None:
+def correct_kernel(robot: NDArray[np.void], batch: Batch) -> None:
     """Run the corrective process for the first run of a batch (:func:`descend_to_goals`).
 
     ``robot`` comes from :func:`robot_parameters`.
     """
     run = batch.runs[0]
+    run.iterations = 0
     load(batch.slots[0], 0, 0, run, arm_of(robot[0], run.hand))
     correct_slots(batch, 1, robot[0])
-
-
-def correct(
-    robot: Robot,
-    q: Array,
-    hand: Hand,
-    goal: tuple[float, float],
-    *,
-    locked_base: Collection[str] = (),
-    model: MotionModel = PAPER,
-) -> Correction:
-    """Find a configuration with a hand at a goal by Jacobian-transpose inverse kinematics.
-
-    This is the paper's corrective process, which descends from ``q`` on the distance to the goal.
-    The other arm does not move.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    q : ndarray, shape (dof,)
-        Configuration in which the process begins, in length units (base) and rad (joints).
-    hand : {"left", "right"}
-        The hand.
-    goal : tuple of float
-        Centre of the goal, x and y in length units.
-    locked_base : collection of {"x", "y"}
-        Coordinates of the base that do not move.
-    model : MotionModel
-        The constants; only ``gain``, ``correction_tolerance`` (0.01 length units for None) and
-        ``max_iterations`` are used.
-
-    Returns
-    -------
-    Correction
-        The configuration, whether its hand is at the goal, and how many iterations the process
-        took. If the process does not converge within ``model.max_iterations``, ``converged`` is
-        False, and no error is raised.
-
-    Raises
-    ------
-    TypeError
-        ``robot`` or ``model`` has another type.
-    ValueError
-        An argument cannot be used:
-
-        - a shape is wrong;
-        - a number is not finite, or beyond 100,000;
-        - the hand is unknown;
-        - ``locked_base`` has an entry other than ``"x"`` and ``"y"``;
-        - a constant of the model is out of bounds.
-
-    Notes
-    -----
-    Source: paper, Figure 2 (Whitney 1969; Craig 2004).
-    """
-    batch = one_run(robot, q, hand, goal)
-    run, entries = batch.runs[0], slice(robot.dof)
-    locked = tuple(map(str, locked_base if isinstance(locked_base, Collection) else [locked_base]))
-    _correct_kernel(robot_parameters(robot, locked_base=locked, model=check_model(model)), batch)
-    return Correction(run["target"][entries].copy(), bool(run["converged"]), int(run["iterations"]))

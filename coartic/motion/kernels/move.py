@@ -7,7 +7,9 @@ q^t is ::
     q + k m (q^t - q) / |q^t - q|   for k < n
     q^t                             for k = n = ceil(|q^t - q| / m)
 
-where m is the length of a step. Before each step the stopping rule is evaluated. A movement ends if
+where m is the length of a step, and |·| the norm of the motion model. With motor noise q^t is
+displaced (:mod:`coartic.motion.kernels.noise`). Before each step the stopping rule is evaluated. A
+movement ends if
 
 - the chosen hand is within the goal's radius, or
 - the movement is towards a learned or planned target, and the hand is within θ^a of the position to
@@ -23,30 +25,30 @@ rule at every step, although they do not visit every step (:func:`clear_steps`).
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from coartic.internal.limits import brief_value, check_limits, real_array
-from coartic.model import PAPER, MotionModel, check_model
-from coartic.motion import trigonometry
-from coartic.motion.batch import (
+from coartic.motion.kernels import trigonometry
+from coartic.motion.kernels.compile import entry, fill_row, inlined, inner, shared
+from coartic.motion.kernels.noise import displace_path, miss_target
+from coartic.motion.kernels.slots import (
     GOING,
     Batch,
     RobotRecord,
+    RunRecord,
     SlotArrays,
     arm_of,
-    batch_for,
     compact,
     find_positions,
+    have_small_angles,
+    load,
     padded_count,
-    robot_parameters,
     start,
     winding,
 )
-from coartic.motion.compile import entry, fill_row, inner, shared
-from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
+from coartic.robot import BASE_DOF
 
 # Each bound has a clearance against rounding: a constant, and per joint a share (_ROUNDING) of the
 # size of positions and angles.
@@ -56,20 +58,15 @@ _single = np.float32
 _LESS, _FEWER, _UNDERFLOW = _single(1.0 - 6e-7), _single(1.0 - 1e-5), _single(1e-18)
 _NOTHING, _OVERFLOW = _single(0.0), _single(math.inf)
 _IN_GOAL, _MISSED = 1.0, 2.0  # status of a slot whose movement has ended
-LARGEST_ENTRY = 1e5  # of any entry of a configuration or goal, in length units or rad
+IDLE, CHECK, MOVE, REPEAT, FOLLOW = range(5)
+"""Next action of a run:
 
-
-class MoveResult(NamedTuple):
-    """Result of one movement (:func:`move`)."""
-
-    q: Array
-    """Configuration in which the movement stopped, shape ``(dof,)``, in length units and rad."""
-    ticks: int
-    """Control ticks spent. The reward of the movement is ``-ticks``."""
-    hit: bool
-    """True if the hand is within the goal's radius."""
-    evaluations: int
-    """Forward-kinematics evaluations; on a path (:func:`follow`) one per tick."""
+- ``IDLE``: none;
+- ``CHECK``: check whether the hand is in the goal;
+- ``MOVE``: move to the target, and end on a hit or on arrival;
+- ``REPEAT``: make a corrective movement, which ends on a hit or at the target;
+- ``FOLLOW``: follow a path, and end on a hit or at its last waypoint.
+"""
 
 
 @inner
@@ -129,14 +126,16 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 
 
 @inner
-def divide_steps(slots: SlotArrays, count: int, step: float) -> bool:
+def divide_steps(slots: SlotArrays, count: int, model: Any) -> bool:
     """Divide the movements in the first ``count`` slots into steps, in place.
 
-    This sets rates, bounds and numbers of steps of length ``step`` in joint space; ``distance``,
-    which :func:`start` has filled with its square, becomes the distance. Return whether all link
-    angles certainly stay below 1e5 rad in size (:func:`winding`).
+    This sets rates, bounds and numbers of steps; ``distance``, which :func:`start` has filled with
+    its square, becomes the length of the movement. Return whether all link angles certainly stay
+    below 1e5 rad in size (:func:`winding`).
     """
-    large = 0
+    large, step = 0, model.step
+    # In a step no joint turns by more than the step, and the base moves at most this far.
+    base_step = step / min(model.base_weight, 1.0)
     for i in range(padded_count(count)):
         distance = math.sqrt(slots.distance[i])
         per_step = step / distance if distance > 0.0 else 0.0
@@ -158,7 +157,7 @@ def divide_steps(slots: SlotArrays, count: int, step: float) -> bool:
         # A joint turns at most as far as at the farther end, plus a step if it overshoots.
         angle = winding(slots.start, i) + winding(slots.target, i) + step * len(slots.length)
         large += 0 if angle < trigonometry.LARGEST else 1
-        size = reach * (1.0 + angle) + step
+        size = reach * (1.0 + angle) + base_step
         for j in range(BASE_DOF):
             size += abs(slots.start[j, i]) + abs(slots.target[j, i]) + abs(slots.shoulder[j, i])
         slots.clearance[i] = _CLEARANCE + _ROUNDING * len(slots.x) * size
@@ -233,7 +232,7 @@ def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotReco
     slots, evaluations, step = batch.slots[0], 0, robot.model.step
     rims = robot.radius, robot.model.arrival_tolerance
     squares = largest_square(rims[0]), largest_square(rims[1])
-    small_angles = divide_steps(slots, count, step)
+    small_angles = divide_steps(slots, count, robot.model)
     if stop_on_arrival:
         for j in range(len(slots.q)):
             fill_row(slots.q[j], slots.target[j])
@@ -252,12 +251,12 @@ def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotReco
             if slots.status[slot] == GOING:
                 continue
             run = batch.runs[slots.run[slot]]
-            q, target = run.q, run.target
+            q, end = run.q, run.end
             at_end = slots.step[slot] == slots.last[slot]
             fraction = 0.0 if at_end else slots.step[slot] * step / slots.distance[slot]
             for j in range(len(q)):
-                between = q[j] + fraction * (target[j] - q[j])
-                q[j] = target[j] if at_end else between
+                between = q[j] + fraction * (end[j] - q[j])
+                q[j] = end[j] if at_end else between
             run.hit = slots.status[slot] == _IN_GOAL
             run.ticks = int(slots.step[slot]) + 1
             run.evaluations += evaluations
@@ -268,224 +267,200 @@ def move_slots(batch: Batch, count: int, stop_on_arrival: bool, robot: RobotReco
                 break
 
 
+@shared
+def move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> None:
+    """Move each of the first ``count`` runs that is ``acting`` to its ``end``, in place.
+
+    A movement ends on a hit or at its end. With ``stops`` it also ends when the hand is near the
+    position to which its end brings it.
+    """
+    slots, slot = batch.slots[0], 0
+    for i in range(count):
+        if batch.runs[i].acting:
+            start(slots, slot, i, batch.runs[i], robot)
+            slot += 1
+    if slot > 0:
+        move_slots(batch, slot, stops, robot)
+
+
+@inlined
+def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
+    """Let each of the first ``count`` runs do its ``action``, unless it follows a path.
+
+    :data:`IDLE` lists the actions. ``q``, ``hit``, ``ticks``, ``evaluations`` and ``acting`` change
+    in place. Ticks are 0 if there is no movement. A movement to a target misses it by noise.
+    """
+    for i in range(count):
+        run = batch.runs[i]
+        if robot.model.motor_noise > 0.0 and (run.action == MOVE or run.action == REPEAT):
+            miss_target(run, robot)
+        else:
+            fill_row(run.end, run.target)
+    for stops in (True, False):
+        for i in range(count):
+            run, action = batch.runs[i], batch.runs[i].action
+            # CHECK is a movement to the present configuration.
+            run.acting = action == MOVE if stops else action in (CHECK, REPEAT)
+        move_acting(count, stops, robot, batch)
+    for i in range(count):
+        if batch.runs[i].action < MOVE:
+            batch.runs[i].ticks = 0
+
+
+# ---- Paths ----
+
+
+@inlined
+def _corner(run: RunRecord, waypoints: Any, k: int, j: int, noisy: bool) -> Any:
+    """Return entry ``j`` of corner ``k`` of a path: -1 is where the run stands, 0 the first of the
+    ``waypoints``.
+
+    With noise, ``run.end`` has the displacement of the last waypoint, NaN where nothing moves.
+    """
+    if k < 0 or (noisy and math.isnan(run.end[j])):
+        return run.q[j]
+    if noisy:
+        return waypoints[k, j] + (k + 1) / len(waypoints) * run.end[j]
+    return waypoints[k, j]
+
+
+@inlined
+def _sum_of_squares(
+    run: RunRecord, waypoints: Any, k: int, entries: Any, noisy: bool, weight: float
+) -> float:
+    """Add the squared changes of some entries from corner ``k`` - 1 to corner ``k`` of a path."""
+    square = 0.0
+    for j in entries:
+        delta = _corner(run, waypoints, k, j, noisy) - _corner(run, waypoints, k - 1, j, noisy)
+        delta *= weight if j < BASE_DOF else 1.0
+        square += delta * delta
+    return square
+
+
+@inner
+def _segment_length(run: RunRecord, waypoints: Any, k: int, model: Any) -> float:
+    """Return the length of a path from corner ``k`` - 1 to corner ``k``.
+
+    The squares are added in the order of ``numpy.sum``, so that the result is that of
+    :func:`coartic.motion.doors.segment_lengths`.
+    """
+    noisy, weight, dof = model.motor_noise > 0.0, model.base_weight, waypoints.shape[1]
+    if model.norm > 0:
+        largest = 0.0
+        for j in range(dof):
+            square = _sum_of_squares(run, waypoints, k, range(j, j + 1), noisy, weight)
+            largest = max(largest, square)
+        return math.sqrt(largest)
+    whole, total = dof - dof % 8, 0.0
+    if whole > 0:
+        quarters = (0.0, 0.0, 0.0, 0.0)
+        for first in range(0, 8, 2):
+            pair = 0.0
+            for j in range(first, first + 2):
+                pair += _sum_of_squares(run, waypoints, k, range(j, whole, 8), noisy, weight)
+            quarters = (quarters[1], quarters[2], quarters[3], pair)
+        total = (quarters[0] + quarters[1]) + (quarters[2] + quarters[3])
+    for j in range(whole, dof):
+        total += _sum_of_squares(run, waypoints, k, range(j, j + 1), noisy, weight)
+    return math.sqrt(total)
+
+
+@inner
+def follow(run: RunRecord, waypoints: Any, robot: RobotRecord, slots: SlotArrays) -> None:
+    """Move a run along a path, until its hand hits the goal or stands at the last waypoint.
+
+    ``waypoints`` has shape ``(W, dof)``. Point k of n = ceil(length / m) lies k m along the path;
+    point n is the last waypoint. With noise, waypoint k of W is displaced by k / W of one
+    displacement, in the coordinates that any waypoint moves. ``q``, ``hit`` and ``ticks`` of the
+    run are set, and ``evaluations`` grows by one for each point. Slot 0 is work space.
+    """
+    model, last = robot.model, len(waypoints) - 1
+    noisy = model.motor_noise > 0.0
+    if noisy:
+        fill_row(run.target, waypoints[last])
+        displace_path(run, waypoints, robot)
+    length = 0.0
+    for k in range(last + 1):
+        length += _segment_length(run, waypoints, k, model)
+    steps = int(np.ceil(length / model.step))
+    square = largest_square(robot.radius)
+    load(slots, 0, 0, run, arm_of(robot, run.hand))
+    tip, first_joint = len(slots.length), slots.first_joint[0]
+    # Corner ``segment`` is ``before`` along the path, the next one ``after``.
+    segment, before, after = -1, 0.0, _segment_length(run, waypoints, 0, model)
+    step, run.hit = 0, False
+    while True:
+        along = step * model.step
+        while step < steps and segment < last - 1 and after <= along:
+            segment, before = segment + 1, after
+            after += _segment_length(run, waypoints, segment + 1, model)
+        for j in range(BASE_DOF + slots.links[0]):
+            entry_of = j if j < BASE_DOF else first_joint + j - BASE_DOF
+            slots.q[j, 0] = _point(
+                run, waypoints, segment, before, after, along, step == steps, entry_of, noisy
+            )
+        find_positions(slots, 1, have_small_angles(slots, 1))
+        run.evaluations += 1
+        dx, dy = slots.goal[0, 0] - slots.x[tip, 0], slots.goal[1, 0] - slots.y[tip, 0]
+        run.hit = dx * dx + dy * dy <= square
+        if run.hit or step == steps:
+            break
+        step += 1
+    for j in range(waypoints.shape[1]):
+        run.q[j] = _point(run, waypoints, segment, before, after, along, step == steps, j, noisy)
+    run.ticks = step + 1
+
+
+@inlined
+def _point(
+    run: RunRecord,
+    waypoints: Any,
+    segment: int,
+    before: float,
+    after: float,
+    along: float,
+    at_end: bool,
+    j: int,
+    noisy: bool,
+) -> Any:
+    """Return entry ``j`` of the point of a path at length ``along``, in ``segment``."""
+    if at_end:
+        return _corner(run, waypoints, len(waypoints) - 1, j, noisy)
+    begin = _corner(run, waypoints, segment, j, noisy)
+    end = _corner(run, waypoints, segment + 1, j, noisy)
+    return (end - begin) / (after - before) * (along - before) + begin
+
+
+@inlined
+def follow_paths(
+    count: int, offset: int, movements: Any, waypoints: Any, robot: RobotRecord, batch: Batch
+) -> None:
+    """Let each of the first ``count`` runs whose action is to follow a path do so.
+
+    Row ``offset`` + n of ``movements``, shape ``(N, 3)``, has the action of run n, and the indices
+    in ``waypoints`` of its first waypoint and of the waypoint after its last.
+    """
+    for i in range(count):
+        run = batch.runs[i]
+        if run.action == FOLLOW:
+            begin, end = movements[offset + i, 1], movements[offset + i, 2]
+            follow(run, waypoints[begin:end], robot, batch.slots[0])
+
+
 @entry
-def _move_kernel(stop_on_arrival: bool, robot: NDArray[np.void], batch: Batch) -> None:
+def path_kernel(robot: NDArray[np.void], waypoints: Any, batch: Batch) -> None:
+    """Move the first run of a batch along a path (:func:`follow`)."""
+    follow(batch.runs[0], waypoints, robot[0], batch.slots[0])
+
+
+@entry
+def move_kernel(stop_on_arrival: bool, robot: NDArray[np.void], batch: Batch) -> None:
     """Move the first run of a batch towards its target.
 
     ``robot`` comes from :func:`robot_parameters`; :func:`move_slots` says what is set in the run's
     record.
     """
     run = batch.runs[0]
-    start(batch.slots[0], 0, 0, run, arm_of(robot[0], run.hand))
-    move_slots(batch, 1, stop_on_arrival, robot[0])
-
-
-def move(
-    robot: Robot,
-    q: Array,
-    target: Array,
-    hand: Hand,
-    goal: tuple[float, float],
-    radius: float,
-    *,
-    stop_on_arrival: bool = True,
-    model: MotionModel = PAPER,
-) -> MoveResult:
-    """Move straight in joint space until the hand hits the goal or arrives.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    q : ndarray, shape (dof,)
-        Configuration in which the robot stands, in length units (base) and rad (joints).
-    target : ndarray, shape (dof,)
-        Target configuration, in the same units.
-    hand : {"left", "right"}
-        The hand that is to hit the goal.
-    goal : tuple of float
-        Centre of the goal, x and y in length units.
-    radius : float
-        Radius of the goal (in length units).
-    stop_on_arrival : bool
-        If True, the movement also ends when the hand is near the position to which the target
-        brings it. If False, as in a corrective movement, it ends only on a hit or at its target.
-    model : MotionModel
-        The constants; only ``step`` and ``arrival_tolerance`` are used.
-
-    Returns
-    -------
-    MoveResult
-        Where the robot stopped, the control ticks of the movement, and whether the goal is hit.
-
-    Raises
-    ------
-    ValueError
-        An argument cannot be used:
-
-        - a shape is wrong;
-        - a number is not finite, or beyond 100,000;
-        - the radius is below 0;
-        - the hand is unknown;
-        - a constant of the model is out of bounds.
-    TypeError
-        ``robot``, ``model`` or ``stop_on_arrival`` has another type.
-
-    Notes
-    -----
-    Source: paper, section *Generating Movement for Each Goal*.
-    """
-    if not isinstance(stop_on_arrival, bool | np.bool_):
-        raise TypeError(f"stop_on_arrival is {brief_value(stop_on_arrival)}; it must be a bool")
-    batch = one_run(robot, q, hand, goal, radius)
-    run, entries = batch.runs[0], slice(robot.dof)
-    run["target"][entries] = configuration(robot, target)
-    parameters = robot_parameters(robot, radius, model=check_model(model))
-    _move_kernel(stop_on_arrival, parameters, batch)
-    return MoveResult(
-        run["q"][entries].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
-    )
-
-
-def follow(
-    robot: Robot,
-    q: Array,
-    waypoints: Array,
-    hand: Hand,
-    goal: tuple[float, float],
-    radius: float,
-    *,
-    model: MotionModel = PAPER,
-) -> MoveResult:
-    """Move along a path through waypoints until the hand hits the goal.
-
-    Without a hit the movement ends at the last waypoint. A movement of k steps takes k + 1 ticks.
-
-    Parameters
-    ----------
-    robot : Robot
-    q : ndarray, shape (dof,)
-        Configuration in which the robot stands, in length units (base) and rad (joints).
-    waypoints : ndarray, shape (W, dof)
-        At least one configuration to pass through (:func:`path_points`).
-    hand : {"left", "right"}
-    goal : tuple of float
-        Centre of the goal, x and y in length units.
-    radius : float
-        Radius of the goal (in length units).
-    model : MotionModel
-
-    Returns
-    -------
-    MoveResult
-        Result of the movement, which stops at the first point of the path at which the hand is in
-        the goal, or else at the last waypoint.
-
-    Raises
-    ------
-    ValueError
-        A shape is wrong, the hand is unknown, or a number is not finite or out of bounds.
-    TypeError
-        ``model`` is not a MotionModel.
-    """
-    check_goal(goal, radius), check_model(model)
-    points = path_points(robot, q, waypoints, model)
-    end = len(points) - 1
-    misses = robot.forward_kinematics(points, hand) - np.asarray(goal, dtype=np.float64)
-    inside = np.flatnonzero(np.hypot(*misses.T) <= radius)
-    k = int(inside[0]) if inside.size else end
-    return MoveResult(np.array(points[k]), k + 1, bool(inside.size), k + 1)
-
-
-def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
-    """Return the configurations at the n steps of a straight movement, with both ends.
-
-    ``q`` and ``target`` have shape ``(dof,)``, the result ``(n + 1, dof)``, in length units and
-    rad. The results are rounded as in the kernels.
-    """
-    difference, square = target - q, 0.0
-    for value in difference.tolist():
-        square += value * value
-    distance = math.sqrt(square)
-    k = np.arange(math.ceil(distance / model.step))[:, None]
-    return np.vstack([q + k * model.step / (distance or 1.0) * difference, target])
-
-
-def segment_lengths(configurations: ArrayLike) -> Array:
-    """Return the joint-space distance from each configuration to the next.
-
-    ``configurations`` has shape ``(k, dof)``, the result ``(k - 1,)``, in a mix of length units and
-    rad.
-    """
-    return np.asarray(np.sqrt((np.diff(configurations, axis=0) ** 2).sum(axis=1)))
-
-
-def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
-    """Return the points of the n steps of a path through waypoints in joint space.
-
-    The path goes from ``q``, shape ``(dof,)``, straight to each of the W > 0 ``waypoints`` in turn,
-    shape ``(W, dof)``. The result has shape ``(n + 1, dof)``, in length units and rad. Point k < n
-    lies k times ``model.step`` along the path; point n is the last waypoint. Raises ValueError for
-    a wrong shape, and for a number that is not finite or beyond 100,000.
-    """
-    shape = (len(waypoints), robot.dof)
-    corners = np.vstack([configuration(robot, q), finite_array("waypoints", waypoints, shape)])
-    ends = np.concatenate([[0.0], np.cumsum(segment_lengths(corners))])
-    lengths = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
-    points = np.stack([np.interp(lengths, ends, joint) for joint in corners.T], axis=1)
-    points[-1] = corners[-1]
-    return points
-
-
-def configuration(robot: Robot, q: Any) -> Array:
-    """Return one configuration as a new contiguous array, shape ``(dof,)``.
-
-    Raises ValueError for a wrong shape, and for an entry that is not finite or beyond ±100,000.
-    """
-    return finite_array("configuration", q, (robot.dof,))
-
-
-def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
-    """Return numbers as a new contiguous array of float64.
-
-    Raises ValueError for a shape other than ``shape``, and for a number that is not finite or
-    beyond ±100,000. ``name`` is what the error calls the value.
-    """
-    array = np.array(real_array(name, value), order="C")
-    if array.shape != shape:
-        raise ValueError(f"{name} has shape {array.shape}; it must be {shape}")
-    if not (np.abs(array) <= LARGEST_ENTRY).all():
-        problem = (
-            f"has a number beyond ±{LARGEST_ENTRY:g}"
-            if np.isfinite(array).all()
-            else "is not finite"
-        )
-        raise ValueError(f"{name} {brief_value(array.tolist())} {problem}")
-    return array
-
-
-def one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
-    """Return a batch of one run whose configuration and target are ``q``.
-
-    ``radius`` is only checked. Raises TypeError if ``robot`` is not a Robot, and ValueError for any
-    other argument that does not fit.
-    """
-    if not isinstance(robot, Robot):
-        raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
-    robot.arm(hand)
-    batch = batch_for(robot, 1)
-    run = batch.runs[0]
-    run["q"][: robot.dof] = run["target"][: robot.dof] = configuration(robot, q)
-    run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal, radius)
-    return batch
-
-
-def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
-    """Return the centre of a goal, x and y, as two floats.
-
-    Raises ValueError if ``centre`` is not two finite numbers within ±100,000, or if ``radius`` is
-    not from 0 to 100,000 (in length units).
-    """
-    x, y = finite_array("goal", centre, (2,)).tolist()
-    check_limits("radius", radius, 0.0, LARGEST_ENTRY)
-    return x, y
+    fill_row(run.end, run.target)
+    run.acting = True
+    move_acting(1, stop_on_arrival, robot[0], batch)

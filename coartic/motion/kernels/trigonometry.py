@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from coartic.motion.compile import scalar
+from coartic.motion.kernels.compile import scalar
 
 LARGEST = 1e5  # rad; up to here k * _HIGH and k * _MIDDLE below are exact
 

@@ -1,0 +1,337 @@
+"""Single movements and corrections, and the points of movements: doors to the kernels.
+
+A movement is straight in joint space, or follows a path. Its length is measured in the norm of the
+motion model, in which a length unit of the base counts as much as ``base_weight`` rad of a joint.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from coartic.internal.limits import brief_value, check_limits, real_array
+from coartic.model import PAPER, MotionModel, check_exact
+from coartic.motion.kernels.correct import correct_kernel
+from coartic.motion.kernels.move import move_kernel, path_kernel
+from coartic.motion.kernels.slots import Batch, batch_for, robot_parameters
+from coartic.robot import BASE_DOF, HANDS, LARGEST_ENTRY, Array, Hand, Robot
+
+
+class MoveResult(NamedTuple):
+    """Result of one movement (:func:`move`)."""
+
+    q: Array
+    """Configuration in which the movement stopped, shape ``(dof,)``, in length units and rad."""
+    ticks: int
+    """Control ticks spent. The reward of the movement is ``-ticks``."""
+    hit: bool
+    """True if the hand is within the goal's radius."""
+    evaluations: int
+    """Forward-kinematics evaluations; on a path (:func:`follow`) one per tick."""
+
+
+class Correction(NamedTuple):
+    """Result of the corrective process (:func:`correct`)."""
+
+    q: Array
+    """Configuration found, shape ``(dof,)``, in length units and rad; the last iterate if
+    ``converged`` is False."""
+    converged: bool
+    """True if the hand is within ``MotionModel.correction_tolerance`` of the goal's centre."""
+    iterations: int
+    """Iterations made, with one Jacobian each."""
+
+
+def move(
+    robot: Robot,
+    q: Array,
+    target: Array,
+    hand: Hand,
+    goal: tuple[float, float],
+    radius: float,
+    *,
+    stop_on_arrival: bool = True,
+    model: MotionModel = PAPER,
+) -> MoveResult:
+    """Move straight in joint space until the hand hits the goal or arrives.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : ndarray, shape (dof,)
+        Configuration in which the robot stands, in length units (base) and rad (joints).
+    target : ndarray, shape (dof,)
+        Target configuration, in the same units.
+    hand : {"left", "right"}
+        The hand that is to hit the goal.
+    goal : tuple of float
+        Centre of the goal, x and y in length units.
+    radius : float
+        Radius of the goal (in length units).
+    stop_on_arrival : bool
+        If True, the movement also ends when the hand is near the position to which the target
+        brings it. If False, as in a corrective movement, it ends only on a hit or at its target.
+    model : MotionModel
+        The constants; ``gain``, ``correction_tolerance`` and ``max_iterations`` are not used.
+
+    Returns
+    -------
+    MoveResult
+        Where the robot stopped, the control ticks of the movement, and whether the goal is hit.
+
+    Raises
+    ------
+    ValueError
+        An argument cannot be used:
+
+        - a shape is wrong;
+        - a number is not finite, or beyond 100,000;
+        - the radius is below 0;
+        - the hand is unknown;
+        - a constant of the model is out of bounds, or the model has motor noise.
+    TypeError
+        ``robot``, ``model`` or ``stop_on_arrival`` has another type.
+
+    Notes
+    -----
+    Source: paper, section *Generating Movement for Each Goal*.
+    """
+    if not isinstance(stop_on_arrival, bool | np.bool_):
+        raise TypeError(f"stop_on_arrival is {brief_value(stop_on_arrival)}; it must be a bool")
+    batch = one_run(robot, q, hand, goal, radius)
+    run, entries = batch.runs[0], slice(robot.dof)
+    run["target"][entries] = configuration(robot, target)
+    parameters = robot_parameters(robot, radius, model=check_exact(model))
+    move_kernel(stop_on_arrival, parameters, batch)
+    return MoveResult(
+        run["q"][entries].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
+    )
+
+
+def follow(
+    robot: Robot,
+    q: Array,
+    waypoints: Array,
+    hand: Hand,
+    goal: tuple[float, float],
+    radius: float,
+    *,
+    model: MotionModel = PAPER,
+) -> MoveResult:
+    """Move along a path through waypoints until the hand hits the goal.
+
+    Without a hit the movement ends at the last waypoint. A movement of k steps takes k + 1 ticks.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : ndarray, shape (dof,)
+        Configuration in which the robot stands, in length units (base) and rad (joints).
+    waypoints : ndarray, shape (W, dof)
+        At least one configuration to pass through (:func:`path_points`).
+    hand : {"left", "right"}
+    goal : tuple of float
+        Centre of the goal, x and y in length units.
+    radius : float
+        Radius of the goal (in length units).
+    model : MotionModel
+
+    Returns
+    -------
+    MoveResult
+        Result of the movement, which stops at the first point of the path at which the hand is in
+        the goal, or else at the last waypoint.
+
+    Raises
+    ------
+    ValueError
+        A shape is wrong, the hand is unknown, a number is not finite or out of bounds, or the model
+        has motor noise.
+    TypeError
+        ``robot`` or ``model`` has another type.
+    """
+    batch = one_run(robot, q, hand, goal, radius)
+    points = finite_array("waypoints", waypoints, (max(len(waypoints), 1), robot.dof))
+    path_kernel(robot_parameters(robot, radius, model=check_exact(model)), points, batch)
+    run = batch.runs[0]
+    return MoveResult(
+        run["q"][: robot.dof].copy(), int(run["ticks"]), bool(run["hit"]), int(run["evaluations"])
+    )
+
+
+def scale_base(changes: Array, model: MotionModel) -> Array:
+    """Return changes of configurations with the base's coordinates times the weight of the base.
+
+    ``changes`` has shape ``(..., dof)``. The Euclidean norm of the result is the length of a
+    straight movement in the Euclidean norm of ``model``. With a weight of 1 the result is
+    ``changes`` itself.
+    """
+    if model.base_weight == 1.0:
+        return changes
+    scaled = np.array(changes)
+    scaled[..., :BASE_DOF] *= model.base_weight
+    return scaled
+
+
+def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
+    """Return the configurations at the n steps of a straight movement, with both ends.
+
+    ``q`` and ``target`` have shape ``(dof,)``, the result ``(n + 1, dof)``, in length units and
+    rad. Entries of ``target`` that are NaN stay. The results are rounded as in the kernels.
+    """
+    target = np.where(np.isnan(target), q, target)
+    difference, square = target - q, 0.0
+    for value in scale_base(difference, model).tolist():
+        square = max(square, value * value) if model.norm == "maximum" else square + value * value
+    distance = math.sqrt(square)
+    k = np.arange(math.ceil(distance / model.step))[:, None]
+    return np.vstack([q + k * model.step / (distance or 1.0) * difference, target])
+
+
+def segment_lengths(configurations: ArrayLike, model: MotionModel = PAPER) -> Array:
+    """Return the joint-space distance from each configuration to the next.
+
+    The distance is in the norm of ``model``, with its weight of the base. ``configurations`` has
+    shape ``(k, dof)``, the result ``(k - 1,)``, in a mix of length units and rad.
+    """
+    changes = scale_base(np.diff(configurations, axis=0), model)
+    if model.norm == "maximum":
+        return np.asarray(np.abs(changes).max(axis=1, initial=0.0))
+    return np.asarray(np.sqrt((changes**2).sum(axis=1)))
+
+
+def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
+    """Return the points of the n steps of a path through waypoints in joint space.
+
+    The path goes from ``q``, shape ``(dof,)``, straight to each of the W > 0 ``waypoints`` in turn,
+    shape ``(W, dof)``. The result has shape ``(n + 1, dof)``, in length units and rad. Point k < n
+    lies k times ``model.step`` along the path; point n is the last waypoint. Raises ValueError for
+    a wrong shape, and for a number that is not finite or beyond 100,000.
+    """
+    shape = (len(waypoints), robot.dof)
+    corners = np.vstack([configuration(robot, q), finite_array("waypoints", waypoints, shape)])
+    ends = np.concatenate([[0.0], np.cumsum(segment_lengths(corners, model))])
+    lengths = np.append(np.arange(math.ceil(ends[-1] / model.step)) * model.step, ends[-1])
+    points = np.stack([np.interp(lengths, ends, joint) for joint in corners.T], axis=1)
+    points[-1] = corners[-1]
+    return points
+
+
+def configuration(robot: Robot, q: Any) -> Array:
+    """Return one configuration as a new contiguous array, shape ``(dof,)``.
+
+    Raises ValueError for a wrong shape, and for an entry that is not finite or beyond ±100,000.
+    """
+    return finite_array("configuration", q, (robot.dof,))
+
+
+def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """Return numbers as a new contiguous array of float64.
+
+    Raises ValueError for a shape other than ``shape``, and for a number that is not finite or
+    beyond ±100,000. ``name`` is what the error calls the value.
+    """
+    array = np.array(real_array(name, value), order="C")
+    if array.shape != shape:
+        raise ValueError(f"{name} has shape {array.shape}; it must be {shape}")
+    if not (np.abs(array) <= LARGEST_ENTRY).all():
+        problem = (
+            f"has a number beyond ±{LARGEST_ENTRY:g}"
+            if np.isfinite(array).all()
+            else "is not finite"
+        )
+        raise ValueError(f"{name} {brief_value(array.tolist())} {problem}")
+    return array
+
+
+def one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
+    """Return a batch of one run whose configuration and target are ``q``.
+
+    ``radius`` is only checked. Raises TypeError if ``robot`` is not a Robot, and ValueError for any
+    other argument that does not fit.
+    """
+    if not isinstance(robot, Robot):
+        raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
+    robot.arm(hand)
+    batch = batch_for(robot, 1)
+    run = batch.runs[0]
+    run["q"][: robot.dof] = run["target"][: robot.dof] = configuration(robot, q)
+    run["hand"], run["goal"] = HANDS.index(hand), check_goal(goal, radius)
+    return batch
+
+
+def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
+    """Return the centre of a goal, x and y, as two floats.
+
+    Raises ValueError if ``centre`` is not two finite numbers within ±100,000, or if ``radius`` is
+    not from 0 to 100,000 (in length units).
+    """
+    x, y = finite_array("goal", centre, (2,)).tolist()
+    check_limits("radius", radius, 0.0, LARGEST_ENTRY)
+    return x, y
+
+
+def correct(
+    robot: Robot,
+    q: Array,
+    hand: Hand,
+    goal: tuple[float, float],
+    *,
+    locked_base: Collection[str] = (),
+    model: MotionModel = PAPER,
+) -> Correction:
+    """Find a configuration with a hand at a goal by Jacobian-transpose inverse kinematics.
+
+    This is the paper's corrective process, which descends from ``q`` on the distance to the goal.
+    The other arm does not move.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : ndarray, shape (dof,)
+        Configuration in which the process begins, in length units (base) and rad (joints).
+    hand : {"left", "right"}
+        The hand.
+    goal : tuple of float
+        Centre of the goal, x and y in length units.
+    locked_base : collection of {"x", "y"}
+        Coordinates of the base that do not move.
+    model : MotionModel
+        The constants; only ``gain``, ``correction_tolerance`` (0.01 length units for None) and
+        ``max_iterations`` are used.
+
+    Returns
+    -------
+    Correction
+        The configuration, whether its hand is at the goal, and how many iterations the process
+        took. If the process does not converge within ``model.max_iterations``, ``converged`` is
+        False, and no error is raised.
+
+    Raises
+    ------
+    TypeError
+        ``robot`` or ``model`` has another type.
+    ValueError
+        An argument cannot be used:
+
+        - a shape is wrong;
+        - a number is not finite, or beyond 100,000;
+        - the hand is unknown;
+        - ``locked_base`` has an entry other than ``"x"`` and ``"y"``;
+        - a constant of the model is out of bounds, or the model has motor noise.
+
+    Notes
+    -----
+    Source: paper, Figure 2 (Whitney 1969; Craig 2004).
+    """
+    batch = one_run(robot, q, hand, goal)
+    run, entries = batch.runs[0], slice(robot.dof)
+    locked = tuple(map(str, locked_base if isinstance(locked_base, Collection) else [locked_base]))
+    correct_kernel(robot_parameters(robot, locked_base=locked, model=check_exact(model)), batch)
+    return Correction(run["target"][entries].copy(), bool(run["converged"]), int(run["iterations"]))

@@ -1,0 +1,723 @@
+"""Execute solutions: the one function that makes and scores the movements of a solution.
+
+A solution is executed from the task's start by the rule of :mod:`coartic.motion.kernels.trial`, and
+every tick counts. The corrective process finishes any goal that the movements miss. Whatever a
+method says about its own solution, the score is the reward of this execution.
+
+:func:`execute` executes without noise, :func:`execute_noisy` many times with motor noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.errors import NotApplicableError, SolutionError
+from coartic.internal.limits import MOST_RUN_SEED, MOST_RUNS, brief_value, check_limits
+from coartic.internal.validation import equal_contents
+from coartic.model import PAPER, MotionModel, check_model, refuse_noise
+from coartic.motion.doors import line_points, path_points
+from coartic.motion.initial_hands import hands_among, search_initial_hands, sequences_with
+from coartic.motion.kernels.move import FOLLOW, MOVE, REPEAT
+from coartic.motion.kernels.noise import STAYS
+from coartic.motion.kernels.trial import FAILURES, TICKS
+from coartic.motion.solution import (
+    Movement,
+    Plan,
+    corrective_movements,
+    hands_in,
+    movements_by_goal,
+)
+from coartic.motion.trials import (
+    ALL_MOVE,
+    JUDGE,
+    NO_NOISE,
+    NO_WAYPOINTS,
+    Accounts,
+    CompiledTask,
+    compiled_task,
+    make_trials,
+    reason_of_failure,
+    world_seed,
+    worlds_of,
+)
+from coartic.robot import HANDS, Array, Configs, Hand, Hands
+from coartic.tasks.catalogue import TaskLike, as_task
+from coartic.tasks.task import Task, check_hands
+
+_ACTIONS = {"learned": MOVE, "planned": MOVE, "corrective": REPEAT, "path": FOLLOW}
+_MOST_NOISE = 100.0  # standard deviation, in length units and rad
+_AT_ONCE = 4096  # noisy executions, which limits the memory
+
+
+@dataclass(frozen=True, eq=False)
+class Execution:
+    """An executed solution (:func:`execute`)."""
+
+    movements: tuple[Movement, ...]
+    """The movements that were made, in order, with targets and ticks. A target is the one that was
+    asked for, without noise. Several corrections of a goal, which only noise makes necessary, are
+    one movement: its target is that of the last correction, and its ticks are their sum."""
+    configurations: Array
+    """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, in length units
+    and rad."""
+    ticks: int
+    """Total number of control ticks."""
+    corrections: int
+    """Number of corrective movements that took a tick or more."""
+    iterations: int = 0
+    """Iterations of the corrective process, with one Jacobian each."""
+    evaluations: int = 0
+    """Forward-kinematics evaluations. A correction takes one more than its iterations. Each goal
+    that is tried takes one more if its first movement is corrective, and otherwise two more."""
+    reason: str = ""
+    """Sentence on why the task was not completed; empty if it was completed."""
+    __eq__ = equal_contents
+
+    @property
+    def completed(self) -> bool:
+        """True if every goal was hit."""
+        return not self.reason
+
+    @property
+    def reward(self) -> int | None:
+        """Total reward, minus the number of ticks; None if the task was not completed."""
+        return -self.ticks if self.completed else None
+
+    @property
+    def hands(self) -> str:
+        """Hand of each goal that has a movement, in goal order, such as ``"LRLR"``."""
+        return hands_in(self.movements)
+
+    def ticks_by_goal(self) -> tuple[int, ...]:
+        """Return the control ticks spent on each goal that has a movement, in goal order."""
+        spent = Counter[int]()
+        for movement in self.movements:
+            spent[movement.goal] += movement.ticks or 0
+        return tuple(spent[goal] for goal in sorted(spent))
+
+
+Refused = SolutionError | ValueError | TypeError | OverflowError
+"""Errors of a solution that cannot be executed."""
+
+
+def execute(
+    task: TaskLike, solution: Iterable[Movement], *, model: MotionModel = PAPER
+) -> Execution:
+    """Execute a solution from the task's start and score it.
+
+    If a goal is still missed after its movements, the corrective process finds a correction from
+    where the robot stands. The ticks of this movement count.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+    solution : iterable of Movement
+        At least one movement for each goal, in the order of the goals.
+    model : MotionModel
+
+    Returns
+    -------
+    Execution
+        Movements made, configurations at the hits, control ticks and reward. If the corrective
+        process does not converge, the execution ends: ``completed`` is False, and ``reason`` says
+        at which goal.
+
+    Raises
+    ------
+    TaskError, TypeError
+        The task cannot be used, or ``task`` or ``model`` has another type.
+    SolutionError
+        The solution breaks a rule of the task:
+
+        - goals are missing or out of order;
+        - the task does not have a movement's hand;
+        - a target has the wrong shape or is not finite;
+        - a locked base moves by more than 1e-6.
+    ValueError
+        A constant of the model is out of bounds, or the model has motor noise
+        (:func:`execute_noisy`).
+
+    Notes
+    -----
+    Source: paper, section *Generating Movement for Each Goal*.
+    """
+    compiled = compiled_task(as_task(task), model)
+    refuse_noise(model)
+    (execution,) = execute_many(compiled, [solution])
+    if isinstance(execution, Exception):
+        raise execution
+    return execution
+
+
+def execute_many(
+    compiled: CompiledTask,
+    solutions: Iterable[Iterable[Movement]],
+    worlds: NDArray[np.uint64] = NO_NOISE,
+) -> list[Execution | Refused]:
+    """Execute and score many solutions of one task, and return a list in their order.
+
+    For a solution that cannot be executed, the list has the error that :func:`execute` would raise.
+    Solutions are executed side by side. If the model of ``compiled`` has noise, ``worlds`` says
+    which (:func:`.worlds_of`).
+    """
+    executions: list[Plan | Refused] = []
+    for solution in solutions:
+        try:
+            executions.append(movements_by_goal(compiled.task, solution))
+        except (SolutionError, ValueError, TypeError, OverflowError) as error:
+            executions.append(error)
+    plans = [item for item in executions if isinstance(item, list)]
+    made = iter(_execute_plans(compiled, plans, worlds))
+    return [next(made) if isinstance(item, list) else item for item in executions]
+
+
+class Requested(NamedTuple):
+    """Plans of K solutions, each with G goals and at most M movements for a goal, as arrays."""
+
+    hands: Hands
+    """Shape ``(K, G)``, 0 left or 1 right."""
+    targets: Configs
+    """Shape ``(K, G, M, dof)``, in length units and rad."""
+    movements: NDArray[np.int64]
+    """How they are made, shape ``(K, G, M, 3)`` (:attr:`.Requests.movements`)."""
+    waypoints: Configs
+    """Waypoints of all paths, shape ``(W, dof)``."""
+
+
+def _with_targets(movements: list[Movement], corrective: float = math.inf) -> list[Movement | None]:
+    """Return the movements for a goal that have targets, up to the first one without.
+
+    The corrective process acts from the first movement without a target on, or after a number of
+    ``corrective`` movements with targets. If the first movement is corrective, the list begins with
+    None, which stands for a check whether the hand is in the goal.
+    """
+    aimed: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
+    for movement in movements:
+        corrective -= movement.kind == "corrective"
+        if movement.target is None or corrective < 0:
+            break
+        aimed.append(movement)
+    return aimed
+
+
+def _requested(
+    compiled: CompiledTask, aims: Sequence[list[list[Movement | None]]], hands: Any
+) -> Requested:
+    """Return plans as arrays for the kernels.
+
+    ``aims`` has the movements with targets of each solution, by goal (:func:`_with_targets`), and
+    ``hands`` the hand of each of its goals.
+    """
+    goals = [movements for of_solution in aims for movements in of_solution]
+    length = max(map(len, goals))
+    rows = [m for movements in goals for m in movements + [None] * (length - len(movements))]
+    stay, shape = [math.nan] * compiled.starts.shape[1], (len(aims), -1, length)
+    targets = np.array([stay if m is None else m.target for m in rows])
+    requested = np.array(hands).reshape(shape[:2]), targets.reshape(*shape, len(stay))
+    made = [MOVE if m is None else _ACTIONS[m.kind] for m in rows]
+    if made.count(MOVE) == len(made):
+        return Requested(*requested, ALL_MOVE, NO_WAYPOINTS)
+    ways = [NO_WAYPOINTS if m is None or m.waypoints is None else m.waypoints for m in rows]
+    ends = np.cumsum([0, *map(len, ways)])
+    movements = np.stack([made, ends[:-1], ends[1:]], axis=1).reshape(*shape, 3)
+    waypoints = np.concatenate([way for way in ways if len(way)]) if ends[-1] else NO_WAYPOINTS
+    return Requested(*requested, movements, waypoints)
+
+
+def _execute_plans(
+    compiled: CompiledTask,
+    plans: Sequence[Plan],
+    worlds: NDArray[np.uint64],
+) -> list[Execution]:
+    """Execute plans side by side, and return the executions in their order."""
+    if not plans:
+        return []
+    aims = [[_with_targets(movements) for movements in plan] for plan in plans]
+    requested = _requested(compiled, aims, _hands_of(plans))
+    accounts = make_trials(compiled, *requested, worlds=worlds).goals
+    executed = movements_in(accounts, compiled.task.robot.dof, aims)
+    trials = zip(plans, executed, accounts[..., 0], strict=True)
+    return [_execution_of(compiled, *trial) for trial in trials]
+
+
+def movements_in(
+    accounts: NDArray[np.void], dof: int, requested: Iterable[Iterable[Sequence[Movement | None]]]
+) -> list[list[Movement]]:
+    """Return the movements that were made in N trials, up to the first goal missed.
+
+    A goal that is hit without a movement has a corrective movement of 0 ticks.
+
+    Parameters
+    ----------
+    accounts : ndarray, shape (N, G, M)
+        Accounts of the goals.
+    dof : int
+        Length of a configuration.
+    requested : iterable of iterable of sequence of Movement or None
+        For each trial and goal the movements that were to be made (:func:`_with_targets`). The
+        kinds of the result come from these movements.
+
+    Returns
+    -------
+    list of list of Movement
+        A list for each trial.
+    """
+    names = ("hand", "hit", "ticks", "corrections")
+    goals = accounts[..., 0]
+    columns = [goals[name].tolist() for name in names] + [accounts["moved"].tolist()]
+    targets, trials = accounts["target"][..., :dof], []
+    for n, of_trial in enumerate(requested):
+        movements: list[Movement] = []
+        of_goals = zip(of_trial, *[column[n] for column in columns], strict=True)
+        for g, (of_goal, side, hit, total, corrections, moved) in enumerate(of_goals):
+            goal, hand, start = g + 1, HANDS[side], len(movements)
+            for m, movement in enumerate(of_goal):
+                if movement is not None and moved[m]:
+                    target = movement.target  # as it was asked for; None in trials of the learner
+                    target = targets[n, g, m] if target is None else target
+                    made = Movement(goal, hand, movement.kind, target, moved[m], movement.waypoints)
+                    movements.append(made)
+            if corrections:
+                ticks = total - sum(moved)
+                corrected = accounts["corrected"][n, g, 0, :dof]
+                movements.append(Movement(goal, hand, "corrective", corrected, ticks))
+            if not hit:
+                break
+            if len(movements) == start:  # hit without a movement: record the hand
+                movements.append(
+                    Movement(goal, hand, "corrective", accounts["q"][n, g, 0, :dof], 0)
+                )
+        trials.append(movements)
+    return trials
+
+
+def _execution_of(
+    compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
+) -> Execution:
+    """Return the execution of a plan from the movements and accounts of its trial.
+
+    ``movements`` are those that were made, up to the first goal missed; ``goals`` are the accounts,
+    shape ``(G,)``.
+    """
+    hits = sum(goals["hit"].tolist())
+    # The hand is evaluated before the first movement and, unless it is corrective, at its end.
+    checked = [2 - (of_goal[0].kind == "corrective") for of_goal in plan[: hits + 1]]
+    return Execution(
+        movements=tuple(movements),
+        configurations=goals["q"][:hits, : compiled.task.robot.dof].copy(),
+        ticks=sum([movement.ticks or 0 for movement in movements]),
+        corrections=sum([m.kind == "corrective" and m.ticks != 0 for m in movements])
+        + sum([max(count - 1, 0) for count in goals["corrections"].tolist()]),
+        iterations=sum(goals["iterations"].tolist()),
+        evaluations=sum(goals["evaluations"].tolist() + checked),
+        reason=reason_of_failure(compiled, goals),
+    )
+
+
+def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
+    """Compute the joint travel of the idle arm, summed over the goals (in rad).
+
+    For each goal, the travel is the Euclidean distance between two vectors of joint angles of the
+    arm that does not hit the goal: those at this hit and those at the hit before (for goal 1, at
+    the start).
+
+    Parameters
+    ----------
+    task : Task
+    hands : iterable of {"left", "right"}
+        The hand for each goal.
+    reached : ndarray, shape (G, dof)
+        The configuration at each hit.
+    """
+    travel, previous = 0.0, task.q0
+    for hand, q in zip(hands, reached, strict=True):
+        joints = task.robot.joints("right" if hand == "left" else "left")
+        square = 0.0
+        # Added in this order, because the rounding of a BLAS dot product depends on the processor.
+        for difference in (q[joints] - previous[joints]).tolist():
+            square += difference * difference
+        travel += math.sqrt(square)
+        previous = q
+    return travel
+
+
+def sample_execution(
+    task: Task, movements: Iterable[Movement], model: MotionModel = PAPER
+) -> Array:
+    """Return the configuration at every control tick of an execution without noise.
+
+    ``movements`` are those of the execution, with targets and ticks. The result has shape ``(ticks,
+    dof)``, in length units and rad. The first row is the start. A movement of k steps has k + 1
+    rows, so that its last row is repeated as the first row of the next movement.
+    """
+    q, rows = np.array(task.q0), [np.empty((0, task.robot.dof))]
+    for movement in movements:
+        assert movement.target is not None
+        if movement.waypoints is not None:
+            points = path_points(task.robot, q, movement.waypoints, model)[: movement.ticks]
+        else:
+            points = line_points(q, movement.target, model)[: movement.ticks]
+        if len(points):
+            q = points[-1]
+            rows.append(points)
+    return np.concatenate(rows)
+
+
+# ---- Motor noise ----
+
+
+def execute_noisy(
+    task: TaskLike,
+    solutions: Iterable[Iterable[Movement]],
+    motor_noise: float,
+    repeats: int,
+    seed: int | Iterable[int],
+    model: MotionModel = PAPER,
+    *,
+    signal_dependent: bool = False,
+) -> Array:
+    """Execute solutions of a task many times with motor noise, and count the ticks.
+
+    Each movement misses its target at random. If a goal is missed, the corrective process corrects
+    it until it is hit; corrections have noise as well. All other rules are as in
+    :func:`coartic.execute`.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+    solutions : iterable of iterables of Movement
+        K solutions of the task, as a list even if there is only one.
+    motor_noise : float
+        Standard deviation s of the noise, from 0 to 100, in length units (base) and rad (joints).
+        With 0 the ticks are the same as in :func:`coartic.execute`.
+    repeats : int
+        Number R of executions of each solution.
+    seed : int or iterable of int
+        Seed of the noise, from 0 to 2^128 - 1: one for all solutions, which then meet the same
+        noise in their r-th execution (*common random numbers*), or one for each. The ticks of a
+        solution depend neither on the other solutions nor on ``repeats``.
+    model : MotionModel
+        The world of the executions. It has no motor noise of its own.
+    signal_dependent : bool
+        True if the noise of aimed movements grows with their length. The noise of corrections
+        always does.
+
+    Returns
+    -------
+    ndarray, shape (K, R)
+        Control ticks of each execution; NaN if it failed, because the corrective process did not
+        converge or the goal was still missed after 50 corrections. If a solution has failures,
+        report their number as well, because the mean over its other executions is too low.
+
+    Raises
+    ------
+    TaskError, TypeError
+        The task cannot be used, or an argument has another type.
+    SolutionError
+        A solution breaks the task's rules, as in :func:`coartic.execute`. Or its movements have
+        other ticks than they take on this task with this model, for example because the solution is
+        of another task.
+    ValueError
+        ``motor_noise``, ``repeats``, ``seed`` or a constant of the model is out of bounds, the
+        model has motor noise, or the number of seeds is not the number of solutions.
+
+    Notes
+    -----
+    The robot stands at q. Coordinate c of a noisy target is, with standard normal numbers z::
+
+        aimed movement         t_c + s z_c              if c moves, else q_c
+        waypoint k of K        w_kc + (k / K) s z_c     if c moves, else q_c
+        correction             a_c + s min(1, L) z_c    for base and chosen arm, else a_c
+
+    - An *aimed movement* has the target t: it is learned or planned. A path has the waypoints w_1
+      to w_K and one z; it is not steered while it is made (open loop).
+    - A coordinate *moves* if the target is a number, or any waypoint, that differs by more than
+      1e-9 from where the robot stands now. A locked base does not move.
+    - A *correction* has as target the configuration a that the corrective process finds from q,
+      even if the solution has a corrective movement with a target. L is the Euclidean distance from
+      q to a. A locked base coordinate keeps a_c.
+    - With ``signal_dependent`` all three rows have s min(1, L) instead of s. L is the Euclidean
+      distance from q to the target without noise, for a path to its last waypoint.
+    - The noisy target counts as the target everywhere: for the hit, for the arrival of an aimed
+      movement, and for the tick that this costs.
+    - A corrective movement is an aimed movement that ends on a hit or at its target if, in the
+      execution without noise, its target differs by more than 1e-9 from the target of the
+      corrective process.
+    - z is a function of the seed, the number of the execution, the goal, the number of the movement
+      made for this goal and the coordinate (:mod:`coartic.motion.kernels.noise`).
+
+    Source: constant noise of the end posture is our simplification. Noise in the execution of
+    people's movements has constant, signal-dependent and temporal parts (van Beers, Haggard &
+    Wolpert 2004, *The role of execution noise in movement variability*, J. Neurophysiol.
+    91:1050-1063). ``signal_dependent`` stands for the second part (Harris & Wolpert 1998,
+    *Signal-dependent noise determines motor planning*, Nature 394:780-784); nothing stands for the
+    third.
+
+    Examples
+    --------
+    >>> from coartic import corrective_trial, execute_noisy
+    >>> solution = corrective_trial("ascending", "RRR").movements
+    >>> execute_noisy("ascending", [solution], 0.0, 2, seed=0)
+    array([[319., 319.]])
+    >>> execute_noisy("ascending", [solution], 0.01, 100, seed=0).shape
+    (1, 100)
+    """
+    check_limits("motor_noise", motor_noise, 0.0, _MOST_NOISE)
+    check_limits("repeats", repeats, 1, MOST_RUNS)
+    if not isinstance(signal_dependent, bool | np.bool_):
+        raise TypeError(f"signal_dependent is {brief_value(signal_dependent)}; it must be a bool")
+    if not isinstance(solutions, Iterable):
+        raise TypeError(f"solutions is {brief_value(solutions)}; it must be a list of solutions")
+    chosen = as_task(task)
+    if check_model(model, radius=chosen.radius).motor_noise > 0.0:
+        raise ValueError(
+            f"model.motor_noise is {model.motor_noise:g}; it must be 0, because argument "
+            "motor_noise says how large the noise is"
+        )
+    plans = [_plan_of(chosen, k, solution) for k, solution in enumerate(solutions)]
+    seeds = np.array([world_seed(value, JUDGE) for value in _seeds(seed, len(plans))], np.uint64)
+    if not plans:
+        return np.empty((0, int(repeats)))
+    aims, ticks = _execute_exactly(compiled_task(chosen, model), plans)
+    for k, plan in enumerate(plans):
+        _check_ticks(chosen, k, plan, ticks[k])
+    if motor_noise == 0.0:
+        return np.repeat(ticks[:, None], repeats, axis=1)
+    noisy = model._replace(motor_noise=float(motor_noise))
+    compiled = compiled_task(chosen, noisy, grows=bool(signal_dependent))
+    hands, targets, movements, waypoints = _requested(compiled, aims, _hands_of(plans))
+    count, parts = len(plans) * int(repeats), []
+    for begin in range(0, count, _AT_ONCE):
+        number, draws = np.divmod(np.arange(begin, min(begin + _AT_ONCE, count)), int(repeats))
+        actions = movements[number] if len(movements) else movements
+        of_part = hands[number], targets[number], actions, waypoints
+        accounts = make_trials(compiled, *of_part, worlds_of(seeds[number], draws))
+        parts.append(_ticks_of(accounts))
+    return np.concatenate(parts).reshape(len(plans), -1)
+
+
+def _hands_of(plans: Sequence[Plan]) -> list[int]:
+    """Return the hand of each goal of each plan, 0 left or 1 right."""
+    return [HANDS.index(movements[0].hand) for plan in plans for movements in plan]
+
+
+def _ticks_of(accounts: Accounts) -> Array:
+    """Return the ticks of trials, shape ``(N,)``; NaN for a trial that failed."""
+    return np.where(accounts.counts[:, FAILURES] > 0, np.nan, accounts.counts[:, TICKS])
+
+
+def _execute_exactly(
+    compiled: CompiledTask, plans: Sequence[Plan]
+) -> tuple[list[list[list[Movement | None]]], Array]:
+    """Execute plans without noise, and find which movements are aimed.
+
+    A corrective movement with a target is made by the corrective process if the process finds this
+    target, to within 1e-9, where the robot then stands. Otherwise, and if the process does not
+    converge there, it is an aimed movement.
+
+    Returns
+    -------
+    list
+        For each plan and goal, the aimed movements before the corrective process acts; None stands
+        for a check whether the hand is in the goal.
+    ndarray, shape (K,)
+        Ticks of each plan; NaN if it fails.
+    """
+    kept = [[0] * len(plan) for plan in plans]  # corrective movements that are aimed, by goal
+    aims = [[_with_targets(movements, 0) for movements in plan] for plan in plans]
+    ticks, due = np.empty(len(plans)), [*range(len(plans))]
+    while due:
+        aims_due, hands = [aims[k] for k in due], _hands_of([plans[k] for k in due])
+        accounts = make_trials(compiled, *_requested(compiled, aims_due, hands))
+        ticks[due] = _ticks_of(accounts)
+        changed = []
+        for n, k in enumerate(due):
+            for g, goal in enumerate(accounts.goals[n, :, 0]):
+                after = [m for m in plans[k][g] if m.kind == "corrective"][kept[k][g] :]
+                target = after[0].target if after else None
+                if target is not None and not _is_found(goal, target):
+                    kept[k][g] += 1
+                    aims[k][g] = _with_targets(plans[k][g], kept[k][g])
+                    changed.append(k)
+                    break
+                if not goal["hit"]:
+                    break
+        due = changed
+    return aims, ticks
+
+
+def _is_found(goal: np.void, target: Array) -> bool:
+    """Return whether a corrective movement to ``target`` is one of the corrective process.
+
+    ``goal`` is the account of its goal, if the process acts in its place. The result is also True
+    if the movement is not made, because the goal is hit already.
+    """
+    if goal["corrections"] == 0:
+        return bool(goal["hit"])
+    differences = np.abs(goal["corrected"][: len(target)] - target)
+    return bool(np.nanmax(differences) <= STAYS)
+
+
+def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
+    """Return the movements of ``solutions[number]`` by goal.
+
+    Raises SolutionError if the solution breaks the task's rules.
+    """
+    try:
+        return movements_by_goal(task, solution)
+    except SolutionError as error:
+        raise SolutionError(f"solutions[{number}]: {error}") from None
+
+
+def _check_ticks(task: Task, number: int, plan: Plan, ticks: float) -> None:
+    """Check that a solution's movements have the ticks that they take without noise.
+
+    ``ticks`` is the number that they take, or NaN if the execution fails. Nothing is checked if a
+    movement has no ticks. Raises SolutionError if the numbers differ.
+    """
+    stored = [movement.ticks for movements in plan for movement in movements]
+    counts = [count for count in stored if count is not None]
+    if len(counts) == len(stored) and sum(counts) != ticks:
+        outcome = "it fails" if np.isnan(ticks) else f"they take {ticks:.0f}"
+        raise SolutionError(
+            f"solutions[{number}]: its movements took {sum(counts)} ticks; on task {task.name!r}, "
+            f"with this model and without noise, {outcome}. Is the solution of another task?"
+        )
+
+
+def _seeds(seed: Any, count: int) -> list[int]:
+    """Return the seed of the noise of each of ``count`` solutions.
+
+    ``seed`` is a seed for each solution, or one seed for all. Raises ValueError for other seeds.
+    """
+    seeds = [*seed] if isinstance(seed, Iterable) else [seed] * count
+    if len(seeds) != count:
+        raise ValueError(
+            f"seed has {len(seeds)} entries; it must have one for each of the {count} solutions"
+        )
+    for value in seeds[:1] if not isinstance(seed, Iterable) else seeds:
+        check_limits("seed", value, 0, MOST_RUN_SEED)
+    return [int(value) for value in seeds]
+
+
+# ---- The corrective process on its own, and initial hands ----
+
+
+def corrective_trial(task: TaskLike, hands: str, *, model: MotionModel = PAPER) -> Execution:
+    """Make one trial in which only the corrective process acts.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+    hands : str
+        The hand for each goal: ``"LRRR"`` is left, right, right, right.
+    model : MotionModel
+
+    Returns
+    -------
+    Execution
+        Movements, configurations at the hits, control ticks and reward. If the corrective process
+        does not converge, ``completed`` is False, and ``reason`` says at which goal.
+
+    Raises
+    ------
+    TaskError, TypeError
+        The task cannot be used, or ``task`` or ``model`` has another type.
+    ValueError
+        The hands do not fit the task, or a constant of the model is out of bounds.
+
+    Notes
+    -----
+    Source: paper, section *The Corrective Process*.
+    """
+    task = as_task(task)
+    hands = check_hands(task, hands)
+    return execute(task, corrective_movements(hands), model=model)
+
+
+def hand_sequences(task: TaskLike, hands: Iterable[Hand] | None = None) -> list[str]:
+    """List all hand sequences of a task.
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+    hands : iterable of {"left", "right"}, optional
+        The hands that may be used; the task's by default.
+
+    Returns
+    -------
+    list of str
+        The sequences in alphabetical order, such as ``"LLLR"``: one letter for each of G goals, 2^G
+        sequences for two hands.
+
+    Raises
+    ------
+    TaskError, TypeError
+        The task cannot be used, or is not a Task, a string or a path.
+    NotApplicableError
+        There are more than 4096 sequences.
+    ValueError
+        ``hands`` is empty, or names a hand that is not the task's.
+    """
+    task = as_task(task)
+    return sequences_with(hands_among(task, hands), len(task.goals), task.name)
+
+
+def initial_hands(
+    task: TaskLike, hands: tuple[Hand, ...] | None = None, *, model: MotionModel = PAPER
+) -> str:
+    """Find the hand sequence of a task's first trial.
+
+    If the task names a sequence, that sequence is returned. If the task names a policy, the result
+    is the sequence for which the corrective process on its own gets the highest reward: among
+    sequences of one hand (``"best-single-hand"``), or among all (``"best-of-all"``).
+
+    Parameters
+    ----------
+    task : Task, str or pathlib.Path
+    hands : tuple of {"left", "right"}, optional
+        The hands among which a policy chooses; the task's by default.
+    model : MotionModel
+        The search is made without its motor noise.
+
+    Returns
+    -------
+    str
+        The hand for each goal, such as ``"RRRR"``.
+
+    Raises
+    ------
+    TaskError, TypeError
+        The task cannot be used, or ``task`` or ``model`` has another type.
+    NotApplicableError
+        No sequence that was tried completes the task, or there are more than 4096.
+    ValueError
+        ``hands`` is empty or names a hand that is not the task's, or a constant of the model is out
+        of bounds.
+
+    Notes
+    -----
+    Source: paper, section *Experiments*.
+    """
+    task = as_task(task)
+    return search_initial_hands(task, hands, model=check_model(model))[0]
+
+
+def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
+    """Return the reward of the corrective process on its own with a task's initial hands.
+
+    The process is executed without the motor noise of ``model``. Return None if the trial fails,
+    or if a policy is to find the hands and finds none (:func:`initial_hands`).
+    """
+    try:
+        hands = initial_hands(task, model=model)
+    except NotApplicableError:
+        return None
+    return corrective_trial(task, hands, model=model.without_noise()).reward

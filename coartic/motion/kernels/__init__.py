@@ -1,0 +1,2 @@
+"""Compiled kernels of motion. Only doors of ``coartic.motion``, the learner's kernel and posture-
+based planning read them."""

@@ -1,0 +1,265 @@
+"""Trials: the rule that executions, learners and environments follow, goal by goal.
+
+A run is one of many robots that make trials side by side. At each goal it passes through five
+phases (paper, sections *Generating Movement for Each Goal* and *The Corrective Process*):
+
+1. *begin*: the run's next goal is set.
+2. *aim*: a hand and perhaps a target are chosen. Callers differ in how they choose.
+3. *move*: the robot moves to the target. Without a target it only checks whether its hand is in the
+   goal already.
+4. *correct*: if the goal is missed, the corrective process **A** looks for a configuration that
+   hits it, and the robot moves there.
+5. *account*: what happened is written down. The trial goes on if the goal is hit.
+
+Two loops consist of these phases: :func:`reach_kernel` moves to given targets, and
+:mod:`coartic.learner.kernel` explores around learned targets. The result of a run depends neither
+on the other runs nor on their number.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coartic.motion.kernels.compile import entry, fill_row, inlined, record_type
+from coartic.motion.kernels.correct import correct_runs
+from coartic.motion.kernels.move import CHECK, IDLE, MOVE, follow_paths, move_runs
+from coartic.motion.kernels.noise import hashed
+from coartic.motion.kernels.slots import Batch, RobotRecord, RunRecord
+from coartic.robot import LARGEST_ENTRY, Configs, Hands, Points
+
+COUNTED = (
+    *("movement_ticks", "forward_kinematics", "corrective_iterations"),
+    *("corrections", "failed_trials"),
+)
+"""Counters of :class:`~coartic.method.Meter` that the kernels update: the columns of counts."""
+TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
+GoalAccount = Any
+"""Record of what happened at a goal (:func:`account_type`)."""
+
+
+@cache
+def account_type(width: int) -> np.dtype[np.void]:
+    """Return the NumPy type of the account of a goal in a trial.
+
+    Configurations have ``width`` entries. If there are several movements to targets for a goal,
+    each has a record with its ``target`` and ``moved``; all other fields are in the first record.
+    """
+    fields = {
+        "q": (np.float64, width),  # where the robot is afterwards, in length units and rad
+        "target": (np.float64, width),  # of the movement, without noise; as requested if not made
+        "corrected": (np.float64, width),  # target of the last corrective movement, if one is made
+        "moved": np.int64,  # ticks of the movement to the target, 0 if it is not made
+        "hand": np.int64,
+        "hit": np.bool_,
+        "ticks": np.int64,  # of all movements
+        "corrections": np.int64,  # corrective movements made
+        "iterations": np.int64,  # of the corrective process
+        "evaluations": np.int64,  # of forward kinematics
+        "failed": np.bool_,  # True if the trial ends here because the goal is missed
+    }
+    return record_type(fields)
+
+
+# ---- The five phases ----
+
+
+@inlined
+def set_off(run: RunRecord, q: Any, seed: Any, draw: Any, robot: RobotRecord) -> None:
+    """Start the trial of a run at configuration ``q``, shape ``(dof,)``, in place.
+
+    ``going`` becomes True and ``evaluations`` 0. The noise of the trial is that of draw ``draw`` of
+    the world with ``seed``, 64 bits. Other fields stay.
+    """
+    fill_row(run.q, q)
+    run.going, run.evaluations = True, 0
+    if robot.model.motor_noise > 0.0:
+        run.world = hashed(hashed(seed, 0), draw)
+
+
+@inlined
+def begin(run: RunRecord, number: int, goal: Any) -> None:
+    """Set the next goal of a run, x and y, in place: phase 1, *begin*.
+
+    ``number`` is the goal's number in the task, from 0. The target becomes the present
+    configuration, ``hit`` False and ``corrects`` True. The next action is to check whether the hand
+    is in the goal, or none if the trial has ended.
+    """
+    fill_row(run.goal, goal)
+    fill_row(run.target, run.q)
+    run.action = CHECK if run.going else IDLE
+    run.number, run.made = number, 0
+    run.hit, run.corrects = False, True
+
+
+@inlined
+def aim(run: RunRecord, target: Any) -> None:
+    """Set the target of a run, in place: phase 2, *aim*.
+
+    Where an entry of ``target`` is NaN, base or joint stays. Unless all entries are NaN, the next
+    action becomes to move. ``target`` has at least ``dof`` entries.
+    """
+    for j in range(len(target)):
+        if not math.isnan(target[j]):
+            run.target[j] = target[j]
+            run.action = MOVE
+
+
+@inlined
+def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
+    """Write a run's result for its goal into an account: phase 5, *account*.
+
+    ``moved`` is the number of ticks of the run's movements to targets. If the run missed its goal,
+    its trial ends. The run's count of evaluations becomes 0.
+    """
+    fill_row(goal.q, run.q)
+    goal.hand, goal.hit = run.hand, run.hit
+    goal.ticks = moved + run.ticks
+    goal.corrections, goal.iterations = run.corrections, run.iterations
+    goal.evaluations = run.evaluations
+    if run.corrections > 0:
+        fill_row(goal.corrected, run.target)
+    goal.failed = run.going and not run.hit
+    run.going, run.evaluations = run.hit, 0
+
+
+@inlined
+def count_goal(goal: GoalAccount, counts: Any) -> None:
+    """Add the numbers in a goal's account to a trial's counts, in place.
+
+    ``counts`` has shape ``(5,)``: ticks, evaluations, iterations, corrections and failures.
+    """
+    counts[TICKS] += goal.ticks
+    counts[EVALUATIONS] += goal.evaluations
+    counts[ITERATIONS] += goal.iterations
+    counts[CORRECTIONS] += goal.corrections
+    counts[FAILURES] += goal.failed
+
+
+# ---- Trials with given targets ----
+
+
+class Requests(NamedTuple):
+    """Movements that the kernel is to make: N arms reach for G goals each.
+
+    There are M movements for each goal of an arm.
+    """
+
+    starts: Configs
+    """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` if all arms start alike."""
+    hands: Hands
+    """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
+    targets: Configs
+    """Targets, shape ``(N, G, M, dof)``, in length units and rad; NaN for entries that stay, and
+    the last waypoint of a path. The first movement for a goal is always made, further ones only
+    while the goal is missed."""
+    movements: NDArray[np.int64]
+    """How each movement is made, shape ``(N, G, M, 3)``: the action
+    :data:`~coartic.motion.kernels.move.MOVE`, ``REPEAT`` or ``FOLLOW``, and for a path the indices
+    in ``waypoints`` of its first waypoint and of the one after its last. Empty if all movements end
+    on arrival as well (``MOVE``)."""
+    waypoints: Configs
+    """Waypoints of all paths, shape ``(W, dof)``."""
+    goals: Points
+    """Centres of the goals, shape ``(N, G, 2)``, or ``(1, G, 2)`` if all arms have the same
+    goals."""
+    first: int
+    """Number in the task of the first of the goals, from 0."""
+    worlds: NDArray[np.uint64]
+    """Seed of the world and number of the draw of each trial, shape ``(N, 2)``, or ``(1, 2)`` if
+    they are the same for all."""
+
+
+NO_REWARD = -(2**63 - 1)
+"""Reward of a failed trial where rewards are integers."""
+
+
+@inlined
+def _are_within(targets: Any) -> bool:
+    """Return whether no entry of a trial's targets is beyond :data:`LARGEST_ENTRY` in size.
+
+    ``targets`` has shape ``(G, M, dof)``. NaN means that a joint stays, and counts as within the
+    bound.
+    """
+    large = 0
+    for g in range(targets.shape[0]):
+        for m in range(targets.shape[1]):
+            for j in range(targets.shape[2]):
+                large += abs(targets[g, m, j]) > LARGEST_ENTRY
+    return large == 0
+
+
+@inlined
+def _reach_lot(
+    offset: int, count: int, arms: Any, robot: Any, goals: Any, counts: Any, batch: Any
+) -> None:
+    """Let ``count`` arms from index ``offset`` on reach for their goals, in place.
+
+    ``count`` is at most the number of runs of ``batch``. ``arms`` are :class:`Requests`, and
+    ``robot`` is a :data:`RobotRecord`. This function fills the accounts ``goals``, shape ``(N, G,
+    M)``, and adds to ``counts``, shape ``(N, 5)``, which the caller sets to 0 before.
+    """
+    for i in range(count):
+        n, run = offset + i, batch.runs[i]
+        world = arms.worlds[min(n, len(arms.worlds) - 1)]
+        start = arms.starts[min(n, len(arms.starts) - 1)]
+        set_off(run, start, world[0], world[1], robot)
+        run.going = _are_within(arms.targets[n])
+        counts[n, FAILURES] = not run.going
+    for g in range(arms.targets.shape[1]):
+        for i in range(count):
+            n, run = offset + i, batch.runs[i]
+            begin(run, arms.first + g, arms.goals[min(n, len(arms.goals) - 1), g])
+            run.hand = arms.hands[n, g]
+            if not robot.checks:
+                run.action = IDLE
+        for m in range(arms.targets.shape[2]):
+            for i in range(count):
+                n, run = offset + i, batch.runs[i]
+                target, noted = arms.targets[n, g, m], goals[n, g, m].target
+                if m > 0:
+                    fill_row(run.target, run.q)
+                    run.action = IDLE
+                if run.going and not run.hit:
+                    aim(run, target)
+                if run.action == MOVE:
+                    fill_row(noted, run.target)
+                    if len(arms.movements) > 0:
+                        run.action = arms.movements[n, g, m, 0]
+                else:
+                    fill_row(noted, target)
+            move_runs(count, robot, batch)
+            if len(arms.waypoints) > 0:
+                follow_paths(count, offset, arms.movements[:, g, m], arms.waypoints, robot, batch)
+            for i in range(count):
+                goals[offset + i, g, m].moved = batch.runs[i].ticks
+        correct_runs(count, robot, batch)
+        for i in range(count):
+            n, moved = offset + i, 0
+            for m in range(goals.shape[2]):
+                moved += goals[n, g, m].moved
+            account(batch.runs[i], moved, goals[n, g, 0])
+            count_goal(goals[n, g, 0], counts[n])
+
+
+REQUESTED = len(Requests._fields)
+
+
+@entry
+def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any) -> None:
+    """Let every arm reach for its goals, as many at once as the batch holds.
+
+    ``goals``, ``counts`` and ``rewards`` are the entries of
+    :class:`~coartic.motion.trials.Accounts`, filled in place; the caller sets ``counts`` to 0.
+    ``arrays`` are the entries of :class:`Requests`, followed by the entries of a batch.
+    """
+    arms, batch = Requests(*arrays[:REQUESTED]), Batch(*arrays[REQUESTED:])
+    count, room = len(arms.targets), len(batch.runs)
+    for offset in range(0, count, room):
+        _reach_lot(offset, min(room, count - offset), arms, robot[0], goals, counts, batch)
+    for n in range(count):
+        rewards[n] = -counts[n, TICKS] if counts[n, FAILURES] == 0 else NO_REWARD

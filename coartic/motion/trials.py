@@ -1,0 +1,442 @@
+"""Trials with given targets: many robots make them side by side, by the compiled kernels.
+
+A session, an objective, an execution and an environment make their trials here, and count them.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from coartic.internal.arguments import Numbers, checked_arguments
+from coartic.internal.limits import brief_value, check_limits
+from coartic.internal.text import counted
+from coartic.internal.threads import in_parts
+from coartic.model import PAPER, MotionModel, check_exact, check_model
+from coartic.motion.doors import check_goal, configuration, finite_array
+from coartic.motion.kernels.noise import MAX_CORRECTIONS
+from coartic.motion.kernels.slots import SLOTS, Batch, batch_for, robot_parameters, width_of
+from coartic.motion.kernels.trial import (
+    CORRECTIONS,
+    COUNTED,
+    EVALUATIONS,
+    FAILURES,
+    ITERATIONS,
+    TICKS,
+    Requests,
+    account_type,
+    reach_kernel,
+)
+from coartic.motion.kernels.trial import NO_REWARD as NO_REWARD
+from coartic.robot import HANDS, LARGEST_ENTRY, Array, Configs, Hands, Points, Robot
+from coartic.tasks.task import Task, check_hands, hands_of
+
+
+class Accounts(NamedTuple):
+    """Accounts of N trials with G goals."""
+
+    goals: NDArray[np.void]
+    """Accounts of the goals, shape ``(N, G, M)``: records (:func:`account_type`)."""
+    counts: NDArray[np.int64]
+    """Counts of the trials, by :data:`COUNTED`, shape ``(N, 5)``."""
+    rewards: NDArray[np.int64]
+    """Total rewards, shape ``(N,)``; :data:`NO_REWARD` where a trial failed."""
+
+
+SHARE = 14 * SLOTS
+"""Smallest number of arms for a thread. Starting a thread takes as long as a hundred trials."""
+_IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
+"""Batches that no thread uses, by :attr:`Robot.max_links`."""
+
+
+def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
+    """Return new accounts of ``count`` trials.
+
+    The accounts have ``goals`` goals, and ``moves`` movements to targets for each goal. The counts
+    of the trials are 0; the caller fills in everything else.
+    """
+    return Accounts(
+        np.empty((count, goals, moves), account_type(width_of(robot))),
+        np.zeros((count, len(COUNTED)), dtype=np.int64),
+        np.empty(count, dtype=np.int64),
+    )
+
+
+ALL_MOVE = np.empty((0, 0, 0, 3), dtype=np.int64)
+"""Value of :attr:`Requests.movements` with which all movements end on arrival as well."""
+NO_WAYPOINTS = np.empty((0, 0))
+NO_NOISE = np.zeros((1, 2), dtype=np.uint64)
+"""Value of :attr:`Requests.worlds` for trials without noise."""
+PRACTICE, JUDGE = 0x70726163, 0x6A756467
+"""Keys of the worlds among the children of a seed: where a method practises, and where its solution
+is judged. So nobody is judged by the noise in which it has practised."""
+
+
+@lru_cache(maxsize=4096)
+def world_seed(seed: int, world: int = PRACTICE) -> int:
+    """Return the seed of the noise that belongs to a seed, from 0 to 2^64 - 1.
+
+    It is a child of the seed (``numpy.random.SeedSequence``), so that ``default_rng(seed)`` has
+    nothing to do with the noise. ``seed`` is from 0 to 2^128 - 1, ``world`` is :data:`PRACTICE` or
+    :data:`JUDGE`.
+    """
+    return int(np.random.SeedSequence(seed, spawn_key=(world,)).generate_state(1, np.uint64)[0])
+
+
+def worlds_of(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
+    """Return the worlds of N trials (:attr:`Requests.worlds`), shape ``(N, 2)``.
+
+    ``seeds`` comes from :func:`world_seed`; it and ``draws`` are numbers or have shape ``(N,)``.
+    """
+    pairs = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64))
+    return np.stack(np.atleast_1d(*pairs), axis=1)
+
+
+def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
+    """Let N arms reach for G goals each, in turn, and return their accounts.
+
+    An arm that misses a goal makes no movement for later goals. A trial with a target beyond
+    :data:`LARGEST_ENTRY` fails without a movement; nothing else is checked. ``parameters`` come
+    from :func:`robot_parameters`. Many arms are divided among threads.
+    """
+    count, goals, moves, _ = arms.targets.shape
+    accounts, idle = empty_accounts(robot, count, goals, moves), _IDLE[robot.max_links]
+
+    def work(part: slice) -> None:
+        requests, results = arms, accounts
+        if part.stop - part.start < count:
+            rows = {name: array[part] for name, array in arms._asdict().items()
+                    if name not in ("waypoints", "first") and len(array) == count}  # fmt: skip
+            requests = arms._replace(**rows)
+            results = Accounts._make(array[part] for array in accounts)
+        try:
+            batch = idle.pop()  # no other thread gets it
+        except IndexError:
+            batch = batch_for(robot)
+        reach_kernel(parameters, *results, *requests, *batch)
+        idle.append(batch)
+
+    in_parts(work, count, SHARE)
+    return accounts
+
+
+class Reached(NamedTuple):
+    """Results of N arms that reached for a goal each (:func:`reach_goals`)."""
+
+    q: Configs
+    """Configuration in which each arm ended, shape ``(N, dof)``, in length units and rad."""
+    hit: NDArray[np.bool_]
+    """True where the hand is in the goal, shape ``(N,)``."""
+    ticks: NDArray[np.int64]
+    """Control ticks of each arm's movements, shape ``(N,)``."""
+    corrected: Configs
+    """Target of each arm's corrective movement, shape ``(N, dof)``; NaN if none was made."""
+    corrections: NDArray[np.int64]
+    """Corrective movements made, 0 or 1, shape ``(N,)``."""
+    iterations: NDArray[np.int64]
+    """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
+    evaluations: NDArray[np.int64]
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
+    iterations."""
+
+
+@checked_arguments
+def reach_goals(
+    robot: Robot,
+    q: Numbers,
+    hands: Numbers,
+    goals: Numbers,
+    radius: float,
+    targets: Numbers | None = None,
+    *,
+    checks: bool = True,
+    locked_base: Sequence[str] = (),
+    model: MotionModel = PAPER,
+) -> Reached:
+    """Let N arms reach for one goal each, side by side, from where they are.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot of all arms.
+    q : ndarray, shape (N, dof)
+        Configurations in which the arms start, in length units (base) and rad (joints).
+    hands : ndarray of int, shape (N,)
+        Hand of each arm: 0 left, 1 right.
+    goals : ndarray, shape (N, 2)
+        Centre of the goal of each arm, x and y in length units.
+    radius : float
+        Radius of all goals (in length units).
+    targets : ndarray, shape (N, dof), optional
+        Targets of the first movements. An entry that is NaN keeps its value. An arm whose row is
+        NaN has no target: only the corrective process acts. By default no arm has a target.
+    checks : bool
+        True if an arm without a target stays when its hand is in its goal already; False if the
+        corrective process begins at once.
+    locked_base : sequence of {"x", "y"}
+        Coordinates of the base that the corrective process does not change.
+    model : MotionModel
+
+    Returns
+    -------
+    Reached
+        Where the arms ended, and the ticks and evaluations that this took. An arm with a target
+        beyond 1e5 does not move, and does not hit its goal.
+
+    Raises
+    ------
+    ValueError
+        A shape is wrong, a number outside ``targets`` is not finite or out of bounds, a hand is
+        neither 0 nor 1, or the model does not fit the radius or has motor noise.
+
+    Notes
+    -----
+    Source: paper, sections *Generating Movement for Each Goal* and *The Corrective Process*.
+    """
+    count = len(np.atleast_2d(q))
+    starts = finite_array("q", q, (count, robot.dof))
+    aims = np.full(starts.shape, np.nan) if targets is None else np.array(targets, order="C")
+    if aims.shape != starts.shape:
+        raise ValueError(f"targets has shape {aims.shape}; it must be {starts.shape}")
+    codes = finite_array("hands", hands, (count,)).astype(np.int64)
+    if not (np.isin(codes, range(len(HANDS))) & (codes == hands)).all():
+        raise ValueError(f"hands is {brief_value(hands)}; each entry must be 0 (left) or 1 (right)")
+    check_limits("radius", radius, 1e-9, LARGEST_ENTRY)
+    check_exact(model, radius=radius)
+    arms = Requests(
+        starts=starts,
+        hands=codes[:, None],
+        targets=aims[:, None, None],
+        movements=ALL_MOVE,
+        waypoints=NO_WAYPOINTS,
+        goals=finite_array("goals", goals, (count, 2))[:, None],
+        first=0,
+        worlds=NO_NOISE,
+    )
+    locked = tuple(locked_base)
+    parameters = robot_parameters(robot, radius, locked_base=locked, model=model, checks=checks)
+    ended = reach(robot, arms, parameters).goals[:, 0, 0]
+    ended["corrected"][ended["corrections"] == 0] = np.nan
+    columns = [ended[name][..., : robot.dof] if name in ("q", "corrected") else ended[name]
+               for name in Reached._fields]  # fmt: skip
+    return Reached._make(map(np.ascontiguousarray, columns))
+
+
+class CompiledTask(NamedTuple):
+    """A task in the form that the kernels read (:func:`compiled_task`)."""
+
+    task: Task
+    starts: Configs
+    """Configuration at the start of a trial, shape ``(1, dof)``, in length units and rad."""
+    goals: Points
+    """Centres of the goals, shape ``(1, G, 2)``."""
+    parameters: NDArray[np.void]
+    """Parameters of the robot (:func:`coartic.motion.kernels.slots.robot_parameters`)."""
+    model: MotionModel
+    options: tuple[bool, bool]
+    """Whether an arm without a target stays if its hand is in the goal, and whether the noise of
+    aimed movements grows with their length."""
+
+
+_last_compiled: CompiledTask | None = None
+
+
+def compiled_task(
+    task: Task, model: MotionModel, *, checks: bool = True, grows: bool = False
+) -> CompiledTask:
+    """Return a task with a model as arrays for the kernels.
+
+    The arrays are cached: do not change them. Without ``checks`` the corrective process begins at
+    once where an arm has no target. With ``grows`` the noise of aimed movements grows with their
+    length.
+
+    Raises
+    ------
+    ValueError
+        A constant of the model is out of bounds or does not fit the radius, or the task is an
+        unchecked copy (``model_copy``) whose start or goals are wrong.
+    TypeError
+        The model is not a MotionModel.
+    """
+    global _last_compiled
+    latest = _last_compiled  # another thread may replace it
+    options = checks, grows
+    if latest is not None and latest.task is task and latest.model is model:  # noqa: SIM102
+        if latest.options == options:
+            return latest
+    check_model(model, radius=task.radius)
+    goals = [check_goal(goal, task.radius) for goal in task.goals]
+    _last_compiled = compiled = CompiledTask(
+        task=task,
+        starts=configuration(task.robot, task.q0)[None],
+        goals=np.array([goals], dtype=np.float64),
+        parameters=robot_parameters(
+            task.robot,
+            task.radius,
+            locked_base=task.locked_base,
+            model=model,
+            checks=checks,
+            grows=grows,
+        ),
+        model=model,
+        options=options,
+    )
+    return compiled
+
+
+# ---- Trials outside the session of a run: honest methods make none ----
+
+_outside = 0
+
+
+def count_trials(count: int) -> None:
+    """Add ``count`` to the number of trials made outside the sessions of runs.
+
+    :func:`trials_outside` returns that number. The session of a run subtracts its own trials.
+    """
+    global _outside
+    _outside += count
+
+
+def trials_outside() -> int:
+    """Return the number of trials that :func:`count_trials` has counted in this process."""
+    return _outside
+
+
+def make_trials(
+    compiled: CompiledTask,
+    hands: Hands,
+    targets: Configs,
+    movements: NDArray[np.int64] = ALL_MOVE,
+    waypoints: Configs = NO_WAYPOINTS,
+    worlds: NDArray[np.uint64] = NO_NOISE,
+) -> Accounts:
+    """Make N trials of a task, count them (:func:`count_trials`), and return their accounts.
+
+    All arguments are as in :class:`Requests`. Without noise the worlds have no effect.
+    """
+    count_trials(len(targets))
+    arms = Requests(
+        compiled.starts, hands, targets, movements, waypoints, compiled.goals, 0, worlds
+    )
+    return reach(compiled.task.robot, arms, compiled.parameters)
+
+
+def reach_next(
+    compiled: CompiledTask,
+    q: Configs,
+    hands: Hands,
+    targets: Configs,
+    first: int,
+    worlds: NDArray[np.uint64] = NO_NOISE,
+) -> Accounts:
+    """Let a robot reach for the next goals of a task, from goal ``first`` on (from 0).
+
+    ``q``, shape ``(1, dof)``, is where it stands; the other arguments are as in :class:`Requests`,
+    for as many goals as there are ``targets``. The trial is not counted.
+    """
+    goals = compiled.goals[:, first : first + targets.shape[1]]
+    arms = Requests(q, hands, targets, ALL_MOVE, NO_WAYPOINTS, goals, first, worlds)
+    return reach(compiled.task.robot, arms, compiled.parameters)
+
+
+def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
+    """Return a sentence on the first goal that a trial missed, or an empty string.
+
+    ``goals`` are the accounts of the trial's goals, shape ``(G,)``.
+    """
+    if goals["hit"][-1]:
+        return ""
+    number = int(goals["hit"].argmin())
+    goal = goals[number]
+    hand, corrections = HANDS[goal["hand"]], int(goal["corrections"])
+    if corrections == MAX_CORRECTIONS:
+        return f"goal {number + 1}: the {hand} hand misses it after {corrections} corrections"
+    return (
+        f"goal {number + 1}: the corrective process did not converge with the {hand} hand in "
+        f"{counted(int(goal['iterations']), 'iteration')}"
+    )
+
+
+class Trials(NamedTuple):
+    """Results of N trials."""
+
+    ticks: NDArray[np.int64]
+    """Control ticks of each trial, shape ``(N,)``."""
+    completed: NDArray[np.bool_]
+    """True where every goal was hit, shape ``(N,)``."""
+    corrections: NDArray[np.int64]
+    """Corrective movements made, shape ``(N,)``."""
+    iterations: NDArray[np.int64]
+    """Iterations of the corrective process, one Jacobian each, shape ``(N,)``."""
+    evaluations: NDArray[np.int64]
+    """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
+    iterations."""
+    targets: Configs
+    """Targets of the movements made, shape ``(N, G, dof)``, in length units and rad. A row is NaN
+    if no target was passed. For goals after a failure the row is the target as it was passed."""
+    reached: Configs
+    """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN if it was not hit."""
+
+    @property
+    def rewards(self) -> Array:
+        """Total reward of each trial, minus its ticks, shape ``(N,)``.
+
+        The reward of a failed trial is -inf.
+        """
+        return np.where(self.completed, -self.ticks, -np.inf)
+
+
+def trials_of(accounts: Accounts, dof: int) -> Trials:
+    """Return the results of trials from their accounts.
+
+    ``dof`` is the number of entries of a configuration. The arrays of the result, except
+    ``completed``, are views of ``accounts``. This function changes ``accounts``: it sets
+    ``accounts.goals["q"]`` to NaN at goals that were not hit. If there are several movements for a
+    goal, only the first account of the goal is used.
+    """
+    goals, counts = accounts.goals[..., 0], accounts.counts
+    reached = goals["q"][..., :dof]
+    if counts[:, FAILURES].any():
+        reached[~goals["hit"]] = np.nan
+    return Trials(
+        ticks=counts[:, TICKS],
+        completed=counts[:, FAILURES] == 0,
+        corrections=counts[:, CORRECTIONS],
+        iterations=counts[:, ITERATIONS],
+        evaluations=counts[:, EVALUATIONS],
+        targets=goals["target"][..., :dof],
+        reached=reached,
+    )
+
+
+HandSequences = str | Sequence[str]
+"""Hand sequences of N trials: one for all (``"RRLR"``), or a list of N."""
+
+
+def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
+    """Return the hand for each goal of ``count`` trials, 0 left or 1 right.
+
+    The shape is ``(count, G)``. Raises ValueError if the sequences do not fit the task, or if a
+    list does not have ``count`` of them.
+    """
+    is_list = isinstance(hands, Iterable) and not isinstance(hands, str)
+    sequences: list[Any] = list(hands) if is_list else [hands]
+    codes = dict[str, list[int]]()
+    for sequence in sequences:
+        if not isinstance(sequence, str) or sequence not in codes:
+            chosen = hands_of(check_hands(task, sequence))
+            codes[sequence] = [HANDS.index(hand) for hand in chosen]
+    if is_list and len(sequences) != count:
+        raise ValueError(
+            f"hands has {counted(len(sequences), 'hand sequence')} for {counted(count, 'trial')}; "
+            "it must have one for each"
+        )
+    rows = np.empty((count, len(task.goals)), dtype=np.int64)
+    rows[:] = np.reshape([codes[sequence] for sequence in sequences], (-1, len(task.goals)))
+    return rows
