@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -19,6 +20,7 @@ from coartic.benchmarks.suites import (
     Suite,
     TaskNamed,
     TrialCount,
+    Worlds,
     check_kind,
     errors_of_block,
     load_suite,
@@ -33,8 +35,9 @@ from coartic.internal.limits import (
 )
 from coartic.internal.text import counted, unknown
 from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.model import PAPER, MotionModel, differences
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, tasks_by_name
+from coartic.runs.plan import Job, cell_of, in_words, tasks_by_name
 from coartic.tasks.families import (
     instance_of,
     is_file,
@@ -97,6 +100,9 @@ class Request(FileData):
     """Limit of the CPU time of a job, in s; by default the limit of the suite."""
     trial_budget: TrialCount | None = None
     """Largest number of physical trials of a run, for all methods; by default there is no limit."""
+    model: Worlds | None = None
+    """World, such as ``{"motor_noise": 0.01}``, of all blocks of the suite that have no table
+    ``model``. Blocks with one are left out, with a warning."""
 
 
 def request_for(**options: Any) -> Request:
@@ -148,7 +154,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     """Return the jobs of :func:`plan_suite` for a checked request and all known methods."""
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
-    jobs = [*_suite_jobs(suite, registered, own, task_named, job)]
+    jobs = [*_suite_jobs(suite, request, registered, own, task_named, job)]
     asked = {name: methods_named(name, registered) for name in request.methods}
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     ids = dict.fromkeys(itertools.chain(*asked.values()))
@@ -163,6 +169,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
         for task, method in itertools.product(tasks.values(), methods)
         if (task.name in own or method.name not in of_suite)
         and (task.name, method.name) not in cells
+        and method.refuses(_world_of(request)) is None
         and method.why_not(task) is None
     ]
     if wrong := [name for name in names if name not in tasks]:
@@ -178,12 +185,12 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     chosen = [planned for planned in jobs if planned.cell.method.name in ids]
     busy = {planned.cell.task.name for planned in chosen}
     if idle := [tasks[name] for name in names if name not in busy]:
-        raise CoarticError(_why_nothing_runs(suite, idle, methods, jobs))
+        raise CoarticError(_why_nothing_runs(suite, request, idle, methods, jobs))
     running = {planned.cell.method.name for planned in chosen}
     for wanted in asked.values() or [[*ids]]:
         if running.isdisjoint(wanted):
             idle_methods = [registered[name] for name in wanted]
-            raise CoarticError(_why_nothing_runs(suite, [], idle_methods, jobs))
+            raise CoarticError(_why_nothing_runs(suite, request, [], idle_methods, jobs))
     _check_effects(request, chosen)
     if request.trials:
         _check_trials(
@@ -312,8 +319,14 @@ def _asked_tasks(
     return names, own, task_named
 
 
+def _world_of(request: Request) -> MotionModel:
+    """Return the world of a request, by default the paper's."""
+    return request.model[0] if request.model else PAPER
+
+
 def _suite_jobs(
     suite: Suite,
+    request: Request,
     registered: Registry,
     own: Collection[str],
     task_named: TaskNamed,
@@ -333,12 +346,21 @@ def _suite_jobs(
             tasks = [*tasks_of(block, own, task_named)]
             if block.goals is not None and not tasks and not own:
                 raise CoarticError(f"goals = {[*block.goals]} leaves no task")
-            for task, method in itertools.product(tasks, methods):
+            worlds = block.model or suite.model
+            if request.model and worlds:
+                warnings.warn(
+                    f"suite {suite.name!r}, block {number}, is left out: it has a world of its own "
+                    f"({', '.join(in_words(differences(world)) for world in worlds)})",
+                    stacklevel=2,
+                )
+                continue
+            for task, method, world in itertools.product(tasks, methods, worlds or (None,)):
                 for values in itertools.product(*block.grid.values()):
                     parameters = block.parameters | dict(zip(block.grid, values, strict=True))
-                    reason = method.why_not(task, parameters)
+                    chosen = world or _world_of(request)
+                    reason = method.refuses(chosen) or method.why_not(task, parameters)
                     if reason is None:
-                        yield job(task, method, parameters, block.runs)
+                        yield job(task, method, parameters, block.runs, chosen)
                     elif not is_open:
                         raise CoarticError(
                             f"{reason}; name in a block only methods that apply to all of its tasks"
@@ -352,6 +374,7 @@ def _job_of(
     method: MethodInfo,
     parameters: Mapping[str, Any] | None = None,
     runs: int | None = None,
+    world: MotionModel | None = None,
 ) -> Job:
     """Return the job of a method with parameters on a task.
 
@@ -361,11 +384,13 @@ def _job_of(
       the suite, or else the default of the method.
     - A method that is not stochastic has only run 0. It has no run if the runs of the request do
       not begin at 0.
+    - The world is ``world``, or else that of the request, or else the paper's.
     """
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
         parameters.pop("trials", None)
-    cell = cell_of(task, method, parameters, trials, request.trial_budget)
+    world = _world_of(request) if world is None else world
+    cell = cell_of(task, method, parameters, trials, request.trial_budget, world)
     asked = request.runs or runs or suite.runs
     numbers = asked if isinstance(asked, range) else range(asked)
     numbers = numbers if method.stochastic else range(numbers.start, 1)
@@ -375,7 +400,11 @@ def _job_of(
 
 
 def _why_nothing_runs(
-    suite: Suite, idle: Sequence[Task], methods: Iterable[MethodInfo], jobs: Sequence[Job]
+    suite: Suite,
+    request: Request,
+    idle: Sequence[Task],
+    methods: Iterable[MethodInfo],
+    jobs: Sequence[Job],
 ) -> str:
     """Return a sentence on why methods have no runs.
 
@@ -383,7 +412,11 @@ def _why_nothing_runs(
     is on the first of them. If there are none, it is on all tasks of ``jobs``.
     """
     tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
-    reasons = dict.fromkeys(method.why_not(task) for task in tasks for method in methods)
+    reasons = dict.fromkeys(
+        method.refuses(_world_of(request)) or method.why_not(task)
+        for task in tasks
+        for method in methods
+    )
     labels = ", ".join(dict.fromkeys(job.cell.label for job in jobs)) or "no methods for it"
     reason = "; ".join(filter(None, reasons)) or f"suite {suite.name!r} has {labels}"
     where = f"task {idle[0].name!r}" if idle else "any of the tasks"

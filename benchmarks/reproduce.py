@@ -56,10 +56,11 @@ def trajectory_of(run: Run) -> Trajectory:
         reason = f"{run.outcome.status}, {run.outcome.reason}"
         raise CoarticError(f"run {run.id} has no solution to show: {reason}")
     task, movements = run.cell.task, run.solution.movements
+    exact = run.cell.model.without_noise()
     try:
-        if error := too_long(task, movements):
+        if error := too_long(task, movements, exact):
             raise error
-        return trajectory(task, movements)
+        return trajectory(task, movements, exact)
     except (SolutionError, ValueError) as error:
         raise CoarticError(f"run {run.id} cannot be shown: {error}") from None
 
@@ -198,9 +199,14 @@ def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int,
                 stored = store.run(run_id)
                 (again,) = with_noise([stored])
                 executed += 1
-                was, now = stored.solution.noisy_ticks, again.solution.noisy_ticks
-                if was != now:
-                    wrong.append(f"Run {run_id}: noisy_ticks is {now}, not {was}.")
+                if stored.solution.noise_rule != again.solution.noise_rule:
+                    continue  # `coartic run` makes them again
+                wrong += [
+                    f"Run {run_id}: {name} is {now}, not {was}."
+                    for name in ("noisy_ticks", "mean_ticks", "failed_executions")
+                    if (was := getattr(stored.solution, name))
+                    != (now := getattr(again.solution, name))
+                ]
     return executed, wrong
 
 
@@ -224,8 +230,8 @@ def compare_runs(a: Run, b: Run) -> list[str]:
         for run in (a, b)
     )
     names = ["status", "reason", "details", *Meter.COUNTS]
-    if a.id == b.id:  # the id is the seed of the motor noise
-        names.append("noisy_ticks")
+    if a.id == b.id and a.solution.noise_rule == b.solution.noise_rule:
+        names += ["noisy_ticks", "mean_ticks", "failed_executions"]  # the id is their seed
     changes = [
         f"{name}: {brief_value(row_a[name])} against {brief_value(row_b[name])}"
         for name in names

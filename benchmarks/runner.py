@@ -22,7 +22,7 @@ from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
-from coartic.benchmarks.scoring import score
+from coartic.benchmarks.scoring import score, with_noise
 from coartic.benchmarks.suites import Suite
 from coartic.benchmarks.time_left import TimeLeft
 from coartic.errors import CoarticError
@@ -184,6 +184,7 @@ def perform(
     - Runs that fail are stored and counted. They do not raise an error. The next call performs
       crashed runs again, and runs that timed out under a lower limit.
     - Finished runs are stored even if the call is interrupted.
+    - Ticks with noise of stored runs that follow an older rule of noise are made again.
     - An ok run that this call makes with each method from a file is made again in another process.
       If the result differs, this call warns, and reports mark the method. It is the quickest of
       those that were not the first of their process, if there are such runs: a method can keep
@@ -241,6 +242,8 @@ def perform(
         missing = _missing_jobs(plan, store, progress)
         own_methods = {job.cell.method.name: job for job in missing if not job.cell.method.is_ours}
         repeats = [replace(job, numbers=job.numbers[:1]) for job in own_methods.values()]
+        for ids in store.outdated_noise():
+            store.write(with_noise([store.run(run_id) for run_id in ids]))
         progress.time_left = TimeLeft(executor.workers)
         progress.time_left.expect([*missing, *repeats])
         tell(None)

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from coartic.benchmarks.provenance import current_environment, now
 from coartic.internal.text import LONGEST_REASON, plain
+from coartic.model import PAPER, same_world
 from coartic.motion.execution import Execution, execute_noisy, other_arm_travel
-from coartic.runs.plan import Job
+from coartic.motion.initial_hands import best_hands
+from coartic.motion.solution import Movement, next_action
+from coartic.runs.plan import Cell, Job
 from coartic.runs.record import (
     MOTOR_NOISE,
+    NOISE_RULE,
     NOISY_EXECUTIONS,
     Outcome,
     Run,
@@ -26,7 +32,9 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     """Execute the movements of a job's outcomes, and return its scored runs.
 
     Parts of an outcome (``solution``, ``initial``, ``replay``) that are too long or break the rules
-    of the task are not executed. Only runs with status ok have scores.
+    of the task are not executed. Only runs with status ok have scores. In a world with noise only
+    the solution counts, which is what the method recommends: it is stored without ticks, and
+    corrections are left to the corrective process.
 
     Parameters
     ----------
@@ -38,13 +46,15 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
     -------
     list of Run
     """
-    task, method = job.cell.task, job.cell.method
+    cell, method = job.cell, job.cell.method
+    is_noisy = cell.model.motor_noise > 0.0
     imports = {} if method.is_ours else {"imports": method.packages}
-    solutions = [movements for outcome in outcomes for movements in outcome.parts.values()]
-    executions = iter(execute_all(task, solutions))
+    stated = [_answer_of(outcome) if is_noisy else outcome.parts for outcome in outcomes]
+    solutions = [movements for parts in stated for movements in parts.values()]
+    executions = iter(execute_all(cell.task, solutions, cell.model))
     runs = []
-    for number, outcome in zip(job.numbers, outcomes, strict=True):
-        parts = {part: next(executions) for part in outcome.parts}
+    for number, outcome, asked in zip(job.numbers, outcomes, stated, strict=True):
+        parts = {part: next(executions) for part in asked}
         status, reason = _final_status(outcome, parts)
         is_ok = status == "ok"
         final = replace(
@@ -55,35 +65,79 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
             environment=current_environment() | imports | (outcome.environment or {}),
         )
         scores = {
-            part: _score_of(task, part, execution) for part, execution in parts.items() if is_ok
+            part: _score_of(cell.task, part, execution)
+            for part, execution in parts.items()
+            if is_ok
         }
+        if is_noisy and is_ok:
+            answer = tuple(asked["solution"])
+            scores["solution"] = scores["solution"]._replace(reward=None, movements=answer)
         runs.append(Run(replace(job, numbers=(number,)), final, scores, now()))
     return with_noise(runs)
 
 
-def with_noise(runs: Sequence[Run]) -> list[Run]:
-    """Set ``noisy_ticks`` in the scores of solutions, and return the runs.
+def _answer_of(outcome: Outcome) -> dict[str, list[Movement]]:
+    """Return the solution of an outcome as it is to be made again (:func:`next_action`)."""
+    solution = outcome.parts.get("solution")
+    return {} if solution is None else {"solution": [*next_action(solution)]}
 
-    ``noisy_ticks`` is the mean number of ticks over executions with motor noise, or None if an
-    execution fails. The seed of the noise is made from the id of the run, so the number does not
-    depend on the other runs. All runs must be on one task.
+
+def with_noise(runs: Sequence[Run]) -> list[Run]:
+    """Execute the solutions of runs with motor noise, and return the runs with these scores.
+
+    All runs must be of one cell. The ticks of a run do not depend on the other runs.
+
+    - In the paper's world, ``noisy_ticks`` is the mean number of ticks over executions with noise
+      of 0.01, or None if an execution fails. The seed of the noise is made from the id of the run.
+    - In a world with noise, ``mean_ticks`` is the mean over executions in this world, and
+      ``failed_executions`` is how many failed. A failed execution counts as twice the ticks of the
+      corrective process with its best hands. The seed is that of the judge (:func:`.judge_seed`),
+      which is the same for all methods.
+    - In another world without noise nothing is executed.
     """
-    solved = {run.id: run for run in runs if "solution" in run.scores}
-    seeds = [int(run_id.partition("-")[0], 16) for run_id in solved]
-    solutions = [run.solution.movements for run in solved.values()]
-    noisy = dict[str, float]()
-    if solved:
-        task = runs[0].cell.task
-        ticks = execute_noisy(task, solutions, MOTOR_NOISE, NOISY_EXECUTIONS, seeds)
-        noisy = dict(zip(solved, ticks.mean(axis=1).tolist(), strict=True))
-    scored = []
-    for run in runs:
-        if run.id in noisy:
-            mean = None if np.isnan(noisy[run.id]) else noisy[run.id]
-            solution = run.solution._replace(noisy_ticks=mean)
-            run = replace(run, scores=run.scores | {"solution": solution})
-        scored.append(run)
-    return scored
+    solved = [run for run in runs if "solution" in run.scores]
+    if not solved:
+        return [*runs]
+    cell = solved[0].cell
+    scores: list[dict[str, Any]]
+    if cell.model.motor_noise > 0.0:
+        scores = _judge(cell, solved)
+    elif same_world(cell.model, PAPER, cell.task.radius):
+        seeds = [int(run.id.partition("-")[0], 16) for run in solved]
+        solutions = [run.solution.movements for run in solved]
+        ticks = execute_noisy(cell.task, solutions, MOTOR_NOISE, NOISY_EXECUTIONS, seeds)
+        means = ticks.mean(axis=1).tolist()
+        scores = [{"noisy_ticks": None if math.isnan(mean) else mean} for mean in means]
+    else:
+        return [*runs]
+    scored = {
+        run.id: run.solution._replace(**values, noise_rule=NOISE_RULE)
+        for run, values in zip(solved, scores, strict=True)
+    }
+    return [
+        replace(run, scores=run.scores | {"solution": scored[run.id]}) if run.id in scored else run
+        for run in runs
+    ]
+
+
+def _judge(cell: Cell, runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """Return ``mean_ticks`` and ``failed_executions`` of the answers of runs in a noisy world."""
+    exact = cell.model.without_noise()
+    ticks = execute_noisy(
+        cell.task,
+        [run.solution.movements for run in runs],
+        cell.model.motor_noise,
+        NOISY_EXECUTIONS,
+        [run.job.judge_seed(run.number) for run in runs],
+        exact,
+    )
+    best = best_hands(cell.task, exact)
+    capped = np.where(np.isnan(ticks), np.nan if best is None else 2.0 * best[1], ticks)
+    means, failed = capped.mean(axis=1).tolist(), np.isnan(ticks).sum(axis=1).tolist()
+    return [
+        {"mean_ticks": None if math.isnan(mean) else mean, "failed_executions": count}
+        for mean, count in zip(means, failed, strict=True)
+    ]
 
 
 def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import sys
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
@@ -18,7 +18,8 @@ from coartic import CoarticError, Task, builtin_tasks, parse_task
 from coartic.internal.limits import MOST_RUNS, MOST_SECONDS, MOST_TRIALS
 from coartic.internal.text import Line, plain, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain
+from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.model import WORLD, MotionModel, check_model
 from coartic.robot import Finite
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.families import named_by, shipped_families
@@ -52,6 +53,38 @@ _Names = Annotated[tuple[str, ...], _SOME]
 _Number = Annotated[int, Field(ge=1, strict=True)]
 
 
+def _worlds(value: Any) -> tuple[MotionModel, ...]:
+    """Validate a table ``model``; return the worlds of all combinations of its values.
+
+    A tuple of worlds, which is validated already, is returned unchanged.
+
+    A list of values is a grid. The constants are those of :data:`.WORLD`.
+    """
+    if isinstance(value, tuple) and all(isinstance(world, MotionModel) for world in value):
+        return value
+    if not isinstance(value, Mapping) or not value:
+        raise sentence_error(
+            f"should be a table of constants, such as {{ motor_noise = 0.01 }}, not {value!r}"
+        )
+    for name in value:
+        if name not in WORLD:
+            raise sentence_error(f"has no constant {name!r}; a world has {', '.join(WORLD)}")
+    lists = [
+        value[name] if isinstance(value[name], list | tuple) else [value[name]] for name in value
+    ]
+    try:
+        return tuple(
+            check_model(MotionModel(**dict(zip(value, values, strict=True))))
+            for values in itertools.product(*lists)
+        )
+    except (TypeError, ValueError) as error:
+        raise sentence_error(str(error)) from None
+
+
+Worlds = Annotated[tuple[MotionModel, ...], PlainValidator(_worlds)]
+"""Worlds of a table ``model`` (:func:`_worlds`)."""
+
+
 class Move(FileData):
     """Displacements of a goal, each of which makes a new task."""
 
@@ -83,6 +116,10 @@ class _Block(FileData):
     grid: dict[str, Annotated[tuple[_Value, ...], _SOME]] = Field(default_factory=dict)
     """Lists of values, by name of the parameter. All combinations of values are run. A value in
     ``grid`` replaces that in ``parameters``."""
+    model: Worlds | None = None
+    """Table ``model``: the world in which methods practise and are judged, by constants that are
+    not the paper's (``motor_noise``, ``norm``, ``base_weight``); each value of a list is a world of
+    its own. By default the suite's."""
 
 
 class Suite(FileData):
@@ -98,6 +135,8 @@ class Suite(FileData):
     """Runs of each stochastic method on each task. Other methods are run once."""
     trials: TrialCount | None = None
     """Trials of a run, for methods that have this parameter."""
+    model: Worlds | None = None
+    """Table ``model`` of all blocks that have none; by default the paper's world."""
     time_limit_s: Seconds | None = 600.0
     """Limit of the CPU time of a job, in s. A job is one run, or several runs that are performed
     side by side."""

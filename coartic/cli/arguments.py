@@ -84,6 +84,26 @@ def names_in(texts: Sequence[str] | None) -> list[str]:
     return [name.strip() for text in texts or () for name in text.split(",")]
 
 
+def constants_in(texts: Sequence[str]) -> dict[str, Any] | None:
+    """Return the constants of a world by name, from texts such as ``motor_noise=0.01``.
+
+    None if there are no texts. Raises CoarticError for a text without ``=``; the plan checks names
+    and values.
+    """
+    constants = dict[str, Any]()
+    for text in texts:
+        name, is_pair, value = (part.strip() for part in text.partition("="))
+        if not is_pair:
+            raise CoarticError(
+                f"--model {text!r} has no value: write a constant with its value, such as "
+                "motor_noise=0.01"
+            )
+        constants[name] = value
+        with suppress(ValueError):
+            constants[name] = float(value)
+    return constants or None
+
+
 def method_titles(registered: Registry) -> dict[str, str]:
     """Return the titles of methods by id; the title of a method without its own is empty."""
     from coartic.analysis.methods import title_of

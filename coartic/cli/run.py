@@ -85,6 +85,13 @@ def run(
     trial_budget: Annotated[
         int | None, given.option("N", "Most trials of a run, for all methods.")
     ] = None,
+    model: Annotated[
+        list[str] | None,
+        given.option(
+            "CONSTANT=VALUE",
+            "World of the runs, such as motor_noise=0.01, of blocks without a world of their own.",
+        ),
+    ] = None,
     scheduler: Annotated[
         str | None, given.option("ADDRESS", "Dask scheduler to use instead of this machine.")
     ] = None,
@@ -133,6 +140,7 @@ def run(
             family_files=family_file or (),
             **{"runs": runs, "trials": trials, "seed": seed},
             **{"time_limit_s": time_limit, "trial_budget": trial_budget},
+            model=given.constants_in(given.names_in(model)),
         )
         asked = plan(chosen, request, registered)
         if include:

@@ -23,6 +23,7 @@ from coartic.internal.text import error_line, plain
 from coartic.internal.user_files import import_from
 from coartic.internal.validation import explain
 from coartic.method import Facts, Method, Outline, outline_of
+from coartic.model import PAPER, MotionModel
 from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
@@ -113,6 +114,11 @@ class MethodInfo:
         reason = self._ask("why_not", parameters or {}, *outline_of(task))
         return None if reason is None else plain(str(reason))
 
+    def refuses(self, model: MotionModel) -> str | None:
+        """Return a sentence on a constant of a world that the method cannot work with, or None."""
+        reason = None if model == PAPER else self._ask("refuses", *model)
+        return None if reason is None else plain(str(reason))
+
     def rules(self) -> dict[str, Any]:
         """Return settings of the method that its check needs.
 
@@ -145,10 +151,11 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     ----------
     method : type
         Class of the method.
-    question : {"complete", "why_not", "rules"}
+    question : {"complete", "why_not", "refuses", "rules"}
         Name of the function of :class:`MethodInfo` whose result is returned.
     *arguments
-        None for ``"rules"``. For the other questions the parameters of the method, and for
+        None for ``"rules"``, and the constants of a model for ``"refuses"``. For the other
+        questions the parameters of the method, and for
         ``"why_not"`` also the entries of an :class:`Outline`.
 
     Raises
@@ -157,6 +164,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         A parameter is wrong, or the method cannot say whether it applies. Other errors of the
         method's own check of parameters are raised as they are.
     """
+    if question == "refuses":
+        return method.refuses(MotionModel(*arguments))
     if question == "rules":
         config = method.Parameters.model_config
         wanted = {key: config.get(key) for key in ("extra", "frozen")}

@@ -18,7 +18,7 @@ from pydantic import Field, InstanceOf
 from coartic.errors import SolutionError
 from coartic.internal.limits import real_array
 from coartic.method import CORRECTIONS_BY_TENTH, MOST_COUNT, Meter
-from coartic.model import PAPER
+from coartic.model import PAPER, MotionModel
 from coartic.motion.doors import segment_lengths
 from coartic.motion.execution import Execution, execute_many
 from coartic.motion.solution import Movement
@@ -37,6 +37,10 @@ MOTOR_NOISE = 0.01
 length units and rad (:func:`coartic.execute_noisy`)."""
 NOISY_EXECUTIONS = 100
 """Number of executions of each solution with motor noise."""
+NOISE_RULE = 2
+"""Version of the rule of motor noise. Ticks of another version are shown as missing until they are
+made again, so that two rules never stand in one column. Raise it with a change of
+:mod:`coartic.motion.kernels.noise` or of the judge's seeds."""
 UNREPEATED = "made_again"
 """Key in the details of a run. Its value is the difference that was found when the run was made
 again."""
@@ -63,8 +67,17 @@ class Score(NamedTuple):
     other_arm_travel: float | None = None
     """Joint travel of arms during movements of the other hand (in rad); only for a solution."""
     noisy_ticks: float | None = None
-    """Mean ticks of a solution over :data:`NOISY_EXECUTIONS` executions with motor noise of
-    standard deviation :data:`MOTOR_NOISE`; None if one of them fails."""
+    """Mean ticks of a solution, found in the paper's world, over :data:`NOISY_EXECUTIONS`
+    executions with motor noise of standard deviation :data:`MOTOR_NOISE`; None if one of them
+    fails."""
+    mean_ticks: float | None = None
+    """Mean ticks of the answer of a run in a world with noise, over :data:`NOISY_EXECUTIONS` fresh
+    executions in this world. A failed execution counts as twice the ticks of the corrective process
+    with its best hands in this world without noise."""
+    failed_executions: int | None = None
+    """How many of these executions failed."""
+    noise_rule: int | None = None
+    """Version of the rule of noise by which these ticks were made (:data:`NOISE_RULE`)."""
 
 
 @dataclass(frozen=True)
@@ -177,6 +190,19 @@ class Run:
         return None if reward is None or reward not in rewards else rewards.index(reward)
 
     @property
+    def practice(self) -> str | None:
+        """Mean ticks of the completed trials in each tenth of a run in noise, as JSON.
+
+        The list has ten entries, null for a tenth without a completed trial. None for a run without
+        noise, and for a run without trials.
+        """
+        if self.cell.model.motor_noise == 0.0 or not self.outcome.rewards:
+            return None
+        tenths = np.array_split(np.array(self.outcome.rewards, np.float64), 10)
+        means = [-float(np.nanmean(part)) if np.isfinite(part).any() else None for part in tenths]
+        return json.dumps(means)
+
+    @property
     def early_corrections(self) -> int | None:
         """Number of corrective movements in the first tenth of a learner's trials, without trial 0.
 
@@ -256,16 +282,30 @@ COLUMNS = (
     ("task", "TEXT", "", "name of the task"),
     ("method", "TEXT", "", "id of the method"),
     ("setting", "TEXT", "", "parameters that are not the defaults"),
+    ("world", "TEXT", "",
+     "constants of the [world](model.md#worlds) that are not the paper's; empty for the paper's"),
     ("run", "INTEGER NOT NULL", "number", "number of the run, from 0"),
     ("seed", "INTEGER NOT NULL", "seed", "the same for every method on a task and `run`"),
     ("status", "TEXT NOT NULL", "outcome.status",
      "`ok`, `infeasible`, `solver-failed`, `timeout` or `crashed`"),
     ("reason", "TEXT NOT NULL", "outcome.reason", "why the run is not ok"),
     ("hands", "TEXT", "solution.hands", "hand of each goal in the solution, such as `LRLR`"),
-    ("reward", "INTEGER", "solution.reward", "of the solution; of a learner its best trial"),
+    ("reward", "INTEGER", "solution.reward",
+     "of the solution; of a learner its best trial; missing in a world with noise"),
+    ("mean_ticks", "REAL", "solution.mean_ticks",
+     "in a world with [motor noise](model.md#motor-noise): mean ticks of 100 fresh executions of "
+     "what the method recommends; a failed one counts as twice the ticks of the corrective "
+     "process with its best hands"),
+    ("failed_executions", "INTEGER", "solution.failed_executions",
+     "how many of these executions failed"),
+    ("practice", "TEXT", "practice",
+     "in a world with noise: mean ticks of the trials in each tenth, as JSON"),
     ("noisy_ticks", "REAL", "solution.noisy_ticks",
-     "mean ticks of 100 executions of the solution with [motor noise](model.md#motor-noise) 0.01; "
-     "missing if one of them fails"),
+     "of a solution found in the paper's world: mean ticks of 100 executions with motor noise "
+     "0.01; missing if one of them fails"),
+    ("noise_rule", "INTEGER", "solution.noise_rule",
+     "version of the rule of noise; ticks of another version are shown as missing until "
+     "`coartic run` makes them again"),
     ("replay_reward", "INTEGER", "replay.reward",
      "of one more trial of a learner, greedy and without noise"),
     ("replay_hands", "TEXT", "replay.hands", "hand of each goal in that trial"),
@@ -378,14 +418,18 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
     return numbers.astype(np.int64).astype("<u4").view(np.uint8).reshape(-1, 4).T.tobytes()
 
 
-def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Execution | Exception]:
-    """Execute solutions of a task under the paper's model.
+def execute_all(
+    task: Task, solutions: Sequence[Sequence[Movement]], model: MotionModel = PAPER
+) -> list[Execution | Exception]:
+    """Execute solutions of a task in a world without its motor noise.
 
     Parameters
     ----------
     task : Task
     solutions : sequence of sequence of Movement
         Solutions, whose targets and waypoints are arrays of floats.
+    model : MotionModel
+        The world.
 
     Returns
     -------
@@ -393,14 +437,17 @@ def execute_all(task: Task, solutions: Sequence[Sequence[Movement]]) -> list[Exe
         Execution of each solution, in order. A solution that breaks the rules of the task or is too
         long (:func:`too_long`) has the error instead, which is not raised.
     """
-    errors = [too_long(task, solution) for solution in solutions]
+    exact = model.without_noise()
+    errors = [too_long(task, solution, exact) for solution in solutions]
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
-    executions = iter(execute_many(compiled_task(task, PAPER), short))
+    executions = iter(execute_many(compiled_task(task, exact), short))
     return [next(executions) if error is None else error for error in errors]
 
 
-def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
-    """Return the error of a solution that is too long; None for any other solution.
+def too_long(
+    task: Task, solution: Sequence[Movement], model: MotionModel = PAPER
+) -> SolutionError | None:
+    """Return the error of a solution that is too long in a world; None for any other solution.
 
     A solution is too long if it has
 
@@ -423,7 +470,11 @@ def too_long(task: Task, solution: Sequence[Movement]) -> SolutionError | None:
     shapes = {np.shape(corner) for corner in corners}
     if len(shapes) == 1:  # a solution with other shapes breaks the rules of the task
         with np.errstate(over="ignore"):
-            steps = segment_lengths(corners).sum() / PAPER.step
+            stays = np.isnan(corners)  # an entry that stays makes no way
+            points = np.where(stays, corners[0], corners)
+            for k in range(1, len(points)):
+                points[k] = np.where(stays[k], points[k - 1], points[k])
+            steps = segment_lengths(points, model).sum() / model.step
         if steps > MOST_STEPS:
             return SolutionError(
                 f"the path of the solution has {steps:.0f} steps; at most {MOST_STEPS} are allowed"

@@ -39,6 +39,7 @@ from coartic.robot import Array
 from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
+    NOISE_RULE,
     PREFIXES,
     UNREPEATED,
     Outcome,
@@ -53,8 +54,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUNS_FILE = "runs.sqlite"
-FORMAT = 7
+FORMAT = 8
 """Number of the format. A change of a table or a view must increase it."""
+OLDEST = 7
+"""Oldest format that is read, that of version 6.0.0. It lacks columns, which are shown as missing;
+``coartic run`` adds them to the folder into which it writes."""
 _APPLICATION = 0x636F6172  # "coar"
 
 _KINDS = {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64", "BOOLEAN": "boolean"}
@@ -66,34 +70,40 @@ _DTYPES: dict[str, Any] = {
 """Types of the columns of views in data frames; all allow missing values."""
 _CELL = TypeAdapter(Cell)
 _STORED = ", ".join(f"{name} {kind}" for name, kind, source, _ in COLUMNS if source)
-_IN_VIEW = ", ".join(f'"{name}"' for name, *_ in COLUMNS)
+_NOISY = {name: f"CASE WHEN noise_rule = {NOISE_RULE} THEN {name} END AS {name}"
+          for name in ("noisy_ticks", "mean_ticks", "failed_executions")}  # fmt: skip
+_IN_VIEW = ", ".join(_NOISY.get(name, f'"{name}"') for name, *_ in COLUMNS)
 _SOLUTIONS = """SELECT run_id, key AS "order", json_extract(value, '$[0]') AS goal,
     json_extract(value, '$[1]') AS hand, json_extract(value, '$[2]') AS kind,
     json_extract(value, '$[3]') AS ticks, json_extract(value, '$[4]') AS path
     FROM asked, json_each(movements, '$.solution') ORDER BY position, run, key"""
 """Query of view ``solutions``. The code uses the query instead of the view, because some versions
 of SQLite do not call functions of JSON in a view of a file whose schema is not trusted."""
+_VIEWS = f"""CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, method,
+    setting, information, parameters, code, world, "commit", packages
+    FROM suite JOIN cells ON runs IS NOT NULL
+    JOIN results ON results.cell = cells.id AND suite_seed = suite.seed AND run < runs
+    JOIN environments ON environments.id = results.environment;
+CREATE VIEW runs AS SELECT {_IN_VIEW} FROM asked ORDER BY position, run;
+CREATE VIEW solutions AS {_SOLUTIONS};"""
 _SCHEMA = f"""BEGIN;
 CREATE TABLE suite (name TEXT NOT NULL, seed INTEGER NOT NULL, content TEXT NOT NULL);
 CREATE TABLE cells (id TEXT PRIMARY KEY, position INTEGER, runs INTEGER, digest TEXT NOT NULL,
     code TEXT NOT NULL, task TEXT NOT NULL, method TEXT NOT NULL, setting TEXT NOT NULL,
-    information TEXT NOT NULL, parameters TEXT NOT NULL, content TEXT NOT NULL);
+    information TEXT NOT NULL, parameters TEXT NOT NULL, content TEXT NOT NULL,
+    world TEXT NOT NULL DEFAULT '');
 CREATE TABLE environments (id TEXT PRIMARY KEY, content TEXT NOT NULL, "commit" TEXT,
     packages TEXT);
 CREATE TABLE results (cell TEXT NOT NULL REFERENCES cells, suite_seed INTEGER NOT NULL,
     environment TEXT NOT NULL REFERENCES environments, details TEXT NOT NULL,
     movements TEXT NOT NULL, rewards BLOB, {_STORED},
     UNIQUE (cell, suite_seed, run));
-CREATE VIEW asked AS SELECT position, results.*, suite.name AS suite, task, method, setting,
-    information, parameters, code, "commit", packages
-    FROM suite JOIN cells ON runs IS NOT NULL
-    JOIN results ON results.cell = cells.id AND suite_seed = suite.seed AND run < runs
-    JOIN environments ON environments.id = results.environment;
-CREATE VIEW runs AS SELECT {_IN_VIEW} FROM asked ORDER BY position, run;
-CREATE VIEW solutions AS {_SOLUTIONS};
+{_VIEWS}
 PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"""
 """Statements that make the tables and views."""
 
+_OF_NOISE = ("noisy_ticks", "mean_ticks", "failed_executions", "noise_rule")
+"""Columns of a run's solution that depend on the rule of noise."""
 WAIT_S = 5.0  # wait for another program before a warning
 _ROWS_AT_ONCE = 5_000  # rows of a data frame that are Python objects at the same time
 
@@ -352,9 +362,10 @@ class Store:
                     ("environments", "TRUE"),
                     ("results", "cell IN (SELECT id FROM main.cells WHERE runs IS NOT NULL)"),
                 ):
+                    names = ", ".join(f'"{name}"' for name in self._columns(table, "other"))
                     self._db.execute(
-                        f"""INSERT OR IGNORE INTO main.{table}
-                        SELECT * FROM other.{table} WHERE {condition}"""
+                        f"""INSERT OR IGNORE INTO main.{table} ({names})
+                        SELECT {names} FROM other.{table} WHERE {condition}"""
                     )
         finally:
             self._db.execute("DETACH DATABASE other")
@@ -391,7 +402,7 @@ class Store:
                 scores["solution"] = scores["solution"]._replace(
                     corrections=row["solution_corrections"],
                     other_arm_travel=row["other_arm_travel"],
-                    noisy_ticks=row["noisy_ticks"],
+                    **_noise_of(row),
                 )
             cell = _cell_from(row["cell"], row["cell_content"])
             job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])
@@ -408,7 +419,15 @@ class Store:
         DataFrame
             Columns :data:`.COLUMNS`, with nullable types.
         """
-        return self._frame("SELECT * FROM runs")
+        there = {*self._columns("asked")}
+        missing = {"world": "'' AS world", "noisy_ticks": "NULL AS noisy_ticks"}
+        names = [name for name, *_ in COLUMNS]
+        if there >= {*names}:
+            return self._frame("SELECT * FROM runs")
+        columns = [
+            missing.get(name, f'"{name}"' if name in there else f"NULL AS {name}") for name in names
+        ]
+        return self._frame(f"SELECT {', '.join(columns)} FROM asked ORDER BY position, run")
 
     def solutions(self) -> pd.DataFrame:
         """Return view ``solutions``: a row for each movement of the plan's solutions.
@@ -458,7 +477,22 @@ class Store:
             for run_id, blob in self._db.execute(query):
                 yield run_id, _unpack(blob)
 
+    def outdated_noise(self) -> list[list[str]]:
+        """Return the ids of solved runs of the plan whose ticks in noise follow another rule.
+
+        The result has a list for each cell with such runs.
+        """
+        rule = "noise_rule" if "noise_rule" in self._columns("asked") else "NULL"
+        query = f"""SELECT position, run_id FROM asked WHERE status = 'ok'
+            AND {rule} IS NOT {NOISE_RULE} ORDER BY position, run"""
+        groups = groupby(self._rows(query), itemgetter(0))
+        return [[run_id for _, run_id in rows] for _, rows in groups]
+
     # Rows.
+
+    def _columns(self, table: str, schema: str = "main") -> list[str]:
+        """Return the names of the columns of a table or view."""
+        return [row[1] for row in self._rows(f"PRAGMA {schema}.table_info({table})")]
 
     def _insert(self, table: str, **row: Any) -> None:
         """Insert a row into a table, or update the row with the same id."""
@@ -534,6 +568,7 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
         "information": ", ".join(cell.method.information),
         "parameters": json.dumps(cell.parameters, ensure_ascii=False),
         "content": json.dumps(cell.content, ensure_ascii=False),
+        "world": cell.world,
     }
 
 
@@ -557,6 +592,12 @@ def _environment_row(content: Mapping[str, Any]) -> dict[str, Any]:
         "commit": commit and commit["id"] + "+" * commit["dirty"],
         "packages": hash_of([content.get("python"), content.get("packages")])[:8],
     }
+
+
+def _noise_of(row: sqlite3.Row) -> dict[str, Any]:
+    """Return the columns :data:`_OF_NOISE` of a row; None for those that an older file lacks."""
+    there = {*row.keys()}
+    return {name: row[name] if name in there else None for name in _OF_NOISE}
 
 
 def _from_row(kind: Any, row: sqlite3.Row) -> Any:
@@ -626,6 +667,8 @@ def writing(folder: Path) -> Iterator[Store]:
                 connection.execute("PRAGMA foreign_keys = ON")
                 if not has_tables:
                     connection.executescript(_SCHEMA)
+                else:
+                    _add_columns(connection)
             yield Store(folder, connection)
 
 
@@ -675,7 +718,7 @@ def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
         return False
     if version > FORMAT:
         raise CoarticError(f"{path} was written by a later version of coartic: update coartic")
-    if version < FORMAT:
+    if version < OLDEST:
         writer = "an earlier version of coartic"
         with suppress(sqlite3.Error, TypeError):
             query = "SELECT max(json_extract(content, '$.coartic')) FROM environments"
@@ -685,6 +728,25 @@ def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
             "the `coartic run` command with another --out"
         )
     return True
+
+
+def _add_columns(connection: sqlite3.Connection) -> None:
+    """Add the columns to an older file that its format lacks, and replace its views."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if version == FORMAT:
+        return
+    stored = {row[1] for row in connection.execute("PRAGMA table_info(results)")}
+    added = [
+        f"ALTER TABLE results ADD COLUMN {name} {kind};"
+        for name, kind, source, _ in COLUMNS
+        if source and name not in stored
+    ]
+    connection.executescript(
+        f"""BEGIN; {" ".join(added)}
+        ALTER TABLE cells ADD COLUMN world TEXT NOT NULL DEFAULT '';
+        DROP VIEW runs; DROP VIEW solutions; DROP VIEW asked; {_VIEWS}
+        PRAGMA user_version = {FORMAT}; COMMIT;"""
+    )
 
 
 @contextmanager
