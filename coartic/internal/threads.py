@@ -122,11 +122,32 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
         os.dup2(null_device, stream)
     os.setpgid(0, 0)
     signal.signal(signal.SIGTERM, lambda *_: end_group(os.getpid()))
+    _let_forks_end()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)  # see blocked_signals
     end_with_parent(folder, lambda: end_group(os.getpid()))
     # A worker that ends in another way, such as when its parent closes the pipe, also kills its
     # group.
     Finalize(None, end_group, (os.getpid(),), exitpriority=0)
+
+
+def _let_forks_end() -> None:
+    """Let SIGTERM end the processes that this process forks, such as those of a method's pool.
+
+    A signal that comes before they have begun would be lost to the inherited handler.
+    """
+
+    def mask(how: int) -> None:
+        signal.pthread_sigmask(how, {signal.SIGTERM})
+
+    def begin_fork() -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        mask(signal.SIG_UNBLOCK)
+
+    os.register_at_fork(
+        before=lambda: mask(signal.SIG_BLOCK),
+        after_in_child=begin_fork,
+        after_in_parent=lambda: mask(signal.SIG_UNBLOCK),
+    )
 
 
 def end_with_parent(
