@@ -28,7 +28,7 @@ from coartic.method import METERED
 from coartic.motion.solution import goals_without_target
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, in_words
-from coartic.runs.record import Run
+from coartic.runs.record import Row
 from coartic.tasks.task import check_task
 
 CHECK_TRIALS = 60  # trials of a run: enough to learn something, few enough to be quick
@@ -106,7 +106,7 @@ def check_method(
     return results
 
 
-_Runs = dict[str, dict[str, Run]]
+_Runs = dict[str, dict[str, Row]]
 """Runs by kind, such as ``first``, and by the name of the task."""
 
 
@@ -131,8 +131,8 @@ def _solution(info: MethodInfo, runs: _Runs) -> Iterator[str]:
     if not runs:
         yield "the method applies to none of the tasks, so nothing can be checked"
     for task, run in runs.get("first", {}).items():
-        if run.outcome.reason:
-            yield f"on {task}: {run.outcome.status}: {run.outcome.reason}"
+        if run["reason"]:
+            yield f"on {task}: {run['status']}: {run['reason']}"
 
 
 def _changes(runs: _Runs, kind: str, how: str) -> Iterator[str]:
@@ -151,14 +151,16 @@ def _determinism(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 
 def _limits(info: MethodInfo, runs: _Runs) -> Iterator[str]:
     for task, run in runs.get("budget", {}).items():
-        meter = run.outcome.meter
-        is_over = meter is not None and meter.trials > _BUDGET
-        if is_over or run.outcome.status not in ("ok", "infeasible"):
-            yield f"a budget of {_BUDGET} trials on {task}: {run.outcome.reason or meter}"
+        is_over = (run["trials"] or 0) > _BUDGET
+        if is_over or run["status"] not in ("ok", "infeasible"):
+            made = run["reason"] or f"{run['trials']} trials"
+            yield f"a budget of {_BUDGET} trials on {task}: {made}"
 
 
 def _used(runs: _Runs) -> set[str]:
-    return {name for run in runs.get("first", {}).values() for name in run.outcome.used}
+    return {
+        name for run in runs.get("first", {}).values() for name in run["used"].split(", ") if name
+    }
 
 
 def _information(info: MethodInfo, runs: _Runs) -> Iterator[str]:
@@ -169,17 +171,17 @@ def _information(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 
 def _failure(info: MethodInfo, runs: _Runs) -> Iterator[str]:
     for run in runs.get("hopeless", {}).values():
-        if run.outcome.status not in ("infeasible", "solver-failed"):
-            status = f"{run.outcome.status} {run.outcome.reason}"
+        if run["status"] not in ("infeasible", "solver-failed"):
+            status = f"{run['status']} {run['reason']}"
             yield f"a task out of reach gives {status}; it must give infeasible with a reason"
 
 
 def _rewards(info: MethodInfo, runs: _Runs) -> str:
     """Return a sentence on the rewards of the solutions, and on goals that have no target."""
     runs_by_task = runs["first"]
-    text = ", ".join(f"{task} {run.solution.reward}" for task, run in runs_by_task.items())
+    text = ", ".join(f"{task} {run['reward']}" for task, run in runs_by_task.items())
     for task, run in runs_by_task.items():
-        if goals := goals_without_target(run.solution.movements):
+        if goals := goals_without_target(run.part("solution")):
             numbers = ", ".join(map(str, goals))
             text += f"; on {task} the solution has no target for goals {numbers}: is this meant?"
     return f"executed and scored on {text}"
@@ -195,7 +197,7 @@ def _seeds(info: MethodInfo, runs: _Runs) -> str:
 def _hopeless(info: MethodInfo, runs: _Runs) -> str:
     """Return a sentence on the run on a task out of reach."""
     for run in runs.get("hopeless", {}).values():
-        return f"a task out of reach gives {run.outcome.status}: {run.outcome.reason}"
+        return f"a task out of reach gives {run['status']}: {run['reason']}"
     return "the method does not apply to a task out of reach"
 
 

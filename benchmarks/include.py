@@ -273,6 +273,6 @@ def _check_same_results(stores: Mapping[str, Store]) -> None:
             run = store.run(run_id)
             if changes := compare_runs(stores[first_name].run(run_id), run):
                 raise CoarticError(
-                    f"run {run.number} of {run.cell.method.name} on {run.cell.task.name} differs "
+                    f"run {run['run']} of {run.cell.method.name} on {run.cell.task.name} differs "
                     f"between {first_name} and {name} ({run_id}): {changes[0]}"
                 )

@@ -18,11 +18,11 @@ from coartic.internal.text import plain
 from coartic.method import Meter
 from coartic.pictures.trajectories import Trajectory, trajectory
 from coartic.runs.plan import Job
-from coartic.runs.record import PARTS, UNREPEATED, Run, too_long
+from coartic.runs.record import OF_NOISE, PREFIXES, UNREPEATED, Row, too_long
 from coartic.runs.store import open_store
 
 
-def find_run(prefix: str, folder: Path) -> Run:
+def find_run(prefix: str, folder: Path) -> Row:
     """Return the run of a results folder whose id begins with ``prefix``.
 
     Raises CoarticError if the prefix is empty, if no run or more than one run matches, or if the
@@ -46,28 +46,28 @@ def find_run(prefix: str, folder: Path) -> Run:
         return store.run(ids[0])
 
 
-def trajectory_of(run: Run) -> Trajectory:
+def trajectory_of(run: Row) -> Trajectory:
     """Execute the solution of a run, and return its movements sampled at each tick.
 
     Raises CoarticError if the run has no solution, or if its solution cannot be executed or is too
     long.
     """
-    if "solution" not in run.scores:
-        reason = f"{run.outcome.status}, {run.outcome.reason}"
-        raise CoarticError(f"run {run.id} has no solution to show: {reason}")
-    task, movements = run.cell.task, run.solution.movements
+    if "solution" not in run.movements:
+        reason = f"{run['status']}, {run['reason']}"
+        raise CoarticError(f"run {run['run_id']} has no solution to show: {reason}")
+    task, movements = run.cell.task, run.part("solution")
     exact = run.cell.model.without_noise()
     try:
         if error := too_long(task, movements, exact):
             raise error
         return trajectory(task, movements, exact)
     except (SolutionError, ValueError) as error:
-        raise CoarticError(f"run {run.id} cannot be shown: {error}") from None
+        raise CoarticError(f"run {run['run_id']} cannot be shown: {error}") from None
 
 
 def perform_in_order(
     jobs: Sequence[Job], workers: int = 1, *, verbose: bool = False
-) -> Iterator[tuple[Job, Run]]:
+) -> Iterator[tuple[Job, Row]]:
     """Perform the jobs of each method in order in one process, and yield the scored runs.
 
     Runs are yielded as they finish, each with its job, and are not stored. If a process ends, a new
@@ -85,14 +85,14 @@ def perform_in_order(
     ------
     Job
         One of ``jobs`` (the same object).
-    Run
+    Row
     """
     with closing(Local(workers, verbose=verbose).perform(jobs, in_order=True)) as answers:
         for job, outcomes in answers:
             yield from ((job, run) for run in score(job, outcomes))
 
 
-def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tuple[Run, Run]]:
+def perform_runs_again(runs: Sequence[Row], registered: Registry) -> Iterator[tuple[Row, Row]]:
     """Perform stored runs again with the methods of this installation.
 
     Parameters
@@ -104,9 +104,9 @@ def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tu
 
     Yields
     ------
-    Run
+    Row
         A stored run.
-    Run
+    Row
         The new run, which is not stored.
 
     Raises
@@ -114,16 +114,17 @@ def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tu
     CoarticError
         A method no longer accepts the parameters of a run.
     """
-    stored_runs = dict[int, Run]()
+    stored_runs = dict[int, Row]()
     jobs = list[Job]()
     for run in runs:
         method = registered[run.cell.method.name]
         try:
             method.complete(run.cell.parameters)
         except CoarticError as error:
-            version = plain(str((run.outcome.environment or {}).get("coartic")), 20)
+            version = plain(str(run.environment.get("coartic")), 20)
             raise CoarticError(
-                f"run {run.id} cannot be performed here: {error}. It was made by coartic {version}."
+                f"run {run['run_id']} cannot be performed here: {error}. It was made by coartic "
+                f"{version}."
             ) from None
         jobs.append(replace(run.job, cell=replace(run.cell, method=method)))
         stored_runs[id(jobs[-1])] = run
@@ -133,7 +134,7 @@ def perform_runs_again(runs: Sequence[Run], registered: Registry) -> Iterator[tu
             yield stored_runs[id(job)], new_run
 
 
-def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
+def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
     """Select runs of a folder that can be performed here, evenly spaced over its plan.
 
     A run can be performed if its method has the same version or code in ``registered``.
@@ -149,7 +150,7 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Run]:
 
     Returns
     -------
-    list of Run
+    list of Row
 
     Raises
     ------
@@ -199,18 +200,16 @@ def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int,
                 stored = store.run(run_id)
                 (again,) = with_noise([stored])
                 executed += 1
-                if stored.solution.noise_rule != again.solution.noise_rule:
-                    continue  # `coartic run` makes them again
-                wrong += [
-                    f"Run {run_id}: {name} is {now}, not {was}."
-                    for name in ("noisy_ticks", "mean_ticks", "failed_executions")
-                    if (was := getattr(stored.solution, name))
-                    != (now := getattr(again.solution, name))
-                ]
+                if stored["noise_rule"] == again["noise_rule"]:  # else `coartic run` makes them
+                    wrong += [
+                        f"Run {run_id}: {name} is {again[name]}, not {stored[name]}."
+                        for name in OF_NOISE
+                        if stored[name] != again[name]
+                    ]
     return executed, wrong
 
 
-def compare_runs(a: Run, b: Run) -> list[str]:
+def compare_runs(a: Row, b: Row) -> list[str]:
     """Compare the results of two runs.
 
     The function compares status, reason, details, counts, movements and rewards. If both runs have
@@ -224,29 +223,26 @@ def compare_runs(a: Run, b: Run) -> list[str]:
     """
     if a.is_downsampled or b.is_downsampled:
         a, b = a.downsample(), b.downsample()
-    row_a, row_b = (
-        run.to_row()
-        | {"details": {k: v for k, v in run.outcome.details.items() if k != UNREPEATED}}
-        for run in (a, b)
-    )
-    names = ["status", "reason", "details", *Meter.COUNTS]
-    if a.id == b.id and a.solution.noise_rule == b.solution.noise_rule:
-        names += ["noisy_ticks", "mean_ticks", "failed_executions"]  # the id is their seed
+    details = ({k: v for k, v in run.details.items() if k != UNREPEATED} for run in (a, b))
+    pairs = [("details", *details)]
+    names = ["status", "reason", *Meter.COUNTS]
+    if a["run_id"] == b["run_id"] and a["noise_rule"] == b["noise_rule"]:
+        names += OF_NOISE  # the id is the seed of the noise
+    pairs += [(name, a[name], b[name]) for name in names]
     changes = [
-        f"{name}: {brief_value(row_a[name])} against {brief_value(row_b[name])}"
-        for name in names
-        if row_a[name] != row_b[name]
+        f"{name}: {brief_value(x)} against {brief_value(y)}" for name, x, y in pairs if x != y
     ]
-    for part in PARTS:
-        if a.movement_data(part) != b.movement_data(part):
-            scores = [run.scores.get(part) for run in (a, b)]
+    for part, prefix in PREFIXES.items():
+        if a.movements.get(part, []) != b.movements.get(part, []):
             words = [
-                f"{score.reward} with {score.hands}" if score else "nothing" for score in scores
+                f"{run[f'{prefix}reward']} with {run[f'{prefix}hands']}"
+                if part in run.movements
+                else "nothing"
+                for run in (a, b)
             ]
             changes.append(f"{part}: {' against '.join(words)}")
-    rewards = a.outcome.rewards, b.outcome.rewards
-    if rewards[0] != rewards[1]:
-        pairs = enumerate(zip_longest(*rewards, fillvalue="no trial"))
-        trial, (x, y) = next((trial, pair) for trial, pair in pairs if pair[0] != pair[1])
+    if a.rewards != b.rewards:
+        trials = enumerate(zip_longest(a.rewards, b.rewards, fillvalue="no trial"))
+        trial, (x, y) = next((trial, pair) for trial, pair in trials if pair[0] != pair[1])
         changes.append(f"rewards by trial differ, first at trial {trial}: {x} against {y}")
     return changes

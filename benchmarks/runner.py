@@ -31,7 +31,7 @@ from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, error_line
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
-from coartic.runs.record import UNREPEATED, Run
+from coartic.runs.record import UNREPEATED, Row
 from coartic.runs.store import Store, writing
 
 _LEAST_BATCH = 8
@@ -79,10 +79,10 @@ class Progress:
         self.failed += status != "ok"
         self.crashed += status == "crashed"
 
-    def finish(self, run: Run) -> None:
+    def finish(self, run: Row) -> None:
         """Count a run that has just been performed."""
         self.done += 1
-        self.count(run.outcome.status)
+        self.count(run["status"])
         self.time_left.finish(run)
 
     @property
@@ -247,15 +247,15 @@ def perform(
         progress.time_left = TimeLeft(executor.workers)
         progress.time_left.expect([*missing, *repeats])
         tell(None)
-        jobs, quickest = _divided(missing, executor.workers), dict[str, Run]()
+        jobs, quickest = _divided(missing, executor.workers), dict[str, Row]()
         while jobs:
             retried: list[Job] = []
             with closing(executor.perform(jobs)) as answers:  # an error below ends the workers
                 for job, outcomes in answers:
                     runs = score(job, outcomes)
                     if len(runs) > 1:  # other runs of the job may have caused a failure
-                        retried += [run.job for run in runs if run.outcome.status not in _SURE]
-                        runs = [run for run in runs if run.outcome.status in _SURE]
+                        retried += [run.job for run in runs if run["status"] not in _SURE]
+                        runs = [run for run in runs if run["status"] in _SURE]
                     store.write(runs)
                     for run in runs:
                         _note_quickest(run, quickest)
@@ -271,23 +271,23 @@ def perform(
         return progress
 
 
-def _note_quickest(run: Run, quickest: dict[str, Run]) -> None:
+def _note_quickest(run: Row, quickest: dict[str, Row]) -> None:
     """Set ``quickest[method]`` to ``run`` if the run is quicker than the one stored there.
 
     Runs that were the first of their method in a process count as slower than all others. Runs that
     are not ok, and runs of built-in methods, are ignored.
     """
 
-    def seconds(run: Run) -> tuple[bool, float]:
-        return not run.outcome.times.warm, run.outcome.times.wall_s or math.inf
+    def seconds(run: Row) -> tuple[bool, float]:
+        return not run["warm"], run["wall_s"] or math.inf
 
-    if run.outcome.status == "ok" and not run.cell.method.is_ours:
+    if run["status"] == "ok" and not run.cell.method.is_ours:
         name = run.cell.method.name
         quickest[name] = min(quickest.get(name, run), run, key=seconds)
 
 
 def _repeat_runs(
-    quickest: dict[str, Run],
+    quickest: dict[str, Row],
     store: Store,
     progress: Progress,
     workers: int,
@@ -305,8 +305,7 @@ def _repeat_runs(
     for _, repeated in perform_in_order([run.job for run in quickest.values()], workers):
         run = quickest[repeated.cell.method.name]
         if changes := compare_runs(run, repeated)[:1]:
-            details = run.outcome.details | {UNREPEATED: changes[0]}
-            store.write([replace(run, outcome=replace(run.outcome, details=details))])
+            store.write([replace(run, details=run.details | {UNREPEATED: changes[0]})])
         progress.time_left.finish(repeated)
         progress.repeats -= 1
         tell(repeated.cell)

@@ -12,29 +12,28 @@ import numpy as np
 from coartic.benchmarks.provenance import current_environment, now
 from coartic.internal.text import LONGEST_REASON, plain
 from coartic.model import PAPER, same_world
-from coartic.motion.execution import Execution, execute_noisy, other_arm_travel
+from coartic.motion.execution import Execution, execute_noisy
 from coartic.motion.initial_hands import best_hands
 from coartic.motion.solution import Movement, next_action
-from coartic.runs.plan import Cell, Job
+from coartic.runs.plan import Job
 from coartic.runs.record import (
     MOTOR_NOISE,
     NOISE_RULE,
     NOISY_EXECUTIONS,
     Outcome,
-    Run,
-    Score,
+    Row,
     execute_all,
+    row_of,
 )
-from coartic.tasks.task import Task, hands_of
 
 
-def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
-    """Execute the movements of a job's outcomes, and return its scored runs.
+def score(job: Job, outcomes: Sequence[Outcome]) -> list[Row]:
+    """Execute the movements of a job's outcomes, and return the rows of its runs.
 
     Parts of an outcome (``solution``, ``initial``, ``replay``) that are too long or break the rules
-    of the task are not executed. Only runs with status ok have scores. In a world with noise only
-    the solution counts, which is what the method recommends: it is stored without ticks, and
-    corrections are left to the corrective process.
+    of the task are not executed. Only runs with status ok have movements and a reward. In a world
+    with noise only the solution counts, which is what the method recommends: it is stored without
+    ticks, and corrections are left to the corrective process.
 
     Parameters
     ----------
@@ -44,7 +43,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
 
     Returns
     -------
-    list of Run
+    list of Row
     """
     cell, method = job.cell, job.cell.method
     is_noisy = cell.model.motor_noise > 0.0
@@ -61,18 +60,13 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Run]:
             outcome,
             status=status,  # type: ignore[arg-type]
             reason="" if is_ok else plain(reason, LONGEST_REASON) or "it gave no reason",
-            parts={},
+            parts=asked,
             environment=current_environment() | imports | (outcome.environment or {}),
         )
-        scores = {
-            part: _score_of(cell.task, part, execution)
-            for part, execution in parts.items()
-            if is_ok
+        done = {
+            part: execution for part, execution in parts.items() if isinstance(execution, Execution)
         }
-        if is_noisy and is_ok:
-            answer = tuple(asked["solution"])
-            scores["solution"] = scores["solution"]._replace(reward=None, movements=answer)
-        runs.append(Run(replace(job, numbers=(number,)), final, scores, now()))
+        runs.append(row_of(replace(job, numbers=(number,)), final, done if is_ok else {}, now()))
     return with_noise(runs)
 
 
@@ -82,8 +76,8 @@ def _answer_of(outcome: Outcome) -> dict[str, list[Movement]]:
     return {} if solution is None else {"solution": [*next_action(solution)]}
 
 
-def with_noise(runs: Sequence[Run]) -> list[Run]:
-    """Execute the solutions of runs with motor noise, and return the runs with these scores.
+def with_noise(runs: Sequence[Row]) -> list[Row]:
+    """Execute the solutions of runs with motor noise, and return the runs with their ticks.
 
     All runs must be of one cell. The ticks of a run do not depend on the other runs.
 
@@ -95,62 +89,43 @@ def with_noise(runs: Sequence[Run]) -> list[Run]:
       which is the same for all methods.
     - In another world without noise nothing is executed.
     """
-    solved = [run for run in runs if "solution" in run.scores]
+    solved = [run for run in runs if "solution" in run.movements]
     if not solved:
         return [*runs]
-    cell = solved[0].cell
-    scores: list[dict[str, Any]]
+    cell, solutions = solved[0].cell, [run.part("solution") for run in solved]
     if cell.model.motor_noise > 0.0:
-        scores = _judge(cell, solved)
+        ticks = _judge(solved, solutions)
     elif same_world(cell.model, PAPER, cell.task.radius):
-        seeds = [int(run.id.partition("-")[0], 16) for run in solved]
-        solutions = [run.solution.movements for run in solved]
-        ticks = execute_noisy(cell.task, solutions, MOTOR_NOISE, NOISY_EXECUTIONS, seeds)
-        means = ticks.mean(axis=1).tolist()
-        scores = [{"noisy_ticks": None if math.isnan(mean) else mean} for mean in means]
+        seeds = [int(run["run_id"].partition("-")[0], 16) for run in solved]
+        made = execute_noisy(cell.task, solutions, MOTOR_NOISE, NOISY_EXECUTIONS, seeds)
+        ticks = [{"noisy_ticks": _number(mean)} for mean in made.mean(axis=1).tolist()]
     else:
         return [*runs]
     scored = {
-        run.id: run.solution._replace(**values, noise_rule=NOISE_RULE)
-        for run, values in zip(solved, scores, strict=True)
+        run["run_id"]: run.with_values(**values, noise_rule=NOISE_RULE)
+        for run, values in zip(solved, ticks, strict=True)
     }
-    return [
-        replace(run, scores=run.scores | {"solution": scored[run.id]}) if run.id in scored else run
-        for run in runs
-    ]
+    return [scored.get(run["run_id"], run) for run in runs]
 
 
-def _judge(cell: Cell, runs: Sequence[Run]) -> list[dict[str, Any]]:
+def _judge(runs: Sequence[Row], answers: Sequence[Sequence[Movement]]) -> list[dict[str, Any]]:
     """Return ``mean_ticks`` and ``failed_executions`` of the answers of runs in a noisy world."""
-    exact = cell.model.without_noise()
-    ticks = execute_noisy(
-        cell.task,
-        [run.solution.movements for run in runs],
-        cell.model.motor_noise,
-        NOISY_EXECUTIONS,
-        [run.job.judge_seed(run.number) for run in runs],
-        exact,
-    )
+    cell, exact = runs[0].cell, runs[0].cell.model.without_noise()
+    seeds = [run.job.judge_seed(run["run"]) for run in runs]
+    noise = cell.model.motor_noise
+    ticks = execute_noisy(cell.task, answers, noise, NOISY_EXECUTIONS, seeds, exact)
     best = best_hands(cell.task, exact)
     capped = np.where(np.isnan(ticks), np.nan if best is None else 2.0 * best[1], ticks)
     means, failed = capped.mean(axis=1).tolist(), np.isnan(ticks).sum(axis=1).tolist()
     return [
-        {"mean_ticks": None if math.isnan(mean) else mean, "failed_executions": count}
+        {"mean_ticks": _number(mean), "failed_executions": count}
         for mean, count in zip(means, failed, strict=True)
     ]
 
 
-def _score_of(task: Task, part: str, execution: Execution | Exception) -> Score:
-    """Return the score of a part of a run that completed the task.
-
-    Only the score of a solution has corrections and the travel of the idle arm.
-    """
-    assert isinstance(execution, Execution)
-    result = Score(execution.reward, execution.hands, execution.movements)
-    if part != "solution":
-        return result
-    travel = other_arm_travel(task, hands_of(execution.hands), execution.configurations)
-    return result._replace(corrections=execution.corrections, other_arm_travel=travel)
+def _number(value: float) -> float | None:
+    """Return a number, or None for NaN."""
+    return None if math.isnan(value) else value
 
 
 def _final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:

@@ -11,7 +11,7 @@ from functools import cache
 
 from coartic.method import TRIALS
 from coartic.runs.plan import Cell, Job, trials_in
-from coartic.runs.record import Run
+from coartic.runs.record import Row
 from coartic.runs.shipped import open_shipped
 
 _Kind = tuple[str, str, int]
@@ -53,17 +53,17 @@ class TimeLeft:
             for job in jobs:
                 self._waiting[_kind_of(job.cell)] += len(job.numbers)
 
-    def finish(self, run: Run) -> None:
+    def finish(self, run: Row) -> None:
         """Count an expected run that was made."""
-        kind, times = _kind_of(run.cell), run.outcome.times
+        kind, wall_s = _kind_of(run.cell), run["wall_s"]
         with self._lock:
             self._last = time.monotonic()
             self._waiting[kind] -= 1
-            if times.wall_s is not None:
-                self._done_s += times.wall_s
-                weight = 0.5 ** (times.wall_s / max(_RECENT * self._done_s, 1e-9))
+            if wall_s is not None:
+                self._done_s += wall_s
+                weight = 0.5 ** (wall_s / max(_RECENT * self._done_s, 1e-9))
                 group = _group_of(kind[0])
-                self._took_s[group] = weight * self._took_s[group] + times.wall_s
+                self._took_s[group] = weight * self._took_s[group] + wall_s
                 self._usual_s[group] = weight * self._usual_s[group] + _shipped_s(kind)
 
     @property

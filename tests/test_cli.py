@@ -224,7 +224,7 @@ def test_workers_round_alike_and_import_nothing_from_the_working_folder(tmp_path
     with open_store(out) as store:
         (run,) = map(store.run, store.ids())
     first, second = np.random.default_rng(0).random((2, 100, 100))
-    assert run.outcome.details == {"solved": np.linalg.solve(first, second[0]).tolist()}
+    assert run.details == {"solved": np.linalg.solve(first, second[0]).tolist()}
 
 
 @pytest.mark.process

@@ -124,10 +124,11 @@ def test_two_results_of_one_run(parts, tmp_path):
         store.write([store.run(run_id).downsample() for run_id in store.ids()])
     assert joined([parts[0], downsampled], tmp_path / "same", LEFT).present == 3
     with open_store(parts[0]) as store:
-        first, second = (run for run in map(store.run, store.ids()) if run.outcome.rewards)
+        first, second = (run for run in map(store.run, store.ids()) if run.rewards)
     with writing(other) as store:
-        store.write([replace(second, job=first.job)])
-    words = f"run {first.number} of {EC1} on ascending differs between .*left and .*other "
+        named = {name: first[name] for name in ("run_id", "run", "seed")}
+        store.write([replace(second, job=first.job).with_values(**named)])
+    words = f"run {first['run']} of {EC1} on ascending differs between .*left and .*other "
     with pytest.raises(CoarticError, match=words):
         joined([parts[0], other], tmp_path / "whole", LEFT)
     with pytest.raises(CoarticError, match="differs between .*same and .*other"):
@@ -180,7 +181,7 @@ def test_shipped_results(monkeypatch, tmp_path):
         now = {job.cell.digest for job in plan_suite("comparison")}
         assert {job.cell.digest for job in plan} == now
         assert len(store.ids()) == size_of(plan)
-        learned = (run for run in map(store.run, store.ids()) if run.outcome.rewards)
+        learned = (run for run in map(store.run, store.ids()) if run.rewards)
         assert next(learned).is_downsampled
     with pytest.raises(CoarticError, match="of suite 'quick' are shipped; those of comparison, "):
         shipped.open_shipped("quick")

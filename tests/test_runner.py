@@ -222,19 +222,18 @@ def test_the_runs_of_a_batch_are_scored():
                "early_corrections", "late_corrections", "solution_corrections", "other_arm_travel",
                "replay_reward", "together", "wall_s", "cpu_s"]  # fmt: skip
     nothing = [None] * 8
-    assert [[run.to_row()[name] for name in columns] for run in runs] == [
+    assert [[run[name] for name in columns] for run in runs] == [
         [0, "ok", -319, "RRR", 2, 20, 11, 3, 0.0, None, 4, 2.0, 1.0],
         [1, "ok", -319, "RRR", None, None, None, 3, 0.0, None, 4, 2.0, 1.0],
         [2, "solver-failed", *nothing, 4, 2.0, 1.0],
         [3, "solver-failed", *nothing, 1, None, None],
         [0, "timeout", *nothing, 4, 2.0, None],
     ]
-    reasons = [run.outcome.reason for run in runs]
+    reasons = [run["reason"] for run in runs]
     assert "movements for goals [1]; it must" in reasons.pop(3)
     assert reasons == ["", "", "it reported ok, but returned no solution", "too slow"]
-    better = replace(runs[0].outcome, rewards=[None, -310, -319, -319])  # than the solution
-    downsampled = replace(runs[0], outcome=better).downsample()
-    assert downsampled.outcome.rewards == [None, -310, -319, None]
+    better = replace(runs[0], rewards=[None, -310, -319, -319])  # than the solution
+    assert better.downsample().rewards == [None, -310, -319, None]
 
 
 def test_ticks_with_noise_are_of_a_runs_own_seed_and_missing_if_an_execution_fails(
@@ -250,13 +249,13 @@ def test_ticks_with_noise_are_of_a_runs_own_seed_and_missing_if_an_execution_fai
     with open_store(results.folder) as store:
         runs = [store.run(run_id) for run_id in solutions.run_ids]
     monkeypatch.setattr(scoring, "execute_noisy", lambda *_: np.array([[1, np.nan], [2, 4]]))
-    assert [run.solution.noisy_ticks for run in scoring.with_noise(runs)] == [None, 3.0]
+    assert [run["noisy_ticks"] for run in scoring.with_noise(runs)] == [None, 3.0]
 
 
 def test_a_solution_that_misses_a_goal_is_infeasible():
     job = Job(cell_on(STUCK, KNOWN["corrective-alone/given"]), 0, (0,), 60.0)
     (run,) = score(job, [Outcome("ok", parts={"solution": [Movement(1, "right", "corrective")]})])
-    assert (run.outcome.status, run.scores) == ("infeasible", {})
+    assert (run["status"], run.movements) == ("infeasible", {})
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -264,7 +263,7 @@ def test_some_runs_of_every_cell_are_performed_again(results):
     stored = reproduce.some_runs(results.folder, len(results.cells), KNOWN)
     again = [*reproduce.perform_runs_again(stored, KNOWN)]
     assert not any(reproduce.compare_runs(*pair) for pair in again)
-    cells = results.runs[results.runs.run_id.isin(run.id for run, _ in again)].groupby(
+    cells = results.runs[results.runs.run_id.isin(run["run_id"] for run, _ in again)].groupby(
         ["task", "method", "setting"]
     )
     assert len(cells) == len(again) == len(results.cells)

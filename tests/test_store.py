@@ -22,7 +22,7 @@ from coartic.benchmarks.runner import perform
 from coartic.benchmarks.scoring import score
 from coartic.benchmarks.worker import fail, perform_job
 from coartic.runs import store as store_module
-from coartic.runs.record import Score
+from coartic.runs.record import movement_data
 from coartic.runs.store import FORMAT, RUNS_FILE, open_store, writing
 from tests.support.processes import started
 from tests.support.strategies import failing_task, tiny_task
@@ -65,7 +65,7 @@ def written(tmp_path_factory):
     with writing(folder) as store:
         store.replace_plan(plan, made_with())
         store.write(runs)
-    return {run.id: run for run in runs}, load(folder)
+    return {run["run_id"]: run for run in runs}, load(folder)
 
 
 @pytest.fixture(scope="module")
@@ -104,23 +104,15 @@ def copied(undisturbed, tmp_path):
 
 
 def plain(run):
-    """All of a run, numbers by their bytes."""
-    parts = {
-        (part, score.reward, score.hands): [
-            (m.goal, m.hand, m.kind, m.ticks, m.target.tobytes(),
-             None if m.waypoints is None else m.waypoints.tobytes())
-            for m in score.movements
-        ]
-        for part, score in run.scores.items()
-    }  # fmt: skip
-    return replace(run, scores=parts, job=replace(run.job, suite=""))
+    """All of a run, without the name of the suite."""
+    return replace(run, job=replace(run.job, suite=""))
 
 
 def test_what_is_written_is_read_back(written):
     handed, study = written
     learner, _, planner = study.runs.run_id
-    assert {None} < set(handed[learner].outcome.rewards)
-    assert handed[planner].scores["solution"].movements[0].waypoints is not None
+    assert {None} < {*handed[learner].rewards}
+    assert handed[planner].part("solution")[0].waypoints is not None
     with open_store(study.folder) as store:
         for run_id, run in handed.items():
             assert plain(store.run(run_id)) == plain(run)
@@ -128,7 +120,7 @@ def test_what_is_written_is_read_back(written):
             replace(job, time_limit_s=300.0) for job in planned(CELLS, trials=40)
         ]
     for run_id, rewards in study.rewards():
-        kept = [np.nan if reward is None else reward for reward in handed[run_id].outcome.rewards]
+        kept = [np.nan if reward is None else reward for reward in handed[run_id].rewards]
         np.testing.assert_array_equal(rewards, kept)
     with closing(sqlite3.connect(study.folder / RUNS_FILE)) as plain_sql:
         for run_id, run in handed.items():
@@ -136,8 +128,8 @@ def test_what_is_written_is_read_back(written):
             def values(query, run_id=run_id):
                 return [value for (value,) in plain_sql.execute(f"SELECT {query}", (run_id,))]
 
-            assert values("reward FROM runs WHERE run_id = ?") == [run.solution.reward]
-            solution = run.scores["solution"].movements if run.scores else ()
+            assert values("reward FROM runs WHERE run_id = ?") == [run["reward"]]
+            solution = run.part("solution")
             paths = values('path FROM solutions WHERE run_id = ? ORDER BY "order"')
             points = [m.target if m.waypoints is None else m.waypoints for m in solution]
             assert [*map(json.loads, paths)] == [each.tolist() for each in points]
@@ -145,11 +137,11 @@ def test_what_is_written_is_read_back(written):
 
 def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
     edges = np.array([5e-324, 1e308, np.nextafter(1, 2), 1 / 3, *np.zeros(6)])
-    movements = (Movement(1, "left", "path", edges, 3, np.array([edges / 7, edges])),)
-    solution = Score(-3, "L", movements)
+    path = movement_data(Movement(1, "left", "path", edges, 3, np.array([edges / 7, edges])))
     first = next(iter(written[0].values()))
-    outcome = replace(first.outcome, environment={"commit": {"id": "c0de", "dirty": True}})
-    run = replace(first, scores={"solution": solution, "replay": solution}, outcome=outcome)
+    environment = {"commit": {"id": "c0de", "dirty": True}}
+    run = replace(first, movements={"solution": [path], "replay": [path]}, environment=environment)
+    run = run.with_values(reward=-3, hands="L", replay_reward=-3, replay_hands="L")
 
     def some():
         yield run
@@ -164,7 +156,7 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
             store.write([run])
             assert len(store.ids()) == 1
     with open_store(tmp_path) as store:
-        assert plain(store.run(run.id)) == plain(run)
+        assert plain(store.run(run["run_id"])) == plain(run)
         assert store.runs().commit.tolist() == ["c0de+"]
 
 

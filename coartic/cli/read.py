@@ -24,7 +24,7 @@ from coartic.internal.text import counted, one_line
 
 if TYPE_CHECKING:
     from coartic.analysis.study import Study
-    from coartic.runs.record import Run
+    from coartic.runs.record import Row
 
 
 def report(
@@ -233,13 +233,13 @@ def _perform_again(
             differences = compare_runs(stored, new)
             differing += bool(differences)
             for difference in differences:
-                say(f"Run {stored.id}, performed again: {difference}")
+                say(f"Run {stored['run_id']}, performed again: {difference}")
             display.show(f"Performed {number} of {counted(len(runs), 'run')} again")
     say(f"{counted(len(runs), 'run')} performed again: {differing or 'none'} with another result.")
     return differing
 
 
-def _describe_run(run: Run, code: str) -> None:
+def _describe_run(run: Row, code: str) -> None:
     """Print id, seed, parameters and result of a run.
 
     ``code`` is the version of the run's method as installed now, or the hash of a method from a
@@ -249,13 +249,16 @@ def _describe_run(run: Run, code: str) -> None:
     from coartic.analysis.words import number
     from coartic.runs.plan import in_words
 
-    cell, result = run.cell, f"{run.outcome.status}: {run.outcome.reason}"
-    if run.solution.reward is not None:
-        result = f"reward {number(run.solution.reward)}, hands {run.solution.hands}"
+    cell, result = run.cell, f"{run['status']}: {run['reason']}"
+    if run["reward"] is not None:
+        result = f"reward {number(run['reward'])}, hands {run['hands']}"
     say_pairs(
         [
-            ("Run", f"{run.id}: {cell.task.label}, {title_of(cell.method)}, run {run.number}"),
-            ("Seed", str(run.seed)),
+            (
+                "Run",
+                f"{run['run_id']}: {cell.task.label}, {title_of(cell.method)}, run {run['run']}",
+            ),
+            ("Seed", str(run["seed"])),
             ("Parameters", in_words(cell.parameters)),
             ("Result", result),
         ]
@@ -409,7 +412,7 @@ def _film(
     for run_id in run_ids:
         stored = find_run(run_id, folder)
         movement = trajectory_of(stored)
-        title = f"{movement.task.label}\n{title_of(stored.cell.method)}, run {stored.number}"
+        title = f"{movement.task.label}\n{title_of(stored.cell.method)}, run {stored['run']}"
         movements.append((title, movement))
     if initial:
         task = movements[0][1].task

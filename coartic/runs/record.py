@@ -1,16 +1,15 @@
-"""The record of a run: its job, outcome and scores, and the columns in which it is stored."""
+"""The record of a run: what a worker returns, and the row in which it is stored."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from operator import attrgetter
 from types import SimpleNamespace
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, InstanceOf
@@ -20,11 +19,11 @@ from coartic.internal.limits import real_array
 from coartic.method import CORRECTIONS_BY_TENTH, MOST_COUNT, Meter
 from coartic.model import PAPER, MotionModel
 from coartic.motion.doors import segment_lengths
-from coartic.motion.execution import Execution, execute_many
+from coartic.motion.execution import Execution, execute_many, other_arm_travel
 from coartic.motion.solution import Movement
 from coartic.motion.trials import compiled_task
 from coartic.runs.plan import Cell, Job
-from coartic.tasks.task import Task
+from coartic.tasks.task import Task, hands_of
 
 Status = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
 """Status of a run."""
@@ -41,6 +40,8 @@ NOISE_RULE = 2
 """Version of the rule of motor noise. Ticks of another version are shown as missing until they are
 made again, so that two rules never stand in one column. Raise it with a change of
 :mod:`coartic.motion.kernels.noise` or of the judge's seeds."""
+OF_NOISE = ("noisy_ticks", "mean_ticks", "failed_executions")
+"""Columns of ticks with noise, which depend on the rule of noise."""
 UNREPEATED = "made_again"
 """Key in the details of a run. Its value is the difference that was found when the run was made
 again."""
@@ -51,33 +52,6 @@ _MOST_NUMBERS = 400_000
 MOST_STEPS = 1_000_000
 """Largest number of movement steps on the straight path from the start through all targets and
 waypoints."""
-
-
-class Score(NamedTuple):
-    """Score of a part of a run (solution, initial or replay); None for missing values."""
-
-    reward: int | None = None
-    """Total reward: minus the number of ticks."""
-    hands: str | None = None
-    """Hand of each goal, such as ``LRLR``."""
-    movements: tuple[Movement, ...] = ()
-    """Executed movements, with their ticks."""
-    corrections: int | None = None
-    """Number of corrective movements; only for a solution."""
-    other_arm_travel: float | None = None
-    """Joint travel of arms during movements of the other hand (in rad); only for a solution."""
-    noisy_ticks: float | None = None
-    """Mean ticks of a solution, found in the paper's world, over :data:`NOISY_EXECUTIONS`
-    executions with motor noise of standard deviation :data:`MOTOR_NOISE`; None if one of them
-    fails."""
-    mean_ticks: float | None = None
-    """Mean ticks of the answer of a run in a world with noise, over :data:`NOISY_EXECUTIONS` fresh
-    executions in this world. A failed execution counts as twice the ticks of the corrective process
-    with its best hands in this world without noise."""
-    failed_executions: int | None = None
-    """How many of these executions failed."""
-    noise_rule: int | None = None
-    """Version of the rule of noise by which these ticks were made (:data:`NOISE_RULE`)."""
 
 
 @dataclass(frozen=True)
@@ -121,158 +95,153 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Run:
-    """A run: its job, its outcome and the scores of its parts."""
+class Row:
+    """A run as it is stored, and shown in view ``runs``."""
 
     job: Job
     """A job with only this run."""
-    outcome: Outcome
-    """The outcome. Its ``parts`` are empty, because the scores have the movements."""
-    scores: dict[str, Score]
-    """Scores by part (``solution``, ``initial``, ``replay``); empty if the run is not ok."""
-    date: str
-    """Date and time at which the run was scored, UTC."""
+    values: dict[str, Any]
+    """Values of the columns of table ``results``, by name (:data:`COLUMNS`): ``row["reward"]``."""
+    movements: dict[str, list[list[Any]]]
+    """Movements by part (``solution``, ``initial``, ``replay``), as lists (:func:`movement_data`);
+    empty if the run is not ok. They are those that were executed. In a world with noise the
+    solution is what the method recommends, without ticks."""
+    rewards: list[int | None]
+    """Reward of each trial; None if the trial failed or its reward is not stored."""
+    details: dict[str, Any]
+    """Further data from the method or the process, by name."""
+    environment: dict[str, Any]
+    """Versions, platform, processor, variables, arithmetic and commit, by name."""
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of a column."""
+        return self.values[name]
 
     @property
     def cell(self) -> Cell:
-        """Task, method and parameters of the run."""
+        """Task, method, parameters and world of the run."""
         return self.job.cell
-
-    @property
-    def number(self) -> int:
-        """Number of the run, from 0 in its cell."""
-        return self.job.numbers[0]
-
-    @cached_property
-    def id(self) -> str:
-        """Id of the run: 16 hex digits, a hyphen, and the version or code of the method."""
-        return self.job.run_id(self.number)
-
-    @property
-    def seed(self) -> int:
-        """Seed of the random numbers."""
-        return self.job.run_seed(self.number)
-
-    @property
-    def solution(self) -> Score:
-        """Score of the solution; its values are None if the run is not ok."""
-        return self.scores.get("solution", Score())
-
-    @property
-    def initial(self) -> Score:
-        """Score of a learner's first trial.
-
-        Its values are None for other methods, or if the trial or the run failed.
-        """
-        return self.scores.get("initial", Score())
-
-    @property
-    def replay(self) -> Score:
-        """Score of a learner's greedy trial after learning.
-
-        Its values are None for other methods, or if the trial or the run failed.
-        """
-        return self.scores.get("replay", Score())
-
-    @property
-    def counts(self) -> Any:
-        """Counts of the run, as attributes of :class:`~coartic.method.Meter`.
-
-        All counts are None if the worker gave no answer.
-        """
-        return self.outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter())))
-
-    @property
-    def best_trial(self) -> int | None:
-        """Number of the first trial with the reward of the solution, from 0; None if there is
-        none."""
-        reward, rewards = self.solution.reward, self.outcome.rewards
-        return None if reward is None or reward not in rewards else rewards.index(reward)
-
-    @property
-    def practice(self) -> str | None:
-        """Mean ticks of the completed trials in each tenth of a run in noise, as JSON.
-
-        The list has ten entries, null for a tenth without a completed trial. None for a run without
-        noise, and for a run without trials.
-        """
-        if self.cell.model.motor_noise == 0.0 or not self.outcome.rewards:
-            return None
-        tenths = np.array_split(np.array(self.outcome.rewards, np.float64), 10)
-        means = [-float(np.nanmean(part)) if np.isfinite(part).any() else None for part in tenths]
-        return json.dumps(means)
-
-    @property
-    def early_corrections(self) -> int | None:
-        """Number of corrective movements in the first tenth of a learner's trials, without trial 0.
-
-        The value is None if the corrections were not counted.
-        """
-        return self._corrections(1)
-
-    @property
-    def late_corrections(self) -> int | None:
-        """Corrective movements in the last tenth of a learner's trials after trial 0.
-
-        The value is None if the corrections were not counted.
-        """
-        return self._corrections(-1)
-
-    def _corrections(self, tenth: int) -> int | None:
-        """Return the corrective movements in a tenth of a learner's trials, from 1 (-1: the
-        last)."""
-        counts = self.outcome.details.get(CORRECTIONS_BY_TENTH)
-        if not isinstance(counts, list) or len(counts) != 11:
-            return None
-        are_counts = all(type(count) is int and 0 <= count <= MOST_COUNT for count in counts)
-        return counts[tenth] if are_counts else None
 
     @property
     def is_downsampled(self) -> bool:
         """True if rewards of some successful trials are not stored."""
-        meter = self.outcome.meter
-        return meter is not None and self.outcome.rewards.count(None) > meter.failed_trials
+        failed = self["failed_trials"]
+        return failed is not None and self.rewards.count(None) > failed
 
-    def downsample(self) -> Run:
-        """Return a copy of the run with fewer rewards.
+    def part(self, name: str) -> list[Movement]:
+        """Return the movements of a part; empty if the run does not have it."""
+        return [*map(movement_from, self.movements.get(name, []))]
+
+    def with_values(self, **values: Any) -> Row:
+        """Return a copy of the row with other values of columns."""
+        return replace(self, values=self.values | values)
+
+    def downsample(self) -> Row:
+        """Return a copy of the row with fewer rewards.
 
         The copy has the rewards of the best trial and of each trial that was better than all
         earlier ones. Other rewards are None.
         """
-        best, solved, rewards = -math.inf, self.best_trial, list[int | None]()
-        for trial, reward in enumerate(self.outcome.rewards):
+        best, solved, rewards = -math.inf, self["best_trial"], list[int | None]()
+        for trial, reward in enumerate(self.rewards):
             better = reward is not None and reward > best
             rewards.append(reward if better or trial == solved else None)
             best = max(best, -math.inf if reward is None else reward)
-        return replace(self, outcome=replace(self.outcome, rewards=rewards))
+        status, movements = self["status"], self.movements
+        fewer = replace(self, rewards=rewards)
+        return fewer.with_values(result=_result_of(status, movements, rewards))
 
-    @cached_property
-    def result(self) -> str:
-        """Hash of status, movements and stored rewards: 16 hex digits.
 
-        The hash includes the ticks and configurations of the movements. It does not include times
-        and counts.
-        """
-        movements = [[part, *data] for part in PARTS for data in self.movement_data(part)]
-        content = json.dumps([self.outcome.status, *movements]).encode()
-        return hashlib.sha256(content + reward_bytes(self.outcome.rewards)).hexdigest()[:16]
+_NOTHING = SimpleNamespace(reward=None, hands=None, corrections=None, other_arm_travel=None)
 
-    def movement_data(self, part: str) -> list[list[Any]]:
-        """Return the movements of a part as lists for JSON (:func:`movement_data`).
 
-        The list is empty if the run does not have the part.
-        """
-        return [movement_data(movement) for movement in self.scores.get(part, Score()).movements]
+def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date: str = "") -> Row:
+    """Return the row of a run from its outcome and the executions of its parts.
 
-    def to_row(self) -> dict[str, Any]:
-        """Return the columns of the run in table ``results``, by name.
+    Ticks with noise are missing (:func:`coartic.benchmarks.scoring.with_noise`).
 
-        The store adds the other columns: ``cell``, ``environment``, ``movements`` and ``rewards``.
-        """
-        row = {name: attrgetter(source)(self) for name, _, source, _ in COLUMNS if source}
-        details = json.dumps(self.outcome.details)
-        used = ", ".join(self.outcome.used)
-        return row | {"suite_seed": self.job.seed, "used": used, "details": details}
+    Parameters
+    ----------
+    job : Job
+        A job with only this run.
+    outcome : Outcome
+        The outcome, with its final status.
+    executions : mapping of str to Execution
+        Executions by part, without noise; empty if the run is not ok.
+    date : str
+        Date and time, UTC.
+    """
+    number, is_noisy = job.numbers[0], job.cell.model.motor_noise > 0.0
+    parts: dict[str, Any] = {part: executions.get(part, _NOTHING) for part in PARTS}
+    movements = {
+        part: [*map(movement_data, execution.movements)] for part, execution in executions.items()
+    }
+    if solution := executions.get("solution"):
+        task, hands = job.cell.task, hands_of(solution.hands)
+        parts["solution"] = SimpleNamespace(
+            reward=None if is_noisy else solution.reward,
+            hands=solution.hands,
+            corrections=solution.corrections,
+            other_arm_travel=other_arm_travel(task, hands, solution.configurations),
+        )
+        if is_noisy:
+            movements["solution"] = [*map(movement_data, outcome.parts["solution"])]
+    reward, rewards = parts["solution"].reward, outcome.rewards
+    tenths = _corrections_by_tenth(outcome.details)
+    sources = SimpleNamespace(
+        **parts,
+        outcome=outcome,
+        counts=outcome.meter or SimpleNamespace(**dict.fromkeys(vars(Meter()))),
+        id=job.run_id(number),
+        number=number,
+        seed=job.run_seed(number),
+        job=job,
+        date=date,
+        best_trial=None if reward is None or reward not in rewards else rewards.index(reward),
+        early_corrections=tenths and tenths[1],
+        late_corrections=tenths and tenths[-1],
+        practice=_practice_of(rewards) if is_noisy and rewards else None,
+        result=_result_of(outcome.status, movements, rewards),
+        later=None,
+    )
+    values = {name: attrgetter(source)(sources) for name, _, source, _ in COLUMNS if source}
+    values["used"] = ", ".join(outcome.used)
+    return Row(job, values, movements, rewards, outcome.details, outcome.environment or {})
+
+
+def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
+    """Return the corrective movements in trial 0 and in each tenth of a learner's later trials.
+
+    The result is None if the corrections were not counted.
+    """
+    counts = details.get(CORRECTIONS_BY_TENTH)
+    if not isinstance(counts, list) or len(counts) != 11:
+        return None
+    are_counts = all(type(count) is int and 0 <= count <= MOST_COUNT for count in counts)
+    return counts if are_counts else None
+
+
+def _practice_of(rewards: Sequence[int | None]) -> str:
+    """Return the mean ticks of the completed trials in each tenth, as a JSON list of ten.
+
+    null stands for a tenth without a completed trial.
+    """
+    tenths = np.array_split(np.array(rewards, np.float64), 10)
+    means = [-float(np.nanmean(part)) if np.isfinite(part).any() else None for part in tenths]
+    return json.dumps(means)
+
+
+def _result_of(
+    status: str, movements: Mapping[str, Sequence[list[Any]]], rewards: Sequence[int | None]
+) -> str:
+    """Return the hash of status, movements and stored rewards of a run: 16 hex digits.
+
+    The hash includes the ticks and configurations of the movements. It does not include times and
+    counts.
+    """
+    stated = [[part, *data] for part in PARTS for data in movements.get(part, [])]
+    content = json.dumps([status, *stated]).encode()
+    return hashlib.sha256(content + reward_bytes(rewards)).hexdigest()[:16]
 
 
 COLUMNS = (
@@ -292,18 +261,18 @@ COLUMNS = (
     ("hands", "TEXT", "solution.hands", "hand of each goal in the solution, such as `LRLR`"),
     ("reward", "INTEGER", "solution.reward",
      "of the solution; of a learner its best trial; missing in a world with noise"),
-    ("mean_ticks", "REAL", "solution.mean_ticks",
+    ("mean_ticks", "REAL", "later",
      "in a world with [motor noise](model.md#motor-noise): mean ticks of 100 fresh executions of "
      "what the method recommends; a failed one counts as twice the ticks of the corrective "
      "process with its best hands"),
-    ("failed_executions", "INTEGER", "solution.failed_executions",
+    ("failed_executions", "INTEGER", "later",
      "how many of these executions failed"),
     ("practice", "TEXT", "practice",
      "in a world with noise: mean ticks of the trials in each tenth, as JSON"),
-    ("noisy_ticks", "REAL", "solution.noisy_ticks",
+    ("noisy_ticks", "REAL", "later",
      "of a solution found in the paper's world: mean ticks of 100 executions with motor noise "
      "0.01; missing if one of them fails"),
-    ("noise_rule", "INTEGER", "solution.noise_rule",
+    ("noise_rule", "INTEGER", "later",
      "version of the rule of noise; ticks of another version are shown as missing until "
      "`coartic run` makes them again"),
     ("replay_reward", "INTEGER", "replay.reward",
@@ -365,7 +334,7 @@ documentation are made from them. A column has
 
 - its name;
 - its type in SQL, with ``NOT NULL`` if all runs have a value in table ``results``;
-- the attribute of :class:`Run` that table ``results`` stores; empty for a column of another table;
+- its source in :func:`row_of`; ``later`` for ticks with noise, empty for a column of another table;
 - a phrase for the documentation."""
 
 

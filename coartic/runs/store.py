@@ -33,19 +33,14 @@ from coartic.errors import CoarticError
 from coartic.internal.files import make_folder
 from coartic.internal.text import plain
 from coartic.internal.validation import explain
-from coartic.method import Meter
 from coartic.motion.solution import Movement
 from coartic.robot import Array
 from coartic.runs.plan import Cell, Job, hash_of
 from coartic.runs.record import (
     COLUMNS,
     NOISE_RULE,
-    PREFIXES,
     UNREPEATED,
-    Outcome,
-    Run,
-    Score,
-    Times,
+    Row,
     movement_from,
     reward_bytes,
 )
@@ -102,8 +97,6 @@ CREATE TABLE results (cell TEXT NOT NULL REFERENCES cells, suite_seed INTEGER NO
 PRAGMA application_id = {_APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"""
 """Statements that make the tables and views."""
 
-_OF_NOISE = ("noisy_ticks", "mean_ticks", "failed_executions", "noise_rule")
-"""Columns of a run's solution that depend on the rule of noise."""
 WAIT_S = 5.0  # wait for another program before a warning
 _ROWS_AT_ONCE = 5_000  # rows of a data frame that are Python objects at the same time
 
@@ -315,7 +308,7 @@ class Store:
 
     # Writing and reading runs.
 
-    def write(self, runs: Iterable[Run]) -> None:
+    def write(self, runs: Iterable[Row]) -> None:
         """Write finished runs, all of them or none.
 
         The runs replace stored runs with the same cell, seed and number. Raises CoarticError if the
@@ -323,20 +316,20 @@ class Store:
         """
         with self.transaction():
             for run in runs:
-                environment = run.outcome.environment or {}
-                row = _environment_row(environment)
-                self._insert("environments", **row)
+                environment = _environment_row(run.environment)
+                self._insert("environments", **environment)
                 packed = None
-                if rewards := run.outcome.rewards:
+                if run.rewards:
                     packer = zlib.compressobj(9, strategy=zlib.Z_FILTERED)
-                    packed = packer.compress(reward_bytes(rewards)) + packer.flush()
-                movements = {part: run.movement_data(part) for part in run.scores}
+                    packed = packer.compress(reward_bytes(run.rewards)) + packer.flush()
                 self._insert(
                     "results",
-                    **run.to_row(),
+                    **run.values,
                     cell=run.cell.id,
-                    environment=row["id"],
-                    movements=json.dumps(movements, separators=(",", ":")),
+                    suite_seed=run.job.seed,
+                    environment=environment["id"],
+                    details=json.dumps(run.details),
+                    movements=json.dumps(run.movements, separators=(",", ":")),
                     rewards=packed,
                 )
 
@@ -370,7 +363,7 @@ class Store:
         finally:
             self._db.execute("DETACH DATABASE other")
 
-    def run(self, run_id: str) -> Run:
+    def run(self, run_id: str) -> Row:
         """Return a run by its id.
 
         ``suite`` of its job and ``where`` of its method are empty. Raises CoarticError if the
@@ -383,33 +376,26 @@ class Store:
             row = self._db.execute(query, (run_id,)).fetchone()
             if row is None:
                 raise CoarticError(f"{self.folder} does not have run {run_id}")
-            rewards = _unpack(row["rewards"]).tolist()
-            outcome = Outcome(
-                row["status"],
-                row["reason"],
-                details=dict(json.loads(row["details"])),
-                used=tuple(filter(None, row["used"].split(", "))),
-                meter=_from_row(Meter, row) if row["trials"] is not None else None,
-                rewards=[None if np.isnan(reward) else int(reward) for reward in rewards],
-                times=_from_row(Times, row),
-                environment=dict(json.loads(row["made"])),
-            )
-            scores = {}
-            for part, movements in json.loads(row["movements"]).items():
-                reward, hands = row[f"{PREFIXES[part]}reward"], row[f"{PREFIXES[part]}hands"]
-                scores[part] = Score(reward, hands, tuple(map(movement_from, movements)))
-            if "solution" in scores:
-                scores["solution"] = scores["solution"]._replace(
-                    corrections=row["solution_corrections"],
-                    other_arm_travel=row["other_arm_travel"],
-                    **_noise_of(row),
-                )
+            there = {*row.keys()}  # a file of an older version lacks columns
+            values = {
+                name: bool(row[name]) if kind == "BOOLEAN" and row[name] is not None else row[name]
+                for name, kind, source, _ in COLUMNS
+                if source and name in there
+            }
+            missing = {name: None for name, _, source, _ in COLUMNS if source}
             cell = _cell_from(row["cell"], row["cell_content"])
             job = Job(cell, row["suite_seed"], (row["run"],), row["time_limit_s"])
-            run = Run(job, outcome, scores, row["date"])
-            if run.id != run_id:
+            if job.run_id(row["run"]) != run_id:
                 raise ValueError(f"run {run_id} does not match its id")
-            return run
+            rewards = _unpack(row["rewards"]).tolist()
+            return Row(
+                job,
+                missing | values,
+                json.loads(row["movements"]),
+                [None if np.isnan(reward) else int(reward) for reward in rewards],
+                dict(json.loads(row["details"])),
+                dict(json.loads(row["made"])),
+            )
 
     def runs(self) -> pd.DataFrame:
         """Return view ``runs``: a row for each stored run of the plan, in order.
@@ -592,17 +578,6 @@ def _environment_row(content: Mapping[str, Any]) -> dict[str, Any]:
         "commit": commit and commit["id"] + "+" * commit["dirty"],
         "packages": hash_of([content.get("python"), content.get("packages")])[:8],
     }
-
-
-def _noise_of(row: sqlite3.Row) -> dict[str, Any]:
-    """Return the columns :data:`_OF_NOISE` of a row; None for those that an older file lacks."""
-    there = {*row.keys()}
-    return {name: row[name] if name in there else None for name in _OF_NOISE}
-
-
-def _from_row(kind: Any, row: sqlite3.Row) -> Any:
-    """Return an object of a dataclass whose fields are columns of a row."""
-    return kind(**{name: row[name] for name in vars(kind())})
 
 
 @contextmanager

@@ -25,7 +25,7 @@ from coartic import execute, load_task
 from coartic.benchmarks.registry import built_in
 from coartic.benchmarks.reproduce import perform_runs_again
 from coartic.method import run_method
-from coartic.runs.record import PARTS, Run
+from coartic.runs.record import PREFIXES, Row
 from coartic.runs.shipped import open_shipped, shipped_hashes
 from coartic.tasks.families import instance, shipped_families
 from coartic.tasks.task import task_text
@@ -96,16 +96,16 @@ def differences(rows: pd.DataFrame) -> Iterator[str]:
 
     Runs by earlier versions of their method (``is_current`` is False) are left out.
     """
-    runs = list[Run]()
+    runs = list[Row]()
     for suite, of_suite in rows[rows.is_current].groupby("suite"):
         with open_shipped(str(suite)) as store:
             runs += map(store.run, of_suite.run_id)
     for run, repeated in perform_runs_again(runs, built_in()):
         if (shipped := result_of(run)) != (result := result_of(repeated)):
             yield (
-                f"{run.cell.label} on {run.cell.task.name}, run {run.number} ({run.id}), no longer "
-                f"reproduces. It is shipped with {shipped} and has {result} here: fix your change, "
-                "or raise the version of the method and make its runs again"
+                f"{run.cell.label} on {run.cell.task.name}, run {run['run']} ({run['run_id']}), no "
+                f"longer reproduces. It is shipped with {shipped} and has {result} here: fix your "
+                "change, or raise the version of the method and make its runs again"
             )
 
 
@@ -142,12 +142,15 @@ def missing_entries(runs: pd.DataFrame) -> Iterator[str]:
             yield f'{name} is new: add "{name}": "{family_hash(name)}" to FAMILIES'
 
 
-def result_of(run: Run) -> str:
+def result_of(run: Row) -> str:
     """Return reward, hands and ticks of each movement of the parts of a run, as a string."""
-    scores = {part: run.scores[part] for part in PARTS if part in run.scores}
-    ticks = [[m.ticks for m in score.movements] for score in scores.values()]
-    words = [f"{part} {score.reward} ({score.hands})" for part, score in scores.items()]
-    return f"{', '.join(words) or run.outcome.status}, ticks {ticks}"
+    parts = [part for part in PREFIXES if part in run.movements]
+    ticks = [[movement.ticks for movement in run.part(part)] for part in parts]
+    words = [
+        f"{part} {run[f'{PREFIXES[part]}reward']} ({run[f'{PREFIXES[part]}hands']})"
+        for part in parts
+    ]
+    return f"{', '.join(words) or run['status']}, ticks {ticks}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

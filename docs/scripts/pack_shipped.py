@@ -27,7 +27,7 @@ from coartic.benchmarks.scoring import with_noise
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.runs import shipped
-from coartic.runs.record import Run
+from coartic.runs.record import Row
 from coartic.runs.store import RUNS_FILE, Store, open_store, writing
 
 
@@ -57,14 +57,14 @@ def changed_runs(folder: Path) -> Iterator[str]:
                     yield f"run {run_id}: {change}"
 
 
-def runs_with_noise(source: Store) -> Iterator[Run]:
+def runs_with_noise(source: Store) -> Iterator[Row]:
     """Execute the solutions of a folder with motor noise again, and yield its runs."""
     ids = iter(source.runs().run_id)
     for job in source.plan():
         yield from with_noise([source.run(next(ids)) for _ in job.numbers])
 
 
-def pack(source: Store, runs: Iterable[Run], out: Path) -> None:
+def pack(source: Store, runs: Iterable[Row], out: Path) -> None:
     """Pack downsampled runs with the plan of ``source`` into the folder ``out``.
 
     The hashes of all packed results in this folder are written, too.
