@@ -64,11 +64,13 @@ def _worlds(value: Any) -> tuple[MotionModel, ...]:
         return value
     if not isinstance(value, Mapping) or not value:
         raise sentence_error(
-            f"should be a table of constants, such as {{ motor_noise = 0.01 }}, not {value!r}"
+            f"model is {value!r}; it must be a table of constants, such as {{ motor_noise = 0.01 }}"
         )
     for name in value:
         if name not in WORLD:
-            raise sentence_error(f"has no constant {name!r}; a world has {', '.join(WORLD)}")
+            raise sentence_error(f"model has no constant {name!r}; it has {', '.join(WORLD)}")
+        if value[name] in ([], ()):
+            raise sentence_error(f"model.{name} is empty; it must be a value or a list of values")
     lists = [
         value[name] if isinstance(value[name], list | tuple) else [value[name]] for name in value
     ]

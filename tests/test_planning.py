@@ -66,6 +66,7 @@ OPTIONS = {
     "method_file": ("--method-file", "mine.py"),
     "family_file": ("--family-file", "strips.v1.toml"),
     "seed": ("--seed", "1"),
+    "model": ("--model", "motor_noise=0.01"),
     "time_limit": ("--time-limit", "5"),
     "trial_budget": ("--trial-budget", "7"),
     "include": ("--include", "before"),
