@@ -83,7 +83,7 @@ class Progress:
         """Count a run that has just been performed."""
         self.done += 1
         self.count(run["status"])
-        self.time_left.finish(run)
+        self.time_left.finish(run.cell, run["wall_s"])
 
     @property
     def unused(self) -> Iterator[str]:
@@ -306,7 +306,7 @@ def _repeat_runs(
         run = quickest[repeated.cell.method.name]
         if changes := compare_runs(run, repeated)[:1]:
             store.write([replace(run, details=run.details | {UNREPEATED: changes[0]})])
-        progress.time_left.finish(repeated)
+        progress.time_left.finish(repeated.cell, repeated["wall_s"])
         progress.repeats -= 1
         tell(repeated.cell)
 

@@ -11,7 +11,6 @@ from functools import cache
 
 from coartic.method import TRIALS
 from coartic.runs.plan import Cell, Job, trials_in
-from coartic.runs.record import Row
 from coartic.runs.shipped import open_shipped
 
 _Kind = tuple[str, str, int]
@@ -53,9 +52,9 @@ class TimeLeft:
             for job in jobs:
                 self._waiting[_kind_of(job.cell)] += len(job.numbers)
 
-    def finish(self, run: Row) -> None:
-        """Count an expected run that was made."""
-        kind, wall_s = _kind_of(run.cell), run["wall_s"]
+    def finish(self, cell: Cell, wall_s: float | None) -> None:
+        """Count an expected run of a cell that was made in ``wall_s`` s; None if unknown."""
+        kind = _kind_of(cell)
         with self._lock:
             self._last = time.monotonic()
             self._waiting[kind] -= 1

@@ -1,7 +1,6 @@
 """The time that missing runs take, on a clock that the test sets."""
 
 import heapq
-from types import SimpleNamespace
 
 import pytest
 
@@ -42,8 +41,7 @@ def test_in_the_last_third_the_time_left_is_true(monkeypatch, slower, order):
         ends.append((end, took, job))
     late = 0
     for clock[0], took, job in sorted(ends, key=lambda each: each[0]):
-        times = SimpleNamespace(wall_s=took, together=1)
-        estimate.finish(SimpleNamespace(cell=job.cell, outcome=SimpleNamespace(times=times)))
+        estimate.finish(job.cell, took)
         left = max(free) - clock[0]
         if 0.03 < left / max(free) < 1 / 3:
             assert left / 1.5 < estimate.seconds < 1.5 * left
