@@ -23,6 +23,7 @@ from coartic.internal.text import error_line, plain
 from coartic.internal.user_files import import_from
 from coartic.internal.validation import explain
 from coartic.method import Facts, Method, Outline, outline_of
+from coartic.model import MotionModel
 from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
@@ -113,6 +114,14 @@ class MethodInfo:
         reason = self._ask("why_not", parameters or {}, *outline_of(task))
         return None if reason is None else plain(str(reason))
 
+    def refuses(self, model: MotionModel) -> str | None:
+        """Return why the method cannot work in the world of a model; None if it can.
+
+        Raises CoarticError if the method cannot say.
+        """
+        reason = self._ask("refuses", *model)
+        return None if reason is None else plain(str(reason))
+
     def rules(self) -> dict[str, Any]:
         """Return settings of the method that its check needs.
 
@@ -145,11 +154,12 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     ----------
     method : type
         Class of the method.
-    question : {"complete", "why_not", "rules"}
+    question : {"complete", "why_not", "refuses", "rules"}
         Name of the function of :class:`MethodInfo` whose result is returned.
     *arguments
-        None for ``"rules"``. For the other questions the parameters of the method, and for
-        ``"why_not"`` also the entries of an :class:`Outline`.
+        None for ``"rules"``, and the entries of a :class:`.MotionModel` for ``"refuses"``. For the
+        other questions the parameters of the method, and for ``"why_not"`` also the entries of an
+        :class:`Outline`.
 
     Raises
     ------
@@ -161,6 +171,13 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         config = method.Parameters.model_config
         wanted = {key: config.get(key) for key in ("extra", "frozen")}
         return {"quick": dict(method.quick), "config": wanted}
+    if question == "refuses":
+        try:
+            return method.refuses(MotionModel(*arguments))
+        except Exception as error:
+            raise CoarticError(
+                f"method {method.name!r} cannot say which worlds it takes: {error_line(error)}"
+            ) from None
     parameters, *outline = arguments
     try:
         typed = method.Parameters.model_validate(parameters)
