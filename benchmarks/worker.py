@@ -112,6 +112,7 @@ def perform_job(job: Job) -> list[Outcome]:
             job.run_seed(number),
             # the declared information, because a method could change its class
             map(Information, cell.method.information),
+            model=cell.model,
             trial_budget=cell.trial_budget,
             trusted=cell.method.is_ours,
             of_run=True,
@@ -126,7 +127,8 @@ def perform_job(job: Job) -> list[Outcome]:
     try:
         method = cell.method.configure(cell.parameters)
         results: Sequence[Any]
-        if (reason_not := method.why_not(outline_of(cell.task))) is not None:
+        reason_not = method.refuses(cell.model) or method.why_not(outline_of(cell.task))
+        if reason_not is not None:
             raise MethodError("infeasible", str(reason_not))
         if len(sessions) == 1:
             results = [method.solve(sessions[0])]

@@ -73,6 +73,32 @@ def ranked_sequences(
     )
 
 
+@lru_cache(maxsize=1024)
+def _best_of_all(task_json: str, model: MotionModel) -> tuple[str, int] | None:
+    task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
+    goals = len(task.goals)
+    if too_many_sequences(task.name, goals, len(task.hands)) is None:
+        sequences = sequences_with(task.hands, goals, task.name)
+    elif task.initial_is_policy:
+        return None
+    else:
+        sequences = [task.initial_hands]
+    ranked = ranked_sequences(task, sequences, model=model)
+    count_trials(-len(ranked))
+    hands, reward, *_ = ranked[0]
+    return None if reward is None else (hands, -reward)
+
+
+def best_hands(task: Task, model: MotionModel = PAPER) -> tuple[str, int] | None:
+    """Return the hands with which the corrective process on its own is quickest, and its ticks.
+
+    The process acts without the motor noise of ``model``. For a task with more than 4096 hand
+    sequences these are its initial hands. The result is None if the process does not complete the
+    task. It is cached, and its trials are not counted.
+    """
+    return _best_of_all(task.model_dump_json(), model.without_noise())
+
+
 def changes_of_hand(sequence: str) -> int:
     """Count how often the hand changes between successive goals: 3 for ``"LRLR"``."""
     return sum(a != b for a, b in itertools.pairwise(sequence))

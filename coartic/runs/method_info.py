@@ -23,7 +23,7 @@ from coartic.internal.text import error_line, plain
 from coartic.internal.user_files import import_from
 from coartic.internal.validation import explain
 from coartic.method import Facts, Method, Outline, outline_of
-from coartic.model import MotionModel
+from coartic.model import PAPER, MotionModel
 from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
@@ -115,11 +115,8 @@ class MethodInfo:
         return None if reason is None else plain(str(reason))
 
     def refuses(self, model: MotionModel) -> str | None:
-        """Return why the method cannot work in the world of a model; None if it can.
-
-        Raises CoarticError if the method cannot say.
-        """
-        reason = self._ask("refuses", *model)
+        """Return a sentence on a constant of a world that the method cannot work with, or None."""
+        reason = None if model == PAPER else self._ask("refuses", *model)
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:
@@ -157,9 +154,9 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     question : {"complete", "why_not", "refuses", "rules"}
         Name of the function of :class:`MethodInfo` whose result is returned.
     *arguments
-        None for ``"rules"``, and the entries of a :class:`.MotionModel` for ``"refuses"``. For the
-        other questions the parameters of the method, and for ``"why_not"`` also the entries of an
-        :class:`Outline`.
+        None for ``"rules"``, and the constants of a model for ``"refuses"``. For the other
+        questions the parameters of the method, and for
+        ``"why_not"`` also the entries of an :class:`Outline`.
 
     Raises
     ------
@@ -167,17 +164,12 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         A parameter is wrong, or the method cannot say whether it applies. Other errors of the
         method's own check of parameters are raised as they are.
     """
+    if question == "refuses":
+        return method.refuses(MotionModel(*arguments))
     if question == "rules":
         config = method.Parameters.model_config
         wanted = {key: config.get(key) for key in ("extra", "frozen")}
         return {"quick": dict(method.quick), "config": wanted}
-    if question == "refuses":
-        try:
-            return method.refuses(MotionModel(*arguments))
-        except Exception as error:
-            raise CoarticError(
-                f"method {method.name!r} cannot say which worlds it takes: {error_line(error)}"
-            ) from None
     parameters, *outline = arguments
     try:
         typed = method.Parameters.model_validate(parameters)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from coartic.errors import CoarticError
-from coartic.model import PAPER
+from coartic.model import PAPER, MotionModel, differences
 from coartic.runs.method_info import MethodInfo
 from coartic.tasks.task import Task
 
@@ -31,6 +31,14 @@ class Cell:
     trial_budget: int | None = None
     """Largest number of trials of a run, without the search for initial hands; None for no
     limit."""
+    model: MotionModel = PAPER
+    """The world in which the method practises and is judged."""
+
+    @cached_property
+    def world(self) -> str:
+        """Constants of the model that are not the paper's, such as ``motor_noise=0.01``; empty for
+        the paper's world."""
+        return in_words(differences(self.model))
 
     @property
     def setting(self) -> str:
@@ -83,7 +91,7 @@ class Cell:
             "task": self.definition,
             "method": method,
             "parameters": self.parameters,
-            "model": PAPER.stored(self.task.radius),
+            "model": self.model.stored(self.task.radius),
             "trial_budget": self.trial_budget,
         }
 
@@ -123,6 +131,10 @@ class Job:
         """Return the seed of the random numbers of run ``number`` (:func:`run_seed`)."""
         return run_seed(self.seed, self.cell.task.name, number)
 
+    def judge_seed(self, number: int) -> int:
+        """Return the seed of the noise by which run ``number`` is judged (:func:`judge_seed`)."""
+        return judge_seed(self.seed, self.cell.task.name, number)
+
 
 def cell_of(
     task: Task,
@@ -130,6 +142,7 @@ def cell_of(
     parameters: Mapping[str, Any],
     trials: int | None = None,
     trial_budget: int | None = None,
+    model: MotionModel = PAPER,
 ) -> Cell:
     """Return the cell of a method on a task.
 
@@ -143,6 +156,8 @@ def cell_of(
         Default of parameter ``trials``, for methods that have it.
     trial_budget : int, optional
         Largest number of trials of a run.
+    model : MotionModel
+        The world of the runs.
 
     Returns
     -------
@@ -156,7 +171,7 @@ def cell_of(
     if trials is not None and "trials" in method.defaults:
         method = replace(method, defaults=method.defaults | {"trials": trials})
         parameters = {"trials": trials, **parameters}
-    return Cell(task, method, method.complete(parameters), trial_budget)
+    return Cell(task, method, method.complete(parameters), trial_budget, model)
 
 
 def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
@@ -179,7 +194,21 @@ def run_seed(suite_seed: int, task: str, number: int) -> int:
     The seed depends only on the suite's seed, the task's name and the run's number. It does not
     depend on the method, so that the runs of two methods are paired.
     """
-    words = np.frombuffer(hashlib.sha256(task.encode()).digest()[:16], dtype="<u4")
+    return _seed_of(suite_seed, task, number)
+
+
+def judge_seed(suite_seed: int, task: str, number: int) -> int:
+    """Return the seed of the noise by which run ``number`` of a task is judged.
+
+    It is equal for all methods, and no seed of practice: a hash of the suite's seed, the task's
+    name, the run's number and the word *judge*.
+    """
+    return _seed_of(suite_seed, f"{task} judge", number)
+
+
+def _seed_of(suite_seed: int, text: str, number: int) -> int:
+    """Return a seed from 0 to 2^63 - 1 that depends on a seed, a text and a number."""
+    words = np.frombuffer(hashlib.sha256(text.encode()).digest()[:16], dtype="<u4")
     sequence = np.random.SeedSequence(suite_seed, spawn_key=(*map(int, words), number))
     return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
