@@ -735,10 +735,13 @@ class Optimiser(Method):
             raise MethodError("solver-failed", "optimise ended without evaluating a point")
         solution = cost.solution
         if session.model.motor_noise > 0.0 and recommended is not None:
-            point = recommended if isinstance(recommended, tuple) else (recommended,)
             try:
-                solution = cost.movements(*point)
-            except (TypeError, ValueError) as error:
+                match recommended:
+                    case (point, str(hands)):
+                        solution = cost.movements(point, hands)
+                    case point:
+                        solution = cost.movements(point)
+            except ValueError as error:
                 raise ValueError(
                     f"optimise returned {brief_value(recommended)}; it must return a point of "
                     f"{cost.dim} numbers, a tuple of a point and its hands, or None ({error})"
