@@ -23,7 +23,7 @@ from coartic.internal.text import error_line, plain
 from coartic.internal.user_files import import_from
 from coartic.internal.validation import explain
 from coartic.method import Facts, Method, Outline, outline_of
-from coartic.model import PAPER, MotionModel
+from coartic.model import MotionModel, differences
 from coartic.tasks.task import Task
 
 BUILT_IN = "built in"
@@ -116,7 +116,7 @@ class MethodInfo:
 
     def refuses(self, model: MotionModel) -> str | None:
         """Return a sentence on a constant of a world that the method cannot work with, or None."""
-        reason = None if model == PAPER else self._ask("refuses", *model)
+        reason = self._ask("refuses", *model) if differences(model) else None
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:

@@ -32,7 +32,10 @@ class Cell:
     """Largest number of trials of a run, without the search for initial hands; None for no
     limit."""
     model: MotionModel = PAPER
-    """The world in which the method practises and is judged."""
+    """The world in which the method practises and is judged, with the tolerances for the task."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "model", self.model.for_radius(self.task.radius))
 
     @cached_property
     def world(self) -> str:
