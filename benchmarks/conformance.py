@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from math import dist
+from math import dist, inf
 from pathlib import Path
 from typing import NamedTuple
 
 from coartic import (
+    PAPER,
+    Execution,
+    MotionModel,
     NotApplicableError,
     Task,
     TaskError,
@@ -25,7 +28,9 @@ from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
 from coartic.internal.text import counted
 from coartic.method import METERED
-from coartic.motion.solution import goals_without_target
+from coartic.motion.execution import execute_many
+from coartic.motion.solution import goals_without_target, next_action
+from coartic.motion.trials import compiled_task, world_seed, worlds_of
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, in_words
 from coartic.runs.record import Row
@@ -34,6 +39,8 @@ from coartic.tasks.task import check_task
 CHECK_TRIALS = 60  # trials of a run: enough to learn something, few enough to be quick
 _LIMIT_S = 120.0  # limit of CPU time of a run
 _BUDGET = 7  # trial budget of the runs that check ``limits``
+_NOISE = "motor noise"  # kind of the runs in a world with noise, and name of their check
+_WORLD = MotionModel(motor_noise=0.01)
 
 
 class CheckResult(NamedTuple):
@@ -83,9 +90,11 @@ def check_method(
         ("after others", 1, None, tasks),
         ("budget", 1, _BUDGET, tasks),
         ("hopeless", 1, None, filter(applies, map(_hopeless_task, tasks[:1]))),
+        (_NOISE, 1, None, tasks),
     ):
         for task in chosen:
-            cell = cell_of(task, info, parameters, trial_budget=budget)
+            world = _WORLD if kind == _NOISE else PAPER
+            cell = cell_of(task, info, parameters, trial_budget=budget, model=world)
             jobs[kind, task.name] = Job(cell, seed, (0,), _LIMIT_S)
     performed = perform_in_order([*jobs.values()], verbose=verbose)
     run_of = {id(job): run for job, run in performed}  # runs may finish in another order
@@ -176,6 +185,40 @@ def _failure(info: MethodInfo, runs: _Runs) -> Iterator[str]:
             yield f"a task out of reach gives {status}; it must give infeasible with a reason"
 
 
+def _noise(info: MethodInfo, runs: _Runs) -> Iterator[str]:
+    for task, run in runs.get(_NOISE, {}).items():
+        if run.outcome.reason:
+            noise = f"with motor noise {_WORLD.motor_noise:g}"
+            yield f"on {task}, {noise}: {run.outcome.status}: {run.outcome.reason}"
+
+
+def _is_best_trial(run: Run) -> bool:
+    """Return whether the answer of a run in noise is its best trial, as far as can be seen.
+
+    The answer is executed under the draw that the best trial has met. If it is that trial, it takes
+    the same ticks; any other answer does so only by chance.
+    """
+    rewards = [-inf if reward is None else reward for reward in run.outcome.rewards]
+    if len({*rewards}) < 2:
+        return False  # there was nothing to choose from
+    task, best = run.cell.task, max(rewards)
+    worlds = worlds_of(world_seed(run.seed), rewards.index(best))
+    answer = next_action(run.solution.movements)
+    (execution,) = execute_many(compiled_task(task, run.cell.model), [answer], worlds)
+    return isinstance(execution, Execution) and execution.reward == best
+
+
+def _luck(info: MethodInfo, runs: _Runs) -> str:
+    """Return a sentence on what the method answers in noise."""
+    made = f"the method solves its tasks with motor noise {_WORLD.motor_noise:g}"
+    if not all(map(_is_best_trial, runs[_NOISE].values())):
+        return made
+    return (
+        f"{made}; its answer seems to be its best trial, which was partly lucky: return what the "
+        "method recommends to do next, if it knows more than this trial"
+    )
+
+
 def _rewards(info: MethodInfo, runs: _Runs) -> str:
     """Return a sentence on the rewards of the solutions, and on goals that have no target."""
     runs_by_task = runs["first"]
@@ -219,6 +262,7 @@ CHECKS: dict[
         lambda _, runs: f"declared and used: {', '.join(sorted(_used(runs))) or 'nothing'}",
     ),
     "failure": (_failure, _hopeless),
+    _NOISE: (_noise, _luck),
 }
 """Checks of a method by name. Each has a function that yields problems, and a function that returns
 a sentence on what was checked."""

@@ -29,7 +29,7 @@ from coartic.internal.toml_files import read_bytes
 from coartic.internal.user_files import is_users
 from coartic.method import Facts, Information, Method
 from coartic.method.optimisers import Optimiser
-from coartic.model import MODEL_VERSION
+from coartic.model import MODEL_VERSION, WORLD
 from coartic.runs.method_info import (
     READERS,
     MethodInfo,
@@ -148,6 +148,12 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
         ):
             raise CoarticError(
                 f"{where}: information must be a set of Information, not {information!r}"
+            )
+        adapts_to = method.adapts_to
+        if adapts_to is not None and not (isinstance(adapts_to, frozenset | set) and
+                                          adapts_to <= {*WORLD}):  # fmt: skip
+            raise CoarticError(
+                f"{where}: adapts_to must be None or a set of {', '.join(WORLD)}, not {adapts_to!r}"
             )
         if not isinstance(method.facts, Facts):
             raise CoarticError(f"{where}: facts must be Facts(...), not {method.facts!r}")

@@ -319,7 +319,7 @@ def test_a_shell_completes_names_and_prints_no_error(tmp_path):
         "run qu": ["quick"],
         "run quick --tasks ascending,d": ["ascending,descending"],
         "run quick --methods EC1,CMA": ["EC1,CMA-ES"],
-        "check optimum/": ["optimum/search"],
+        "check optimum/": ["optimum/search", "optimum/in-model"],
         "list comp": ["comparison"],
         f"verify {tmp_path}/out --run {run_id[:3]}": [run_id],
         f"draw {tmp_path}/out --run ": [run_id],

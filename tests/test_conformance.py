@@ -146,6 +146,7 @@ CASES = [
     ("test/freeloader", "solution", "used 'corrective process', which it does not declare"),
     ("test/lucky", "determinism", "stochastic is False, but another seed"),
     ("test/unhelpful", "failure", "ZeroDivisionError: no goal is that far"),
+    ("test/timid", "motor noise", "on ascending, with motor noise 0.01: crashed: "),
 ]
 
 
@@ -157,6 +158,19 @@ def test_each_law_can_be_broken(methods, name, law, finding):
     # What is found after a solution that failed would mislead.
     later = [*laws.values()][[*laws].index("solution") + 1 :]
     assert {each.passed is None for each in later} == {law == "solution"}
+
+
+@pytest.mark.parametrize(
+    ("name", "is_best_trial"),
+    [("test/proud", True), ("random-search", True), ("cma-es/bandit", False),
+     ("hill-climbing", False), ("dual-process/EC4", False), ("test/good", False)],
+)  # fmt: skip
+def test_whoever_answers_a_lucky_trial_is_told(methods, name, is_best_trial):
+    tasks = [load_task(task) for task in ("ascending", "two-armed-1")]
+    tasks = [task for task in tasks if methods[name].why_not(task) is None]
+    laws = {each.name: each for each in check_method(methods[name], tasks=tasks)}
+    assert laws["motor noise"].passed
+    assert ("seems to be its best trial" in laws["motor noise"].finding) == is_best_trial
 
 
 @pytest.mark.parametrize("path", sorted(TASK_FOLDER.glob("*.toml")), ids=lambda path: path.stem)

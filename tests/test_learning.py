@@ -100,6 +100,56 @@ def test_equals_the_loop_in_every_world(name, condition, world):
     assert_equals_reference(load_task(name), CONDITIONS[condition], 6, model=world)
 
 
+NOISY = [world for world in WORLDS if world.motor_noise]
+
+
+@pytest.mark.parametrize("world", NOISY, ids=named)
+@pytest.mark.parametrize("condition", ["EC1", "EC3", "EC4", "EC4-subtask", "EC4-uncorrected"])
+def test_next_action_is_read_from_the_tables_of_the_slow_learner(condition, world):
+    """Greedy hands and their postures, state by state; it is what a run in noise answers."""
+    task = load_task("ascending" if condition == "EC1" else "two-armed-2")
+    condition = EVERY_CONDITION[condition]
+    run = learn(task, condition, seed=3, trials=12, model=world)
+    slow = reference.learn(task, condition, seed=3, trials=12, model=world)
+    if not slow.completed.any():
+        assert run.learned == ()
+        return
+    due, before = [], None
+    for goal in range(len(task.goals)):
+        known = {hand: value for (state, hand), value in slow.values.items()
+                 if state == (goal, before)}  # fmt: skip
+        hand = max(sorted(known), key=known.get) if known else condition.hands[0]
+        target = slow.targets.get(((goal, before), hand))
+        if target is not None and not condition.modify_other:
+            target = np.array(target)
+            target[task.robot.joints("left" if hand == "right" else "right")] = np.nan
+        due.append((hand, target))
+        before = hand
+    assert [(m.goal, m.hand) for m in run.learned] == [*enumerate((h for h, _ in due), 1)]
+    for movement, (_, target) in zip(run.learned, due, strict=True):
+        assert movement.ticks is None
+        assert movement.kind == ("corrective" if target is None else "learned")
+        if target is not None:
+            npt.assert_allclose(movement.target, target, atol=1e-9)
+    method = next(each for each in METHODS if each.name.endswith(f"/{condition.id}"))
+    options = {"model": world, "trusted": True}
+    result = method(method.Parameters(trials=12)).solve(
+        Session(task, 3, method.information, **options)
+    )
+    assert result.solution == run.learned
+
+
+def test_next_action_corrects_where_nothing_is_stored():
+    """Values without postures after them: the greedy hands lead into a state that no trial saw."""
+    run = learn("two-armed-2", "EC4", seed=0, trials=40, model=NOISY[0])
+    values, targets = run.values.copy(), run.targets.copy()
+    code = int(values[0, 2].argmax())
+    values[1, code], targets[1, code] = -np.inf, np.nan
+    first, second, *_ = replace(run, values=values, targets=targets).next_action
+    assert (first.kind, second.kind, second.target) == ("learned", "corrective", None)
+    assert second.hand == "left"  # at a tie
+
+
 def shown(movements):
     return [(m.goal, m.hand, m.kind, m.ticks, tuple(m.target)) for m in movements]
 

@@ -24,7 +24,7 @@ from coartic.method import (
     run_method,
 )
 from coartic.method.optimisers import OPTIMISER_INFORMATION
-from coartic.motion.solution import movements_of
+from coartic.motion.solution import movements_of, next_action
 from tests.support.strategies import make_trials, sample, tiny_task
 
 BLIND = frozenset({Information.REWARD_BY_TRIAL})
@@ -131,6 +131,7 @@ ANY_WORLD = [MotionModel(motor_noise=0.01), MotionModel(norm="maximum"), MotionM
 REFUSED = {  # how many of these three worlds a method refuses
     "dual-process/EC4": 0, "dual-process/EC4-informed": 0, "cma-es/bandit": 0, "random-search": 0,
     "corrective-alone/best-hands": 0, "optimum/search": 1, "receding-horizon": 1,
+    "optimum/in-model": 0,
     "trajectory-optimisation/path-length": 1, "trajectory-optimisation/jerk": 2,
     "nullspace-qp/least-motion": 2, "posture-based/one-goal": 2, "posture-qp/current-goal": 2,
 }  # fmt: skip
@@ -167,3 +168,9 @@ def test_every_method_solves_a_task_in_noise(name):
         result, session = run_method(made, task, model=MotionModel(motor_noise=0.01))
         assert execute(task, result.solution).completed
         assert session.model.motor_noise == 0.01
+        assert {movement.ticks for movement in result.solution} == {None}
+        assert all(m.target is None for m in result.solution if m.kind == "corrective")
+        assert (result.initial, result.replay) == ((), ())
+        if not session.trials_made and name != "optimum/in-model":  # a planner: its plan
+            plan, _ = run_method(made, task)
+            assert result.solution == next_action(plan.solution)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coartic import CoarticError
+from coartic import CoarticError, MotionModel
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
 from coartic.benchmarks.registry import registry
@@ -23,7 +23,7 @@ TEXT = METHOD.read_text(encoding="utf-8")
 def test_a_file_brings_a_method(coartic, tmp_path):
     own = ("--method-file", METHOD)
     code, checked, _ = coartic("check", "nearest-hand", *own)
-    assert (code, "nearest-hand: 8 of 8 checks passed." in checked) == (0, True), checked
+    assert (code, "nearest-hand: 9 of 9 checks passed." in checked) == (0, True), checked
     code, _, error = coartic(
         "run", "paper", "--methods", "nearest-hand", *own, "--jobs", "1", "--out", tmp_path,
         "--tasks", f"two-armed-1,{METHOD.with_name('shelf.toml')}",
@@ -54,6 +54,24 @@ def test_a_helper_is_compiled_from_its_source_and_is_that_of_its_folder(helper, 
     (tmp_path / "mine.py").write_text(f"import {helper}\n{text}", encoding="utf-8")
     assert registry([tmp_path / "mine.py"])["nearest-hand"].title.startswith("0.3 of ")
     assert [*tmp_path.rglob("mine*.pyc")] == []
+
+
+@pytest.mark.process
+def test_a_method_file_says_which_worlds_it_takes(tmp_path):
+    """In the process of the file; what is no set of constants is refused."""
+    path = tmp_path / "mine.py"
+    text = TEXT.replace('    title = "', '    adapts_to = {"norm"}\n    title = "')
+    path.write_text(text, encoding="utf-8")
+    info = registry([path])["nearest-hand"]
+    assert info.refuses(MotionModel(norm="maximum", motor_noise=0.01)) is None
+    assert info.refuses(MotionModel()) is None
+    assert "model.base_weight is 2; method 'nearest-hand'" in info.refuses(
+        MotionModel(base_weight=2)
+    )
+    for wrong in ('"norm"', '{"weight"}'):
+        path.write_text(text.replace('{"norm"}', wrong), encoding="utf-8")
+        with pytest.raises(CoarticError, match="adapts_to must be None or a set of motor_noise, "):
+            registry([path])
 
 
 @pytest.mark.process

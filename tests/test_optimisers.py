@@ -272,6 +272,56 @@ def test_an_optimiser_that_evaluates_nothing_has_no_solution():
     assert execute(FOUR, result.solution).reward == max(session.rewards)
 
 
+class Recommends(coartic.Optimiser):
+    """Returns what a function makes of the objective, once all trials are made."""
+
+    name = "test/recommends"
+    title = "Recommends"
+
+    def optimise(self, objective, rng):
+        with suppress(BudgetError):
+            while True:
+                objective.many(objective.x0 + 0.05 * rng.standard_normal((7, objective.dim)))
+        self.best_trial = objective.solution
+        return self.answer(objective)
+
+
+def recommended(answer, model):
+    """The solution and the best trial of an optimiser that returns an answer, and the session."""
+    method = Recommends(Recommends.Parameters(trials=200, hands="LRLR"))
+    method.answer = answer
+    result, session = run_method(method, FOUR, model=model)
+    assert session.trials_made == 200
+    return result.solution, method.best_trial, session
+
+
+def test_a_point_that_is_returned_is_the_solution_in_noise_alone():
+    noisy, due = MotionModel(motor_noise=0.01), {}
+
+    def answer(cost):
+        due["x"] = cost.x0 + 0.01
+        return due["x"]
+
+    solution, best, _ = recommended(answer, noisy)
+    assert solution == objective(FOUR, "LRLR", model=noisy).movements(due["x"]) != best
+    solution, *_ = recommended(lambda cost: (cost.x0, "RRRR"), noisy)
+    assert {movement.hand for movement in solution} == {"right"}
+    solution, best, _ = recommended(lambda cost: None, noisy)
+    assert solution == best
+    solution, best, session = recommended(answer, MotionModel())
+    assert solution == best
+    assert execute(FOUR, solution).reward == max(session.rewards)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [3.0, "x", (), np.zeros(3), np.full(40, np.inf), ([0.0], "RRRR"), ([0.0] * 40, "RR"), {"x": 1}],
+)
+def test_what_is_no_point_cannot_be_recommended(wrong):
+    with pytest.raises(ValueError, match="optimise returned .* must return a point of 40 numbers"):
+        recommended(lambda cost: wrong, MotionModel(motor_noise=0.01))
+
+
 def test_a_method_cannot_see_its_task():
     cost = Objective(Session(FOUR, 0, OPTIMISER_INFORMATION))
     for ask in ("task", "best_known", "proven"):

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from coartic import MotionModel, execute, load_task
-from coartic.baselines.optimum import OptimumSearch, with_locks
+from coartic import MotionModel, execute, execute_noisy, load_task
+from coartic.baselines.optimum import InModel, OptimumSearch, with_locks
 from coartic.baselines.receding_horizon import RecedingHorizon
 from coartic.baselines.trajectory_optimisation import PathLength
 from coartic.method import MethodError
 from coartic.motion.execution import other_arm_travel
 from coartic.tasks.task import hands_of
-from tests.support.strategies import changed, solve, tiny_task
+from tests.support.strategies import STUCK, changed, solve, tiny_task
 
 FEW = {"graphs": 1, "chains": 1, "nodes": 60}
 
@@ -53,6 +53,57 @@ def test_a_hand_that_is_there_already_saves_a_tick():
     assert execution.hands == "RL"
     assert execution.ticks_by_goal()[1] == 0
     assert execution.corrections == 0
+
+
+RIGHT = {"hands": ["right"], "goals": [[6.004, 0.1]]}
+"""The arm is stretched along x: only the base can bring the hand to the right, by 1.404."""
+
+
+@pytest.mark.parametrize(
+    ("world", "ticks"),
+    [
+        ({}, 142),
+        ({"norm": "maximum"}, 142),
+        ({"base_weight": 4.0}, 563),
+        ({"base_weight": 0.5}, 72),
+    ],
+)
+def test_the_search_in_any_world_finds_what_can_be_computed(world, ticks):
+    """Whole steps of the base's weighted way, and the tick of arrival."""
+    options = {"evaluations": 300, **FEW, "model": MotionModel(**world)}
+    result, execution, session = solve(InModel, tiny_task(**RIGHT), **options)
+    assert execution.ticks == ticks
+    assert result.solution == execution.movements
+    assert session.used == InModel.information
+
+
+def test_the_search_in_noise_is_better_than_the_shortest_path_and_knows_by_how_much():
+    task, noisy = tiny_task(goals=[[4.0, 1.0], [3.5, 1.5]]), MotionModel(motor_noise=0.02)
+    few = {**FEW, "model": noisy}
+    plan = solve(OptimumSearch, task, **few)[0].solution
+    result, *_ = solve(InModel, task, evaluations=1500, executions=50, **few)
+    assert (
+        result.solution
+        == solve(InModel, task, 7, evaluations=1500, executions=50, **few)[0].solution
+    )
+    ticks = execute_noisy(task, [result.solution, plan], 0.02, 2000, 5)
+    errors = ticks.std(axis=1) / np.sqrt(2000)
+    better = ticks[1] - ticks[0]
+    assert better.mean() > 4 * better.std() / np.sqrt(2000)
+    path = result.details["shortest path"]
+    least = min(each["end"] for each in result.details.values())
+    for told, mean, error in zip((least, path["start"]), ticks.mean(axis=1), errors, strict=True):
+        assert abs(told - mean) < 4 * error * np.sqrt(1 + 2000 / 500)
+
+
+def test_the_search_in_any_world_needs_a_path_or_corrections():
+    few = {**FEW, "evaluations": 20}
+    result, *_ = solve(InModel, STUCK, **few)  # the corrective process fails
+    assert [*result.details] == ["shortest path"]
+    far = changed("ascending", goals=[[9e3, 9e3]], locked_base=["x", "y"], initial_hands="R")
+    with pytest.raises(MethodError, match="neither a path nor corrections") as caught:
+        solve(InModel, far, **few)
+    assert caught.value.outcome == "infeasible"
 
 
 @pytest.mark.parametrize("method", [OptimumSearch, PathLength, RecedingHorizon])

@@ -41,6 +41,7 @@ SHORT_RUNS = {
     "trajectory-optimisation/hand-jerk": ("descending", -409, "RRR", 44),
     "receding-horizon": ("ascending", -299, "RRR", 74),
     "optimum/search": ("ascending", -292, "RRR", 46),
+    "optimum/in-model": ("ascending", -292, "RRR", 46),
 }
 """Task, reward, hands, and control ticks of all trials or iterations of the solver, of methods
 without a shipped run, with seed 1 and 2,000 trials; and of planners whose cheapest shipped run

@@ -9,7 +9,7 @@ from pydantic import ConfigDict
 import coartic
 from coartic import load_task
 from coartic.method import Information, Method, Parameters, Result, Session
-from coartic.motion.solution import Movement
+from coartic.motion.solution import Movement, movements_of
 
 CORRECTIVE = frozenset({Information.CORRECTIVE_PROCESS})
 SEEN = []
@@ -169,6 +169,35 @@ class Lucky(Good):
 
     def details(self, session):
         return {"drawn": session.rng.random()}
+
+
+class Timid(Good):
+    """Finds nothing where movements miss."""
+
+    name = "test/timid"
+
+    def details(self, session):
+        assert session.model.motor_noise == 0.0, "nothing is certain"
+
+
+class Proud(Good):
+    """Answers its best trial, in noise, too."""
+
+    name = "test/proud"
+    information = CORRECTIVE | {Information.REWARD_BY_TRIAL}
+    stochastic = True
+
+    def solve(self, session):
+        hands = session.find_initial_hands()
+        start = session.trials(hands, np.full((1, session.goals_count, session.dof), np.nan))
+        count = 6 if session.trials_left is not None else 30
+        targets = start.reached + 0.02 * session.rng.standard_normal(
+            (count, session.goals_count, session.dof)
+        )
+        for k in map("xy".index, session.locked_base):
+            targets[..., k] = session.q0[k]
+        best = targets[session.trials(hands, targets).rewards.argmax()]
+        return Result(movements_of(hands, best))
 
 
 class Draws(Lucky):
