@@ -7,13 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from coartic.benchmarks.provenance import current_environment, now
 from coartic.internal.text import LONGEST_REASON, plain
 from coartic.model import PAPER, same_world
 from coartic.motion.execution import Execution, execute_noisy, other_arm_travel
-from coartic.motion.initial_hands import best_hands
 from coartic.motion.solution import Movement, next_action
 from coartic.runs.plan import Cell, Job
 from coartic.runs.record import (
@@ -24,6 +21,7 @@ from coartic.runs.record import (
     Run,
     Score,
     execute_all,
+    judge,
 )
 from coartic.tasks.task import Task, hands_of
 
@@ -122,21 +120,12 @@ def with_noise(runs: Sequence[Run]) -> list[Run]:
 
 def _judge(cell: Cell, runs: Sequence[Run]) -> list[dict[str, Any]]:
     """Return ``mean_ticks`` and ``failed_executions`` of the answers of runs in a noisy world."""
-    exact = cell.model.without_noise()
-    ticks = execute_noisy(
-        cell.task,
-        [run.solution.movements for run in runs],
-        cell.model.motor_noise,
-        NOISY_EXECUTIONS,
-        [run.job.judge_seed(run.number) for run in runs],
-        exact,
-    )
-    best = best_hands(cell.task, exact)
-    capped = np.where(np.isnan(ticks), np.nan if best is None else 2.0 * best[1], ticks)
-    means, failed = capped.mean(axis=1).tolist(), np.isnan(ticks).sum(axis=1).tolist()
+    answers = [run.solution.movements for run in runs]
+    seeds = [run.job.judge_seed(run.number) for run in runs]
+    means, failed = judge(cell.task, answers, cell.model, seeds)
     return [
         {"mean_ticks": None if math.isnan(mean) else mean, "failed_executions": count}
-        for mean, count in zip(means, failed, strict=True)
+        for mean, count in zip(means.tolist(), failed.tolist(), strict=True)
     ]
 
 

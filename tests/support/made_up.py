@@ -15,6 +15,7 @@ from coartic.analysis.study import Study
 from coartic.estimates import Estimate
 from coartic.runs.method_info import BUILT_IN, MethodInfo
 from coartic.runs.plan import Cell, Job
+from coartic.runs.record import NOISE_RULE
 from common.judging import Finding
 
 MADE_WITH = {
@@ -71,7 +72,8 @@ def row(method, reward, *, task="two-armed-1", run=0, setting="", **more):
         "task": task, "method": method, "setting": setting, "run": run, "seed": run,
         "status": "ok" if reward is not None else "infeasible", "reason": "", "reward": reward,
         "run_id": f"{task}-{method}-{setting}-{run}", "hands": "LRLR",
-        "noisy_ticks": None if reward is None else -1.1 * reward,
+        "noisy_ticks": None if reward is None else -1.1 * reward, "noise_rule": NOISE_RULE,
+        "world": "", "mean_ticks": None, "failed_executions": None, "practice": None,
         "information": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
         "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
         "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "cpu_s": 0.5,
