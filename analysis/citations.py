@@ -13,7 +13,7 @@ from typing import Any
 
 from coartic import __version__
 from coartic.analysis.methods import KNOWN_METHODS
-from coartic.analysis.words import latex, slugs
+from coartic.analysis.words import latex, listed, slugs
 from coartic.internal.text import one_line
 from coartic.runs.method_info import BUILT_IN, MethodInfo
 from coartic.runs.plan import world_title
@@ -64,7 +64,7 @@ def bibliography(
     if commit := made_with.get("commit"):
         note += f", commit {commit['id']}{' with changes' * commit['dirty']}"
     if any(worlds):
-        note += f"; runs in {' and '.join(map(world_title, worlds))}"
+        note += f"; runs in {listed(map(world_title, worlds))}"
     software = _misc(
         "coartic",  # as in CITATION.cff
         author="{The coartic developers}",

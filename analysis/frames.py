@@ -26,6 +26,7 @@ from pandas.api.types import is_hashable
 
 from coartic.analysis.optima import gap_share, run_values
 from coartic.analysis.statistics import task_mean
+from coartic.analysis.words import listed
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.internal.limits import brief_value
@@ -185,7 +186,7 @@ def _refuse_worlds(frame: pd.DataFrame) -> None:
     if len(worlds) > 1:
         first = next(iter(worlds))
         raise CoarticError(
-            f"column world has {' and '.join(map(world_title, worlds))}; runs in different worlds "
+            f"column world has {listed(map(world_title, worlds))}; runs in different worlds "
             f"are not compared. Take those in one world: frame[frame.world == {first!r}]"
         )
 

