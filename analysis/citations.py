@@ -13,9 +13,10 @@ from typing import Any
 
 from coartic import __version__
 from coartic.analysis.methods import KNOWN_METHODS
-from coartic.analysis.words import latex, slugs
+from coartic.analysis.words import latex, listed, slugs
 from coartic.internal.text import one_line
 from coartic.runs.method_info import BUILT_IN, MethodInfo
+from coartic.runs.plan import world_title
 
 THE_PAPER = "shah2013"
 STATISTICS = "efron1993", "davison1997", "holm1979", "chung2013", "schuirmann1987", "cohen1988"
@@ -35,6 +36,7 @@ def bibliography(
     analysis: bool = False,
     environment: Mapping[str, Any] | None = None,
     imports: Mapping[str, Sequence[str]] | None = None,
+    worlds: Sequence[str] = ("",),
 ) -> str:
     """Return BibTeX for the software, the paper and the methods; each work has one entry.
 
@@ -53,11 +55,16 @@ def bibliography(
     imports : mapping, optional
         Names and versions of the packages that a method's file imports, by the id of the method
         (:attr:`.Study.imports`). They are named in a comment.
+    worlds : sequence of str
+        Worlds of the runs (:attr:`.Study.worlds`). They are named in the note on the software if
+        one is not the paper's.
     """
     made_with = environment or {}
     note = f"Version {made_with.get('coartic') or __version__}"
     if commit := made_with.get("commit"):
         note += f", commit {commit['id']}{' with changes' * commit['dirty']}"
+    if any(worlds):
+        note += f"; runs in {listed(map(world_title, worlds))}"
     software = _misc(
         "coartic",  # as in CITATION.cff
         author="{The coartic developers}",

@@ -5,12 +5,14 @@ the columns
 
 - ``method`` and ``task``;
 - ``reward``: negative ticks, NaN for a failed run;
+- ``mean_ticks``, only for runs in a world with noise, whose ``reward`` is NaN;
 - ``best_known``: the best known reward of the task, negative ticks;
 - ``corrective_best``, only for shares: the reward of the corrective process alone with its best
   hands, negative ticks.
 
-The costs of an ``Objective`` are the negatives of rewards. Frames with wrong values raise
-CoarticError.
+What is compared is the *value* of a run: its reward, or minus its ``mean_ticks`` in a world with
+noise (:func:`.run_values`). The costs of an ``Objective`` are the negatives of rewards. Frames with
+wrong values, and rankings of runs in different worlds, raise CoarticError.
 """
 
 from __future__ import annotations
@@ -22,13 +24,14 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from pandas.api.types import is_hashable
 
-from coartic.analysis.optima import gap_share
+from coartic.analysis.optima import gap_share, run_values
 from coartic.analysis.statistics import task_mean
+from coartic.analysis.words import listed
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.internal.limits import brief_value
 from coartic.internal.text import counted, plain
-from coartic.runs.plan import label_of
+from coartic.runs.plan import label_of, world_title
 
 SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
@@ -50,8 +53,13 @@ def checked(
 ) -> pd.DataFrame:
     """Check a user's frame, and return a copy of the columns that are needed.
 
-    If ``numbers`` has ``reward`` and the frame has a column ``status``, this column is also checked
-    and returned: a run must have a reward if its status is ``ok``, and no reward otherwise.
+    If ``numbers`` has ``reward``, the result also has
+
+    - ``value`` (:func:`.run_values`), from ``reward`` and, if there is such a column,
+      ``mean_ticks``;
+    - ``is_noisy``: True where column ``motor_noise``, if there is one, is above 0;
+    - column ``status``, if there is one: a run must have a reward or mean ticks if its status is
+      ``ok`` (in noise both can be missing, :func:`.judge`), and neither otherwise.
 
     Parameters
     ----------
@@ -75,7 +83,10 @@ def checked(
     """
     if not isinstance(frame, pd.DataFrame):
         raise CoarticError(f"the frame must be a pandas.DataFrame, not a {type(frame).__name__}")
-    status = ["status"] if "reward" in numbers and "status" in frame else []
+    has_value, there = "reward" in numbers, {*frame.columns}
+    status = ["status"] if has_value and "status" in there else []
+    of_noise = [name for name in ("mean_ticks", "motor_noise") if has_value and name in there]
+    numbers = [*numbers, *of_noise]
     wanted = [*dict.fromkeys((*names, *others, *status, *numbers))]
     if missing := [name for name in wanted if name not in {*frame.columns}]:
         raise CoarticError(f"the frame has no column {', '.join(map(inline, missing))}")
@@ -94,10 +105,14 @@ def checked(
             raise CoarticError(f"column {inline(name)} must have numbers ({error})") from None
         refuse_rows(columns, name, np.isinf(values), "it must be a finite number")
         columns[name] = values
+    if has_value:
+        is_noisy = columns.motor_noise > 0 if "motor_noise" in of_noise else False
+        columns = columns.assign(value=run_values(columns), is_noisy=is_noisy)
     if status:
         is_ok = columns.status.astype(object) == "ok"
         rule = "a run must have a reward if its status is ok, and NaN otherwise"
-        refuse_rows(columns, "status", is_ok != columns.reward.notna(), rule)
+        is_wrong = (is_ok != columns.value.notna()) & ~(is_ok & columns.is_noisy)
+        refuse_rows(columns, "status", is_wrong, rule)
     return columns
 
 
@@ -133,34 +148,47 @@ def refuse_rows(frame: pd.DataFrame, column: str, wrong: ArrayLike, needed: str)
 def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     """Return a copy of checked columns with ``gap``, and with ``share`` if they have :data:`ZERO`.
 
-    gap = (best known - reward) / |best known|
-    share = (reward - zero) / (best known - zero), where zero is column :data:`ZERO`
+    gap = (best known - value) / |best known|
+    share = (value - zero) / (best known - zero), where zero is column :data:`ZERO`
 
-    Both are NaN if the reward or the best known reward is NaN. ``share`` is also NaN if zero is NaN
-    or equals the best known reward.
+    Both are NaN if the value or the best known reward is NaN. ``share`` is also NaN if zero is NaN,
+    or not below the best known reward.
 
     Raises
     ------
     CoarticError
-        - A reward or a best known reward is above 0.
+        - A value or a best known reward is above 0.
         - A best known reward is 0.
         - A reward is above the best known reward by more than rounding (:data:`NEGLIGIBLE`), or
-          :data:`ZERO` is above the best known reward.
+          :data:`ZERO` is above the best known reward. In noise both can be by chance.
     """
-    for name in ("reward", "best_known"):
+    for name in ("reward", "value", "best_known"):
         sign = "a reward must be minus the ticks; for a cost, such as best_cost, use the negative"
         refuse_rows(columns, name, columns[name] > 0, sign)
     share = "a gap is a share of the best known reward, which must be below 0"
     refuse_rows(columns, "best_known", columns.best_known == 0, share)
-    excess = columns.reward - columns.best_known
+    excess = (columns.value - columns.best_known).mask(columns.is_noisy)
     highest = "it is above best_known, which must be the highest reward of the task"
     refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
-    columns = columns.assign(gap=gap_share(columns.reward, columns.best_known))
+    columns = columns.assign(gap=gap_share(columns.value, columns.best_known))
     if ZERO not in columns:
         return columns
     possible = columns.best_known - columns[ZERO]
-    refuse_rows(columns, ZERO, possible < 0, highest)
-    return columns.assign(share=(columns.reward - columns[ZERO]) / possible.where(possible > 0))
+    refuse_rows(columns, ZERO, (possible < 0) & ~columns.is_noisy, highest)
+    return columns.assign(share=(columns.value - columns[ZERO]) / possible.where(possible > 0))
+
+
+def _refuse_worlds(frame: pd.DataFrame) -> None:
+    """Raise CoarticError if column ``world`` of a frame, if there is one, has several worlds."""
+    if "world" not in {*getattr(frame, "columns", ())}:
+        return
+    worlds = dict.fromkeys(frame.world.astype(object).where(frame.world.notna(), "").astype(str))
+    if len(worlds) > 1:
+        first = next(iter(worlds))
+        raise CoarticError(
+            f"column world has {listed(map(world_title, worlds))}; runs in different worlds "
+            f"are not compared. Take those in one world: frame[frame.world == {first!r}]"
+        )
 
 
 def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
@@ -177,7 +205,7 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     DataFrame
         A copy of the columns that are needed, with
 
-        - ``gap``, and ``share`` if the frame has ``corrective_best``;
+        - ``value``, ``gap``, and ``share`` if the frame has ``corrective_best``;
         - ``method``, which includes the setting if the method has several settings in the frame;
         - ``task``, the number of the task in the order of names, from 0;
         - ``key``, a number for each run, the same in all rows of the run. Rows belong to the same
@@ -187,9 +215,11 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        The frame is wrong (:func:`checked`, :func:`_with_gaps`), or a task has more than one
-        ``best_known`` or :data:`ZERO`.
+        The frame is wrong (:func:`checked`, :func:`_with_gaps`), it has runs in several worlds
+        (column ``world``), or a task has more than one ``best_known`` or, without noise, more than
+        one :data:`ZERO`.
     """
+    _refuse_worlds(frame)
     existing = [*getattr(frame, "columns", ())]
     numbers = (*SCORES, *[ZERO] * (ZERO in existing), *more)
     others = [name for name in ("setting", *_SOURCES) if name in existing]
@@ -198,6 +228,7 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     task = np.argsort(np.argsort([*map(str, tasks)], kind="stable"))[number]  # the order of names
     for name in {"best_known", ZERO} & {*columns}:
         is_ambiguous = columns[name].groupby(task).transform("nunique") > 1
+        is_ambiguous &= ~columns.is_noisy | (name != ZERO)  # in noise each run has a zero
         refuse_rows(columns, "task", is_ambiguous, f"the task must have one {name}, not several")
     names = columns.method.to_numpy(object)
     if "setting" in existing:
@@ -228,7 +259,8 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     ----------
     frame : DataFrame
         With columns ``reward`` (NaN for a failed run) and ``best_known`` (NaN if the task has no
-        best known reward), negative ticks.
+        best known reward), negative ticks. Runs in noise have ``mean_ticks`` in place of a reward,
+        and ``motor_noise`` above 0; their gaps can be negative by chance.
 
     Returns
     -------
@@ -242,7 +274,7 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
         - The frame has no rows, or a column is missing.
         - A value is neither a finite number nor missing (NaN), or a reward is above 0 (rewards are
           negative, costs positive).
-        - A reward is above the best known reward, or a best known reward is 0.
+        - A reward without noise is above the best known reward, or a best known reward is 0.
 
     Examples
     --------
@@ -349,9 +381,9 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         A row for each pair of ``task`` and ``method`` (with the setting, as in :func:`ranking`), in
-        the order of first appearance. ``reward`` (negative ticks), ``gap`` and, if the frame has
-        ``corrective_best``, ``share`` are means over the runs that have such a number, NaN if no
-        run has one. ``n`` is the number of solved runs.
+        the order of first appearance. ``reward`` (negative ticks; in noise minus ``mean_ticks``),
+        ``gap`` and, if the frame has ``corrective_best``, ``share`` are means over the runs that
+        have such a number, NaN if no run has one. ``n`` is the number of solved runs.
 
     Raises
     ------
@@ -370,7 +402,7 @@ def by_task(frame: pd.DataFrame) -> pd.DataFrame:
     values = _scored_runs(frame).assign(task=frame.task)
     scores = [name for name in ("gap", "share") if name in values]
     groups = values.groupby(["task", "method"], sort=False)
-    table = groups.agg(reward=("reward", "mean"), n=("reward", "count")).join(groups[scores].mean())
+    table = groups.agg(reward=("value", "mean"), n=("value", "count")).join(groups[scores].mean())
     return table.reset_index()
 
 
@@ -390,9 +422,12 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         - ``budget``: the number of trials that was asked for, missing for a method without trials;
         - ``noisy_ticks``: mean ticks of the run's solution with motor noise, missing if executions
           fail;
-        - ``note``: what readers should know of the run, empty or missing for nothing.
+        - ``note``: what readers should know of the run, empty or missing for nothing;
+        - ``mean_ticks`` and ``motor_noise``: in a world with noise (above 0) a run has mean ticks,
+          not a reward;
+        - ``world``: the world of the run, which all runs must share; empty for the paper's.
 
-        ``load(folder).runs`` has all of them.
+        ``load(folder).runs`` has all of them; ``load(folder).worlds`` has a study for each world.
 
     Returns
     -------
@@ -421,7 +456,8 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     ------
     CoarticError
         A column or a name is missing, a reward is wrong (:func:`gaps`), a task has more than one
-        best known reward, a run has two rows, or methods have different budgets.
+        best known reward, a run has two rows, methods have different budgets, or runs are in
+        different worlds.
 
     Examples
     --------
@@ -478,7 +514,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
             fails = bool(why) or solved.noisy_gap.isna().any()
             row |= (Estimate(np.nan) if fails else task_mean(parts)).columns("noisy_gap")
         counts = {"tasks": len(by_task), "runs": len(of_method)}
-        rows.append(row | counts | {"failed": int(of_method.reward.isna().sum()), "why": why})
+        rows.append(row | counts | {"failed": int(of_method.value.isna().sum()), "why": why})
         if "note" in runs:
             rows[-1]["note"] = "; ".join(filter(None, map(str, of_method.note.dropna().unique())))
     methods = pd.Index([*runs.method.unique()], name="method", tupleize_cols=False)

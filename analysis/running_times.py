@@ -25,6 +25,7 @@ from coartic.errors import CoarticError
 from coartic.estimates import FEWER_RESAMPLES, FEWEST, IN_CACHE, SEED, TAILS, Estimate, slices
 from coartic.internal.limits import brief_value, real_array
 from coartic.robot import Array
+from coartic.runs.plan import world_title
 
 SPENDS = ("trials", "forward_kinematics", "solve_s")
 """Costs, as columns of :attr:`.Study.runs`; ``solve_s`` is wall time, in s."""
@@ -179,12 +180,15 @@ def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
 
 
 @lru_cache(maxsize=4)
-def target_ranges(study: Study) -> dict[str, tuple[float, int]]:
+def target_ranges(study: Study) -> dict[str, tuple[float, float]]:
     """Return the two rewards between which the targets of each task lie, by task name.
 
     They are :attr:`.Study.corrective_best` and the best known reward, both in negative ticks. A
-    task is left out if one of the two is missing, or if both are equal.
+    task is left out if one of the two is missing, or if both are equal. In a world with noise there
+    are no targets, because the reward of a single trial there is partly luck.
     """
+    if study.is_noisy:
+        return {}
     zero = study.corrective_best
     rewards = {name: (zero[name], best.reward) for name, best in study.optima.items()}
     return {name: pair for name, pair in rewards.items() if pair[0] < pair[1]}  # False for NaN
@@ -309,10 +313,16 @@ def runtimes(
     Raises
     ------
     CoarticError
-        The folder is not a results folder, targets are out of bounds, or no task has a best known
-        reward above the reward of the corrective process alone.
+        The folder is not a results folder, it has runs in several worlds or in a world with noise,
+        targets are out of bounds, or no task has a best known reward above the reward of the
+        corrective process alone.
     """
     study = results if isinstance(results, Study) else load(results)
+    if study.is_noisy:
+        raise CoarticError(
+            f"{study.folder} has runs in {world_title(study.world)}, where the reward of a single "
+            "trial is partly luck: running times need a world without motor noise"
+        )
     shares = np.empty(0)
     with suppress(ValueError):  # not numbers, or masked
         shares = real_array("targets", targets)

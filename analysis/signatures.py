@@ -47,6 +47,7 @@ from coartic.estimates import (
     slices,
 )
 from coartic.internal.arguments import Numbers
+from coartic.model import PAPER, MotionModel
 from coartic.motion.trials import reach_goals
 from coartic.robot import HANDS, Array
 from coartic.tasks.optima import HASHED_FIELDS
@@ -69,6 +70,9 @@ class Solutions:
     0 if the runs are not recorded."""
     deterministic: bool = False
     """True if all runs of the method on this task are equal by construction."""
+    model: MotionModel = PAPER
+    """The world, without motor noise, in which the runs were executed, and in which the corrective
+    process is compared with them."""
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
@@ -101,7 +105,9 @@ class Solutions:
         corrective process does not complete the task with them.
         """
         hand_sequences = {run.hands for run in self.runs}
-        references = {hands: corrective_trial(self.task, hands) for hands in hand_sequences}
+        references = {
+            hands: corrective_trial(self.task, hands, model=self.model) for hands in hand_sequences
+        }
         changes = np.full((len(self.runs), len(self.task.goals)), np.nan)
         for row, run in zip(changes, self.runs, strict=True):
             if (reference := references[run.hands]).completed:
@@ -109,10 +115,10 @@ class Solutions:
         return changes
 
 
-def initial_solution(task: Task) -> Execution | None:
+def initial_solution(task: Task, model: MotionModel = PAPER) -> Execution | None:
     """Return the execution of the corrective process alone with the initial hands of a task.
 
-    Returns None if
+    ``model`` is a world without noise. Returns None if
 
     - the corrective process does not complete the task with the initial hands;
     - the task does not name initial hands, and no hand sequence that its policy allows completes
@@ -120,7 +126,7 @@ def initial_solution(task: Task) -> Execution | None:
     - the task does not name initial hands, and there are more than 4,096 hand sequences to try.
     """
     try:
-        execution = corrective_trial(task, initial_hands(task))
+        execution = corrective_trial(task, initial_hands(task, model=model), model=model)
     except NotApplicableError:
         return None
     return execution if execution.completed else None
@@ -132,7 +138,7 @@ def _other(hand: Hand) -> Hand:
 
 
 def isolated_reaches(
-    task: Task, q: Array, goals: ArrayLike, hands: ArrayLike
+    task: Task, q: Array, goals: ArrayLike, hands: ArrayLike, model: MotionModel = PAPER
 ) -> tuple[Array, Array]:
     """Reach single goals by the corrective process, and return ticks and final configurations.
 
@@ -145,6 +151,8 @@ def isolated_reaches(
         Configurations at the start, in length units and rad.
     goals, hands : array_like of int, shapes that broadcast to (...)
         Numbers of goals, from 1, and indices of hands in HANDS.
+    model : MotionModel
+        A world without noise.
 
     Returns
     -------
@@ -175,6 +183,7 @@ def isolated_reaches(
         task.goal_array[np.broadcast_to(goals, shape).ravel() - 1],
         task.radius,
         locked_base=task.locked_base,
+        model=model,
     )
     ticks = np.where(reached.hit, reached.ticks, np.nan)
     return ticks.reshape(shape), reached.q.reshape(q.shape)
@@ -198,13 +207,15 @@ def gain_at_next(runs: Solutions) -> Array:
     task, hands = runs.task, runs.hands
     goals = 1 + np.arange(len(task.goals))
     now, following = np.s_[:, :-1], np.s_[:, 1:]
-    isolated, corrective = isolated_reaches(task, runs.starts[now], goals[:-1], hands[now])
+    starts = runs.starts[now]
+    isolated, corrective = isolated_reaches(task, starts, goals[:-1], hands[now], runs.model)
     idle = np.zeros((len(HANDS), task.robot.dof), dtype=np.bool_)
     for number, hand in enumerate(HANDS):
         idle[number, task.robot.joints(_other(hand))] = True
     hit = np.where(idle[hands[now]], corrective, runs.configurations[now])
     after, nearer = (
-        isolated_reaches(task, q, goals[1:], hands[following])[0] for q in (corrective, hit)
+        isolated_reaches(task, q, goals[1:], hands[following], runs.model)[0]
+        for q in (corrective, hit)
     )
     return np.where(np.isnan(isolated), np.nan, after - nearer)
 
@@ -222,7 +233,7 @@ def ticks_slower(runs: Solutions) -> Array:
     goals = 1 + np.arange(len(runs.task.goals))
     isolated = np.full((len(HANDS), *runs.hands.shape), np.inf)
     for hand in map(HANDS.index, runs.task.hands):
-        reached, _ = isolated_reaches(runs.task, runs.starts, goals, np.array(hand))
+        reached, _ = isolated_reaches(runs.task, runs.starts, goals, np.array(hand), runs.model)
         isolated[hand] = np.where(np.isnan(reached), np.inf, reached)
     chosen = np.take_along_axis(isolated, runs.hands[None], axis=0)[0]
     slower: Array = np.full_like(chosen, np.inf)
@@ -338,7 +349,7 @@ def other_arm(runs: Solutions) -> Array:
     - on a task for one hand, or without an initial solution (:func:`initial_solution`);
     - for a run in which :func:`preshaping` is NaN for all goals.
     """
-    initial = initial_solution(runs.task)
+    initial = initial_solution(runs.task, runs.model)
     if not runs.runs or initial is None or len(runs.task.hands) < 2:
         return np.full(len(runs.runs), np.nan)
     values = np.array([preshaping(runs.task, run, initial) for run in runs.runs])

@@ -13,9 +13,10 @@ import pandas as pd
 
 from coartic.analysis.frames import ranking
 from coartic.analysis.methods import BY_TRIAL
-from coartic.analysis.study import Study
+from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import listed, number
 from coartic.internal.text import counted
+from coartic.runs.record import NOISE_RULE
 
 
 def reference(study: Study, tasks: Iterable[str]) -> str:
@@ -38,6 +39,10 @@ def reference(study: Study, tasks: Iterable[str]) -> str:
     return " or ".join(names)
 
 
+NOT_HERE = "no runs in this world"
+"""Why a method is not ranked that has runs only in other worlds of the folder."""
+ESTIMATES, COUNTS = ("gap", "share", "noisy_gap"), ("tasks", "runs", "failed")
+"""Columns of numbers of :func:`.ranking`."""
 _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "parameters", "information"]
 """Columns of runs that no ranking uses. Dropping them saves memory for a large folder."""
 
@@ -46,9 +51,12 @@ _OF_RECORD = ["reason", "date", "commit", "packages", "result", "used", "paramet
 def compared_runs(study: Study) -> pd.DataFrame:
     """Return the runs that the ranking uses, including failed runs.
 
+    The study must have one world (:attr:`.Study.worlds`).
+
     These are the runs of all methods except searches for the optimum, on tasks with a best known
     reward. The columns :data:`_OF_RECORD` are left out. The frame is cached: do not change it.
     """
+    check_study(study)
     runs = study.runs[study.runs.best_known.notna()].drop(columns=_OF_RECORD, errors="ignore")
     runs.attrs = {}  # pandas would copy attrs with every selection
     return runs[~runs.label.map(study.methods.is_search).astype(bool)]
@@ -129,11 +137,20 @@ def standings(study: Study) -> pd.DataFrame:
 
         - how many trials the solved runs of a method from a file made, if a run was asked for
           another number;
-        - how many of a method's solutions can fail with motor noise.
+        - how many of a method's solutions, found in the paper's world, can fail with motor noise;
+        - in a world with noise, how many executions failed.
+
+        Methods that have runs only in other worlds (:attr:`.Study.elsewhere`) have a row, too.
     """
     runs, budget = compared_runs(study), ranking_budget(study)
+    elsewhere = study.elsewhere
+    if len(elsewhere):
+        elsewhere = elsewhere[~elsewhere.is_search.astype(bool)]
+        elsewhere = elsewhere.assign(why=NOT_HERE, note="", **dict.fromkeys(COUNTS, 0))
     if not len(runs):
-        return pd.DataFrame(columns=["gap", "noisy_gap", "runs", "why", "note", *study.methods])
+        estimates = [f"{name}{end}" for name in ESTIMATES for end in ("", "_low", "_high")]
+        columns = [*estimates, "without_gain", *COUNTS, "why", "note", *study.methods]
+        return elsewhere.reindex(columns=columns)
     by_method = runs_by_method(study)
     rows = ranking(runs.drop(columns="budget")).loc[[*by_method]].join(study.methods)
     reasons, notes = [], []
@@ -145,17 +162,22 @@ def standings(study: Study) -> pd.DataFrame:
         )
         reasons.append("; ".join(filter(None, [row.why, trials])))
         due = max([*asked, budget or 0])
-        made = of_method.trials[of_method.reward.notna()].dropna().astype(int)
+        made = of_method.trials[of_method.value.notna()].dropna().astype(int)
         is_told = not row.built_in and row.information == BY_TRIAL and due and (made != due).any()
         ends = dict.fromkeys([made.min(), made.max()])
-        fragile = int((of_method.reward.notna() & of_method.noisy_ticks.isna()).sum())
+        is_executed = (of_method.noise_rule == NOISE_RULE) & of_method.reward.notna()
+        fragile = int((is_executed & of_method.noisy_ticks.isna()).sum())
+        failed = int(of_method.failed_executions.sum())
         note = [
             f"made {' to '.join(map(number, ends))} of {number(due)} trials" * bool(is_told),
             f"{fragile} of {counted(len(of_method), 'solution')} can fail with motor noise"
             * bool(fragile),
+            f"{counted(failed, 'execution')} failed" * bool(failed),
         ]
         notes.append("; ".join(filter(None, note)))
     rows = rows.assign(why=reasons, note=notes)
+    if len(elsewhere):
+        rows = pd.concat([rows, elsewhere])
     return rows.sort_values(
         ["why", "gap"], key=lambda column: column != "" if column.name == "why" else column
     )
@@ -169,5 +191,5 @@ def solved_tasks(study: Study, method: str) -> tuple[str, ...]:
     """
     runs = compared_runs(study)
     runs = runs[(runs.ranked_as == method) | (runs.label == method)]
-    failed = {*runs.task[runs.reward.isna()]}
+    failed = {*runs.task[runs.value.isna()]}
     return tuple(str(task) for task in dict.fromkeys(runs.task) if task not in failed)

@@ -15,7 +15,7 @@ import html
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -77,6 +77,7 @@ from coartic.analysis.words import (
     NONE,
     RECONSTRUCTED,
     commonest,
+    ending_of,
     id_of,
     in_brackets,
     latex,
@@ -97,6 +98,7 @@ from coartic.estimates import (
 from coartic.internal.text import counted, one_line
 from coartic.motion.execution import initial_reward
 from coartic.robot import Array
+from coartic.runs.plan import world_title
 
 Row = dict[str, Any]
 Rows = Iterator[tuple[str, Row]]
@@ -246,9 +248,26 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
 
 
 def caption_of(table: Table, study: Study) -> str:
-    """Return the caption of a table with the study's number of tasks and reference."""
+    """Return the caption of a table with the study's number of tasks, reference and world."""
     caption = table.caption.replace("{tasks}", counted(len(ranked_tasks(study)), "task"))
-    return caption.replace("{reference}", reference(study, study.optima))
+    caption = caption.replace("{reference}", reference(study, study.optima))
+    return caption + f" ({world_title(study.world)})" * bool(study.world)
+
+
+def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
+    """Return a table of several worlds, keyed by world (:attr:`.Study.worlds`), as CSV.
+
+    The rows of all worlds are in one file, so that one frame has them, and column ``world`` tells
+    them apart. It is left out if there is only the paper's world.
+    """
+    if [*frames] == [""]:
+        return csv_of(frames[""])
+    parts = []
+    for world, frame in frames.items():
+        parts.append(frame.copy())
+        parts[-1].insert(0, "world", world)
+    rows = pd.concat([part for part in parts if len(part)])
+    return csv_of(rows.assign(run_ids=rows.pop("run_ids")))
 
 
 def csv_of(frame: pd.DataFrame) -> str:
@@ -286,6 +305,7 @@ def shown_columns(
         **{str(task.family): str(task.family).split("/")[0] for task in study.tasks.values()},
         **{name: marked(task) for name, task in study.tasks.items()},
         **study.methods.title,
+        **dict(study.elsewhere.get("title", {})),
         **_USES,
     }
     to, shown = reference(study, study.optima), dict[str, ShownColumn]()
@@ -344,13 +364,15 @@ def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
     """Return a table as HTML, made by pandas' Styler.
 
     - If the table has gaps on tasks, whose runs can be played, the cell in row 2 and column 3 has
-      the id ``T_ID_row2_col3``, where ``ID`` is the table's id.
+      the id ``T_ID_row2_col3``, where ``ID`` is the table's id with :func:`.ending_of`.
     - Cells without a value are empty.
     - Cells of columns that are not numbers have the class ``text``.
     - Rows of methods from files have the class ``own``, unless all methods are from files.
     """
     columns = shown_columns(table, study, frame)
-    built_in = {"", *study.methods.index[study.methods.built_in.astype(bool)]}
+    built_in = {""}
+    for methods in filter(len, (study.methods, study.elsewhere)):
+        built_in |= {*methods.index[methods.built_in.astype(bool)]}
     is_own = ~frame.get("method", pd.Series("", frame.index)).isin(built_in).to_numpy()
     own = np.where(is_own & (not is_own.all()), "own ", "")
     texts = {
@@ -361,7 +383,8 @@ def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
     cells = pd.DataFrame(texts)
     classes = pd.DataFrame({name: own + kind for name, kind in kinds.items()})
     has_ids = any(column.name == "on " for column in table.columns)  # ids are half of the page
-    styler = Styler(cells, uuid=table.id, uuid_len=len(table.id), cell_ids=has_ids)
+    uuid = table.id + ending_of(study)
+    styler = Styler(cells, uuid=uuid, uuid_len=len(uuid), cell_ids=has_ids)
     styler.hide(axis="index")
     styler.set_td_classes(classes).format(escape="html")
     styler.set_table_styles(
@@ -392,7 +415,7 @@ def latex_of(table: Table, study: Study, frame: pd.DataFrame, notes: Sequence[st
             hrules=True,
             column_format="".join("r" if column.is_number else "l" for column in columns.values()),
             caption=latex(caption_of(table, study)),
-            label=f"tab:coartic-{table.id}",
+            label=f"tab:coartic-{table.id}{ending_of(study)}",
         )
     )
     if "†" in body or any("†" in note for note in notes):
@@ -462,9 +485,7 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
             learner = study.cells.get((name, EC4 if len(task.hands) > 1 else EC1))
             if runs is None or learner is None or runs is learner:
                 continue
-            rewards, learned = (
-                solved(cell).reward.to_numpy(np.float64) for cell in (runs, learner)
-            )
+            rewards, learned = (solved(cell).value.to_numpy(np.float64) for cell in (runs, learner))
             if len(rewards) == len(runs) and len(learned) == len(learner):
                 ahead.append(bool(rewards.mean() > learned.mean()))
                 if min(len(learned), len(rewards) if stochastic else FEWEST) < FEWEST:
@@ -487,10 +508,14 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
 def _gaps_after(study: Study, trials: int) -> pd.Series:
     """Return the gap that each ranked method had after ``trials`` trials, a mean over tasks.
 
+    All are NaN in a world with noise, where the best trial so far is partly luck.
+
     The gap of a run is the gap of its best trial so far. Runs without rewards of trials keep their
     final gap. The mean is NaN if a run had no solution by then. The index has the labels.
     """
     learned, runs = improvements(study), compared_runs(study)
+    if study.is_noisy:
+        return pd.Series(math.nan, runs.ranked_as.unique())
     best = [
         float(best_after(learned[run_id], trials))
         if not math.isnan(reward) and len(learned.get(run_id, ((),))[0])
@@ -511,7 +536,7 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
     single = [task for task in ranked_tasks(study) if task in study.individual_tasks]
     early = _gaps_after(study, _EARLY).to_dict() if ranked and len(rows) else {}
     for label, row in rows.iterrows():
-        runs = runs_by_method(study)[str(label)]
+        runs = runs_by_method(study).get(str(label), compared_runs(study)[:0])
         gaps = runs.groupby("task").gap.mean()
         counts = [
             counts
@@ -543,8 +568,7 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
 
 
 @table(
-    "Gap and share of the possible gain, means over {tasks}, and gap on each. Motor noise is added "
-    "when a solution is executed, and the gap then is to the {reference} without noise",
+    "Gap and share of the possible gain, means over {tasks}, and gap on each",
     """
     method             | method                            |   | tex
     gap[]              | gap (%)                           | 1 | tex
@@ -648,7 +672,7 @@ def list_differences(study: Study) -> Rows:
             name = names[0] if len(names) == 1 else row
             budgets = {*runs.budget.dropna()}
             is_fair = budgets == asked or not (budgets and asked) or ranking_budget(study) is None
-            if len(runs) and runs.reward.notna().all() and is_fair and name != against:
+            if len(runs) and runs.value.notna().all() and is_fair and name != against:
                 found.append((_difference_of_gaps(study, name, against, tasks), name))
         adjusted = holm([difference.p for difference, _ in found]) if found else []
         in_order = sorted(zip(found, adjusted, strict=True), key=lambda item: item[0][0].value)
@@ -923,14 +947,15 @@ def list_saved(study: Study) -> Rows:
 def list_runtimes(study: Study) -> Rows:
     """Yield what it costs each method to reach a quarter and half of the targets (:data:`COSTS`).
 
-    Methods without a solution, or with an unknown number of trials, are left out. The row also has
+    Methods without a solution, or with an unknown number of trials, are left out, and so are
+    worlds with noise. The row also has
     the share of targets reached. For methods that use the reward of each trial, ``half on *`` is
     the median number of trials to the target halfway to the optimum on a task. It is infinite if
     most runs do not reach this target.
     """
     for method, runs in runs_with_targets(study).items():
         times = {spend: times_on_tasks(study, runs, spend) for spend in SPENDS}
-        if runs.reward.isna().all() or not all(map(len, times["trials"])):
+        if runs.value.isna().all() or not all(map(len, times["trials"])):
             continue
         reached = share_reached(times["trials"])
         row: Row = {"method": method, "reached": reached, "trials": runs.trials.max()}
@@ -963,8 +988,10 @@ def list_learning(study: Study) -> Rows:
     A method, unless it is a search, has a row for each individual task on which all of its runs
     have a solution and made at least 100 trials. Rewards are means over runs, negative
     ticks, after each number of trials in :data:`BUDGETS`. A reward is NaN if not all runs made so
-    many trials, or a run had no solution by then.
+    many trials, or a run had no solution by then. In a world with noise there are no rows.
     """
+    if study.is_noisy:  # the best trial so far is partly luck
+        return
     learned = improvements(study)
     for (task, label), runs in study.cells.items():
         is_shown = task in study.individual_tasks and not study.methods.is_search[label]
@@ -999,7 +1026,7 @@ def on_instances(study: Study) -> pd.DataFrame:
     """
     runs = compared_runs(study)
     names = [*itertools.chain.from_iterable(_instances(study).values())]
-    failed = runs.reward.isna().groupby([runs.ranked_as, runs.task]).transform("any")
+    failed = runs.value.isna().groupby([runs.ranked_as, runs.task]).transform("any")
     runs = runs[runs.task.isin(names) & ~failed]
     place = pd.Categorical(runs.task, names)
     runs = runs.assign(place=place, method=runs.ranked_as)
@@ -1089,17 +1116,20 @@ def list_tasks(study: Study) -> Rows:
     """Yield the best known reward of each individual task, and what corrections alone get.
 
     ``initial`` and ``best_hands`` are the rewards of the corrective process alone with the
-    initial and with the best hands. All rewards are negative ticks.
+    initial and with the best hands. All rewards are negative ticks. In a world with noise
+    ``initial`` is missing, and ``best_hands`` is the mean of :attr:`.Study.corrective_best`.
     """
     for name, task in study.individual_tasks.items():
         best, locked = study.optima.get(name), " and ".join(task.locked_base)
         alone = study.sequences(name).reward.dropna()
+        with_best = float(alone.max()) if len(alone) else math.nan
+        initial = None if study.is_noisy else initial_reward(task, study.models[name])
         row: Row = {
             "task": marked(task),
             "arms": len(task.hands),
             "base": f"locked in {locked}" if locked else "free",
-            "initial": initial_reward(task),
-            "best_hands": float(alone.max()) if len(alone) else math.nan,
+            "initial": initial,
+            "best_hands": study.corrective_best[name] if study.is_noisy else with_best,
             "optimum": best.reward if best else None,
             "source": best.source if best else None,
             "bound": best.bound if best else None,
@@ -1129,16 +1159,17 @@ def list_tasks(study: Study) -> Rows:
 def list_methods(study: Study) -> Rows:
     """Yield the rewards, hands and median costs of each method on each individual task.
 
-    Rewards are negative ticks. Within a task, searches for the optimum come first; the other
-    methods follow, the highest mean reward first. ``median_run`` is the beginning of the id of the
-    run whose reward is nearest to the median, or None if no run is solved.
+    Rewards are negative ticks, in a world with noise minus the mean ticks of a run. Within a task,
+    searches for the optimum come first; the other methods follow, the highest mean reward first.
+    ``median_run`` is the beginning of the id of the run whose value is nearest to the median, or
+    None if no run is solved.
     """
     places, rows = {task: place for place, task in enumerate(study.individual_tasks)}, []
     for (task, label), runs in study.cells.items():
         if task not in places:
             continue
         good = solved(runs)
-        rewards = good.reward.to_numpy(np.float64)
+        rewards = good.value.to_numpy(np.float64)
         row = _named(study, runs) | {
             "solved": len(good),
             "reward": rewards.mean() if len(good) else math.nan,

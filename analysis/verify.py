@@ -24,6 +24,7 @@ Acquisition*):
   made while the goal is not hit.
 - A path leads through waypoints, and stops on a hit or at its end.
 - The targets of corrective movements are stored; the corrective process is not run again.
+- With motor noise a run stores what its method recommends, without ticks: it is not executed.
 """
 
 from __future__ import annotations
@@ -105,7 +106,7 @@ def stored_task(content: str) -> Any:
     """Return the task of a cell from the cell's stored JSON.
 
     Further attributes are the constants of movement (``model``), the start (``q0``), locked
-    coordinates, arms, the hash of the cell (``digest``), and names of task, method and setting.
+    coordinates, arms, the hash of the cell (``digest``), and names of task, method, setting, world.
     """
     plain = json.loads(content)
     cell = json.loads(content, object_hook=lambda values: SimpleNamespace(**values))
@@ -113,7 +114,8 @@ def stored_task(content: str) -> Any:
     task.model = SimpleNamespace(**WORLD | vars(cell.model))
     method, given = plain["method"], plain["parameters"]
     changed = [f"{name}={x}" for name, x in given.items() if x != method["defaults"].get(name)]
-    task.labels = task.name, method["name"], ", ".join(changed)
+    world = [f"{name}={x}" for name, x in vars(task.model).items() if x != WORLD.get(name, x)]
+    task.labels = task.name, method["name"], ", ".join(changed), ", ".join(world)
     plain["method"] = method["name"]
     text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
     task.digest = hashlib.sha256(text.encode()).hexdigest()
@@ -190,31 +192,35 @@ def make(
     return points[:, k], k + 1, bool(hits[k])
 
 
-def _recompute(task: Any, movements: list[list[Any]]) -> tuple[int, str, int, float]:
+def _recompute(task: Any, movements: list[list[Any]]) -> tuple[Any, ...]:
     """Make all movements of a part of a run again.
 
     Each movement is a list of its goal (from 1), hand, kind, ticks, and path as JSON. Raises
     ValueError if a rule is broken or ticks differ from the stored ones.
 
-    Returns
-    -------
-    (int, str, int, float)
-        Reward, letters of the hands, number of corrections, and the distance in joint space (in
-        rad) that idle arms travel, added over goals.
+    Returns reward, letters of the hands, number of corrections, and the distance in joint space (in
+    rad) that idle arms travel, added over goals. In noise it only returns None and the letters.
     """
     goals = [movement[0] for movement in movements]
     order = [*range(1, len(task.goals) + 1)]
     need(goals == sorted(goals) and sorted({*goals}) == order, f"its goals are {goals}")
     q, reward, letters, corrections, travel = task.q0, 0, "", 0, 0.0
+    is_noisy = task.model.motor_noise > 0.0
     for goal in order:
         to_goal, before, hit = [move for move in movements if move[0] == goal], q, False
         hand = to_goal[0][1]
         need(hand in task.hands, f"the task has no {hand} hand")
         for _, same_hand, kind, stored, text in to_goal:
             need(same_hand == hand, f"goal {goal} has two hands")
-            corners = np.atleast_2d(np.array(json.loads(text), dtype=np.float64))
+            numbers = json.loads(text) if text else [math.nan] * len(task.q0)
+            corners = np.atleast_2d(np.array(numbers, dtype=np.float64))
             is_locked = ((corners == task.q0) | np.isnan(corners))[:, task.locked].all()
             need(is_locked, "a movement moves a locked base")
+            if is_noisy:
+                hit, is_aim = True, not (np.isnan(corners).all() or np.isinf(corners).any())
+                is_answer = stored is None and is_aim == (kind != "corrective")
+                need(is_answer, f"a movement to goal {goal} is no answer in noise")
+                continue
             end, ticks, hits = make(task, q, goal, hand, kind, corners)
             if hit or (kind == "corrective" and hits and ticks == 1):
                 # The hand is in the goal already. A movement of 0 ticks without change names it.
@@ -229,7 +235,7 @@ def _recompute(task: Any, movements: list[list[Any]]) -> tuple[int, str, int, fl
         letters += hand[0].upper()
         other = task.arms["right" if hand == "left" else "left"][0]
         travel += math.dist(q[other], before[other])
-    return reward, letters, corrections, travel
+    return (None, letters) if is_noisy else (reward, letters, corrections, travel)
 
 
 class Report(NamedTuple):
@@ -258,7 +264,8 @@ def check_runs(folder: Path) -> Report:
         (state,) = db.execute("PRAGMA integrity_check(1)").fetchone()
         need(state == "ok", f"it is damaged: {state}")
         runs, movements, wrong = 0, 0, list[str]()
-        for row in db.execute("SELECT * FROM results LEFT JOIN cells ON id = cell"):
+        columns = "*, '' AS world" if version == 7 else "*"  # format 7 has only the paper's world
+        for row in db.execute(f"SELECT {columns} FROM results LEFT JOIN cells ON id = cell"):
             runs += 1
             try:
                 movements += _check_run(row)
@@ -283,7 +290,7 @@ def _check_run(row: Any) -> int:
     words = np.frombuffer(hashlib.sha256(task.name.encode()).digest()[:16], "<u4").tolist()
     sequence = np.random.SeedSequence(row["suite_seed"], spawn_key=(*words, row["run"]))
     need(row["seed"] == int(sequence.generate_state(1, "u8")[0]) >> 1, "its seed is another one")
-    labels = row["task"], row["method"], row["setting"]
+    labels = row["task"], row["method"], row["setting"], row["world"]
     need(task.labels == labels, f"it is listed as a run of {labels}, not of {task.labels}")
     parts, stored = json.loads(row["movements"]), [row["status"]]
     need(("solution" in parts) == (row["status"] == "ok"), f"its status is {row['status']}")
@@ -302,10 +309,7 @@ def _check_run(row: Any) -> int:
 
 
 def main() -> int:
-    """Check the folder that the command line names, and print the result.
-
-    Returns 0 if nothing differs or is missing, otherwise 1.
-    """
+    """Check the folder that the command line names; return 1 if it is not right, otherwise 0."""
     report = check_runs(Path(sys.argv[1]))
     print(f"{report.runs} runs checked, {report.movements} movements executed.")
     print(*(report.wrong or ["Nothing differs."]), *report.unfinished, sep="\n")

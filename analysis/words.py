@@ -15,6 +15,7 @@ from coartic.internal.text import one_line
 
 if TYPE_CHECKING:
     from coartic import Task
+    from coartic.analysis.study import Study
 
 _Digits = Annotated[int, Field(ge=0, le=30)]
 NONE = "–"
@@ -196,6 +197,14 @@ def slugs(names: Iterable[str]) -> dict[str, str]:
             slug = f"{base}-{count}"
         slug_of.setdefault(name, slug)
     return slug_of
+
+
+def ending_of(study: Study) -> str:
+    """Return the end of ids of tables and figures in a world, such as ``-motor-noise-0-01``.
+
+    It is empty for the paper's world.
+    """
+    return f"-{slugs([study.world])[study.world]}" if study.world else ""
 
 
 def latex(text: object) -> str:

@@ -187,23 +187,23 @@ def _failure(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 
 def _noise(info: MethodInfo, runs: _Runs) -> Iterator[str]:
     for task, run in runs.get(_NOISE, {}).items():
-        if run.outcome.reason:
+        if run["reason"]:
             noise = f"with motor noise {_WORLD.motor_noise:g}"
-            yield f"on {task}, {noise}: {run.outcome.status}: {run.outcome.reason}"
+            yield f"on {task}, {noise}: {run['status']}: {run['reason']}"
 
 
-def _is_best_trial(run: Run) -> bool:
+def _is_best_trial(run: Row) -> bool:
     """Return whether the answer of a run in noise is its best trial, as far as can be seen.
 
     The answer is executed under the draw that the best trial has met. If it is that trial, it takes
     the same ticks; any other answer does so only by chance.
     """
-    rewards = [-inf if reward is None else reward for reward in run.outcome.rewards]
+    rewards = [-inf if reward is None else reward for reward in run.rewards]
     if len({*rewards}) < 2:
         return False  # there was nothing to choose from
     task, best = run.cell.task, max(rewards)
-    worlds = worlds_of(world_seed(run.seed), rewards.index(best))
-    answer = next_action(run.solution.movements)
+    worlds = worlds_of(world_seed(run["seed"]), rewards.index(best))
+    answer = next_action(run.part("solution"))
     (execution,) = execute_many(compiled_task(task, run.cell.model), [answer], worlds)
     return isinstance(execution, Execution) and execution.reward == best
 

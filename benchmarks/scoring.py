@@ -7,13 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from coartic.benchmarks.provenance import current_environment, now
 from coartic.internal.text import LONGEST_REASON, plain
 from coartic.model import PAPER, same_world
 from coartic.motion.execution import Execution, execute_noisy
-from coartic.motion.initial_hands import best_hands
 from coartic.motion.solution import Movement, next_action
 from coartic.runs.plan import Job
 from coartic.runs.record import (
@@ -23,6 +20,7 @@ from coartic.runs.record import (
     Outcome,
     Row,
     execute_all,
+    judge,
     row_of,
 )
 
@@ -110,16 +108,12 @@ def with_noise(runs: Sequence[Row]) -> list[Row]:
 
 def _judge(runs: Sequence[Row], answers: Sequence[Sequence[Movement]]) -> list[dict[str, Any]]:
     """Return ``mean_ticks`` and ``failed_executions`` of the answers of runs in a noisy world."""
-    cell, exact = runs[0].cell, runs[0].cell.model.without_noise()
+    cell = runs[0].cell
     seeds = [run.job.judge_seed(run["run"]) for run in runs]
-    noise = cell.model.motor_noise
-    ticks = execute_noisy(cell.task, answers, noise, NOISY_EXECUTIONS, seeds, exact)
-    best = best_hands(cell.task, exact)
-    capped = np.where(np.isnan(ticks), np.nan if best is None else 2.0 * best[1], ticks)
-    means, failed = capped.mean(axis=1).tolist(), np.isnan(ticks).sum(axis=1).tolist()
+    means, failed = judge(cell.task, answers, cell.model, seeds)
     return [
         {"mean_ticks": _number(mean), "failed_executions": count}
-        for mean, count in zip(means, failed, strict=True)
+        for mean, count in zip(means.tolist(), failed.tolist(), strict=True)
     ]
 
 

@@ -122,10 +122,10 @@ EDITS = {  # what is said, and what was edited
     ),
     "that its id says": result(FAILED, "run = 60"),
     "its seed is another": result(TINY, "seed = seed + 1"),
-    "listed as a run of ('tiny', 'mine', '')": (
+    "listed as a run of ('tiny', 'mine', '', '')": (
         "UPDATE cells SET method = 'mine' WHERE task = 'tiny'",
     ),
-    "not of ('stuck', 'dual-process/EC1', 'noise_sd=0.1')": (
+    "not of ('stuck', 'dual-process/EC1', 'noise_sd=0.1', '')": (
         "UPDATE cells SET setting = '' WHERE task = 'stuck'",
     ),
     "rewards of more or fewer trials": result(LEARNER, "trials = trials - 1"),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -602,14 +603,21 @@ CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
 
 @figure(
     "Learning curves",
-    "Best reward so far (mean over runs; band: quartiles). n = {n} runs of a method on a task.",
+    "Mean over runs (band: quartiles) of",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
     """Draw the best reward so far against the trial, a panel for each task.
 
-    Curves are those of :func:`learning_curves`. Returns None if there is no curve.
+    Curves are those of :func:`learning_curves`. In a world with noise, where the best trial is
+    partly luck, they show the mean reward of the trials in each tenth of practice instead
+    (:func:`practice_curves`). Returns None if there is no curve.
     """
-    data = learning_curves(study)
+    if study.is_noisy:
+        data, shown = practice_curves(study), "mean"
+        more = "the mean reward of the trials in each tenth of a run, drawn at its middle."
+    else:
+        data, shown = learning_curves(study), "best"
+        more = "the best reward so far."
     if not len(data):
         return None
     tasks = [study.tasks[name] for name in data.task.unique()]
@@ -625,9 +633,9 @@ def draw_learning_curves(study: Study) -> Parts | None:
         for label, curve in of_task.groupby("method", sort=False):
             look = looks[str(label)]
             band: Any = {"color": look["color"], "alpha": 0.22, "linewidth": 0}
-            axes.fill_between(curve.trial, curve.best_low, curve.best_high, **band)
-            axes.plot(curve.trial, curve.best, **look)
-        floor, top = of_task.best.min(), of_task.best_high.max()
+            axes.fill_between(curve.trial, curve[f"{shown}_low"], curve[f"{shown}_high"], **band)
+            axes.plot(curve.trial, curve[shown], **look)
+        floor, top = of_task[shown].min(), of_task[f"{shown}_high"].max()
         zero, optimum = study.corrective_best[task.name], study.optima.get(task.name)
         if not math.isnan(zero):
             axes.axhline(zero, **style.INITIAL)
@@ -637,8 +645,11 @@ def draw_learning_curves(study: Study) -> Parts | None:
             top = max(top, optimum.reward)
         reach = max(top - floor, 1.0)  # 1 tick, if nothing is learned and no optimum is known
         axes.set_ylim(floor - 0.04 * reach, top + 0.06 * reach)
-        style.log_axis(axes)
-        axes.set_xlim(1, max(2, of_task.trial.max()))
+        if study.is_noisy:
+            axes.set_xlim(0, max(2, of_task.trial.max()))
+        else:
+            style.log_axis(axes)
+            axes.set_xlim(1, max(2, of_task.trial.max()))
         axes.set_title(marked(task))
         axes.set_ylabel("" if place % columns and style.is_narrow() else "reward (ticks)")
         axes.set_xlabel("trial" if place + columns >= len(tasks) else "")
@@ -654,9 +665,10 @@ def draw_learning_curves(study: Study) -> Parts | None:
     longest = max(len(str(handle.get_label())) for handle in handles)
     style.legend(drawing, handles, 2 if longest <= 40 else 1)
     ends = data.groupby(["task", "method"], sort=False).tail(1)
-    words = spoken(study, ends, "{task}, {title}: {best:.0f}")
-    alt = f"Reward against trial. Mean best reward at the end: {words}."
-    return drawing, data, alt, ""
+    words = spoken(study, ends, f"{{task}}, {{title}}: {{{shown}:.0f}}")
+    what = "reward" if study.is_noisy else "best reward"
+    alt = f"Reward against trial. Mean {what} at the end: {words}."
+    return drawing, data, alt, f" {more} n = {{n}} runs of a method on a task."
 
 
 def learning_curves(study: Study) -> pd.DataFrame:
@@ -677,18 +689,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
         - ``best_low`` and ``best_high``: quartiles.
     """
     learned, curves = improvements(study), [pd.DataFrame()]
-    cells = {
-        (task, label): runs
-        for (task, label), cell in study.cells.items()
-        if task in study.individual_tasks and len(runs := solved(cell[cell.run_id.isin(learned)]))
-    }
-    rows = study.methods[study.methods.index.isin([label for _, label in cells])]
-    drawn = headline_methods(rows[rows.base.isin(CURVES) | ~rows.built_in])
-    for task, label in itertools.product(study.individual_tasks, drawn):
-        two_armed = any((task, learner) in cells for learner in LEARNERS[1:])
-        if (task, label) not in cells or (two_armed and label == EC1):
-            continue
-        runs = cells[task, label]
+    for task, label, runs in _runs_with_curves(study, learned):
         at = np.unique(np.round(np.geomspace(1, int(runs.trials.min()), 120)).astype(np.int64))
         # Rewards are NaN until a run has a solution, and the mean is NaN until all runs have one.
         best = np.array([best_after(learned[run_id], at) for run_id in runs.run_id])
@@ -699,6 +700,53 @@ def learning_curves(study: Study) -> pd.DataFrame:
         named = {"task": task, "method": label, "runs": len(runs)}
         curves.append(pd.DataFrame(named | curve))
     return pd.concat(curves[1:] or curves, ignore_index=True)
+
+
+def practice_curves(study: Study) -> pd.DataFrame:
+    """Return the mean rewards of trials in each tenth of practice in a world with noise.
+
+    Runs and methods are those of :func:`learning_curves`. Failed trials have no reward.
+
+    Returns
+    -------
+    DataFrame
+        If there are no curves, it is empty and has no columns. Otherwise its columns are
+
+        - ``task``, ``method`` (label), and ``runs`` (number of runs);
+        - ``trial``: the middle of each tenth of the shortest run;
+        - ``mean``: mean over runs of the mean reward in the tenth, in negative ticks, NaN if a run
+          completed no trial in it;
+        - ``mean_low`` and ``mean_high``: quartiles.
+    """
+    practised, curves = study.runs[study.runs.practice.notna()], [pd.DataFrame()]
+    for task, label, runs in _runs_with_curves(study, practised.run_id):
+        means = -np.array([json.loads(text) for text in runs.practice], dtype=np.float64)
+        low, high = np.quantile(means, [0.25, 0.75], axis=0)
+        at = (np.arange(10) + 0.5) / 10 * float(runs.trials.min())
+        curve = {"trial": at, "mean": means.mean(axis=0), "mean_low": low, "mean_high": high}
+        named = {"task": task, "method": label, "runs": len(runs)}
+        curves.append(pd.DataFrame(named | curve))
+    return pd.concat(curves[1:] or curves, ignore_index=True)
+
+
+def _runs_with_curves(
+    study: Study, run_ids: Collection[str]
+) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """Yield task, label and solved runs of each curve (:func:`learning_curves`).
+
+    Only the runs in ``run_ids`` count.
+    """
+    cells = {
+        (task, label): runs
+        for (task, label), cell in study.cells.items()
+        if task in study.individual_tasks and len(runs := solved(cell[cell.run_id.isin(run_ids)]))
+    }
+    rows = study.methods[study.methods.index.isin([label for _, label in cells])]
+    drawn = headline_methods(rows[rows.base.isin(CURVES) | ~rows.built_in])
+    for task, label in itertools.product(study.individual_tasks, drawn):
+        two_armed = any((task, learner) in cells for learner in LEARNERS[1:])
+        if (task, label) in cells and not (two_armed and label == EC1):
+            yield task, label, cells[task, label]
 
 
 @figure(
@@ -747,7 +795,7 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
             diamond: Any = {"markersize": size, "markerfacecolor": style.BACKGROUND, "zorder": 4}
             axes.plot(mean["mean"], -place, "D", color=style.INK, **diamond)
         axes.set_xscale("symlog", linthresh=0.02, linscale=0.5)
-        axes.set_xlim(-0.004, 1.15)
+        axes.set_xlim(min(-0.004, 1.1 * data.gap.min()), 1.15)  # in noise a gap can be negative
         axes.set_xticks([0, 0.02, 0.1, 0.5], ["0", "2", "10", "50"])
         axes.minorticks_off()
         axes.set_title(family.partition("/")[0])

@@ -24,12 +24,13 @@ from coartic.analysis.figures.style import RC, drawn_at
 from coartic.analysis.methods import COLORS, MARKS
 from coartic.analysis.standings import reference
 from coartic.analysis.study import Study, check_study
-from coartic.analysis.words import RECONSTRUCTED, id_of, number
+from coartic.analysis.words import RECONSTRUCTED, ending_of, id_of, number
 from coartic.errors import CoarticError
 from coartic.internal.files import errors_in_words
 from coartic.internal.limits import brief_value
 from coartic.internal.text import one_line
 from coartic.internal.threads import environment
+from coartic.runs.plan import world_title
 
 FORMATS = (".svg", ".pdf", ".png")
 _LONGEST_NAME = 48  # longest line of a name, in characters; half as many in a narrow figure
@@ -88,7 +89,7 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 
     - The figure has the style of all figures.
     - Its id is the part of the function's name after the first underscore, with dashes for
-      underscores.
+      underscores, and :func:`.ending_of` in another world than the paper's, which its title names.
     - The caption is followed by the sentences that the function returns, and by an explanation of
       the dagger if one is drawn.
     - In the caption ``{n}`` stands for the range of column ``runs`` of the drawn numbers (empty if
@@ -112,7 +113,9 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
             ends = (data.runs.min(), data.runs.max()) if "runs" in data else ()
             to = reference(study, study.optima)
             n = " to ".join(dict.fromkeys(map(number, ends)))
-            return Plot(id_of(draw), title, words.format(n=n, reference=to), alt, drawing, data)
+            name = id_of(draw) + ending_of(study)
+            heading = f"{title}, in {world_title(study.world)}" if study.world else title
+            return Plot(name, heading, words.format(n=n, reference=to), alt, drawing, data)
 
         FIGURES[id_of(draw)] = plot
         return plot

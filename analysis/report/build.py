@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import html
 import os
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any
@@ -18,22 +19,22 @@ from coartic.analysis.figures.plot import Plot, for_page, panels_for_page, pictu
 from coartic.analysis.figures.style import ONE
 from coartic.analysis.report import sections
 from coartic.analysis.report.player import player
-from coartic.analysis.report.sections import SECTIONS, Section
+from coartic.analysis.report.sections import IN_NOISE, SECTIONS, Section
 from coartic.analysis.standings import reference
 from coartic.analysis.study import Study
 from coartic.analysis.tables import (
     TABLES,
     Table,
     caption_of,
-    csv_of,
+    csv_of_worlds,
     html_of,
     is_setting,
     latex_of,
 )
-from coartic.analysis.words import id_of, listed, marked, number
+from coartic.analysis.words import ending_of, id_of, listed, marked, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
 from coartic.play.page import part_of_page
-from coartic.runs.plan import hash_of
+from coartic.runs.plan import hash_of, world_title
 from coartic.runs.store import lock
 from coartic.tasks.task import shipped_tasks
 
@@ -52,7 +53,10 @@ def write_report(
 ) -> tuple[list[str], dict[str, str]]:
     """Write a report into a folder, and replace an earlier report of the same results.
 
-    The page ``report.html`` and tables as CSV are always written.
+    The page ``report.html`` and tables as CSV are always written. If the study has several worlds,
+    the page shows the first one, and each other world in a section of its own. A CSV file has the
+    rows of all worlds, with a column ``world``. A LaTeX file has a table for each world, because
+    headings and references differ. Names of figures end in their world.
 
     Parameters
     ----------
@@ -98,38 +102,45 @@ def write_report(
                     f"{folder} holds the report of other results; choose another folder"
                 )
         failures: dict[str, str] = {}
-        files = {"report.html": _page(study, home, failures, watch).encode()}
         names = {table.id: section.title for section in SECTIONS for table in section.tables}
-        for name, table in TABLES.items():
-            of_table = sections.attempt(
-                failures, names.get(name, name), _files_of_table, study, table, for_paper
-            )
-            files |= of_table or {}
-        for section in sections.visible_sections(study) if for_paper else ():
-            watch(f"{section.title}, for print")
-            files |= (
-                sections.attempt(failures, section.title, _files_of_figures, study, section, width)
-                or {}
-            )
+        shown, first = list[dict[str, Any]](), list[Plot]()
+        frames = defaultdict[str, dict[str, pd.DataFrame]](dict)
+        texts, files = defaultdict[str, list[str]](list), {"report.html": b""}
+        for world, of_world in study.worlds.items():  # all of a world, so that caches are small
+            of_page = [sections.section_of_world(of_world)]
+            if is_first := not shown:
+                of_page = sections.visible_sections(of_world)
+                first = sections.attempt(failures, "Pictures", _first_figures, of_world) or []
+            shown += _sections_shown(of_world, of_page, first * is_first, failures, watch)
+            for name, table in TABLES.items():
+                title = names.get(name, name)
+                frame = sections.attempt(failures, title, table, of_world)
+                if frame is not None and len(frame):
+                    frames[name][world] = frame
+                    if for_paper and (
+                        tex := sections.attempt(failures, title, _latex_of, of_world, table)
+                    ):
+                        texts[name].append(tex)
+            for section in of_page if for_paper else ():
+                watch(f"{section.title}, for print")
+                of_figures = sections.attempt(
+                    failures, section.title, _files_of_figures, of_world, section, width
+                )
+                files |= of_figures or {}
+        for name, of_worlds in frames.items():
+            files[f"tables/{name}.csv"] = csv_of_worlds(of_worlds).encode()
+        files |= {f"tables/{name}.tex": "\n".join(of).encode() for name, of in texts.items() if of}
+        files["report.html"] = _page(study, home, shown, first, failures).encode()
         publish(folder, files)
         return list(files), failures
 
 
-def _files_of_table(study: Study, table: Table, for_paper: bool) -> dict[str, bytes]:
-    """Return the contents of a table's files by path.
-
-    There is a CSV file and, with ``for_paper``, a LaTeX file if the table has columns for LaTeX.
-    The result is empty if the table has no rows.
-    """
-    frame = table(study)
-    if not len(frame):
-        return {}
-    files = {f"tables/{table.id}.csv": csv_of(frame).encode()}
-    if for_paper and any(column.in_latex for column in table.columns):
-        notes = sections.notes_of(study, frame.columns)
-        text = latex_of(table, study, _rows_shown(study, table), notes)
-        files[f"tables/{table.id}.tex"] = text.encode()
-    return files
+def _latex_of(study: Study, table: Table) -> str:
+    """Return a table of one world as LaTeX, or the empty string if it has no columns for LaTeX."""
+    if not any(column.in_latex for column in table.columns):
+        return ""
+    notes = sections.notes_of(study, table(study).columns)
+    return latex_of(table, study, _rows_shown(study, table), notes)
 
 
 def _files_of_figures(study: Study, section: Section, width: float | None) -> dict[str, bytes]:
@@ -162,10 +173,11 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
     - ``finding``: a list of lines;
     - ``figures``: for each figure except ``first``, those at the top of the page, a tuple of the
       plot, its SVG and the SVGs of its panels for phones (:func:`.panels_for_page`);
-    - ``shown``: for each table with rows, a dictionary of its ``id``, ``caption``, number of
-      ``rows`` and ``html``, and whether it is ``folded``.
+    - ``shown``: for each table with rows, a dictionary of its ``id``, name of its ``file``,
+      ``caption``, number of ``rows`` and ``html``, and whether it is ``folded``.
     """
-    draws = [draw for draw in section.figures if id_of(draw) not in {plot.id for plot in first}]
+    drawn = {plot.id for plot in first}
+    draws = [draw for draw in section.figures if id_of(draw) + ending_of(study) not in drawn]
     figures = [plot for draw in draws if (plot := draw(study)) is not None]
     has_figure = bool(figures) or len(draws) < len(section.figures)
     tables = []
@@ -173,7 +185,8 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
         if len(frame := _rows_shown(study, table)):
             is_long = table not in section.unfolded or len(frame) > LONG
             folded = is_long and (has_figure or not section.figures)
-            words = {"id": table.id, "caption": caption_of(table, study), "rows": len(frame)}
+            words: dict[str, Any] = {"id": table.id + ending_of(study), "file": table.id}
+            words |= {"caption": caption_of(table, study), "rows": len(frame)}
             tables.append({**words, "html": html_of(table, study, frame), "folded": folded})
     return {
         "finding": sections.finding(study, section),
@@ -211,16 +224,20 @@ def _heading_of(study: Study) -> str:
     return f"Coarticulation of a simulated robot: {subject}"
 
 
-def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[str], object]) -> str:
-    """Return the page as HTML, which needs no other file and no network.
+def _sections_shown(
+    study: Study,
+    of_page: Sequence[Section],
+    first: Sequence[Plot],
+    failures: dict[str, str],
+    watch: Callable[[str], object],
+) -> list[dict[str, Any]]:
+    """Return the sections of a world that have something to show, for the page's template.
 
-    ``home`` is the path from the page's folder to the results. Errors of parts that could not be
-    made are added to ``failures``, by the name of the part. ``watch`` is called with the title of
-    each section.
+    Errors of parts that could not be made are added to ``failures``, by the title of the section.
+    ``watch`` is called with the title of each section.
     """
-    first = sections.attempt(failures, "Pictures", _first_figures, study) or []
     shown = []
-    for section in sections.visible_sections(study):
+    for section in of_page:
         watch(section.title)
         parts = sections.attempt(failures, section.title, _parts_of, study, section, first)
         parts = parts or {"finding": [], "figures": [], "shown": []}
@@ -228,6 +245,23 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         if failure or parts["figures"] or parts["shown"]:
             note = section.note.replace("{reference}", reference(study, study.optima))
             shown.append({**vars(section), **parts, "failure": failure, "note": note})
+    return shown
+
+
+def _page(
+    study: Study,
+    home: str,
+    shown: Sequence[Mapping[str, Any]],
+    first: Sequence[Plot],
+    failures: dict[str, str],
+) -> str:
+    """Return the page as HTML, which needs no other file and no network.
+
+    ``home`` is the path from the page's folder to the results, ``shown`` are the sections, and
+    ``first`` the figures at the top. Errors of parts that could not be made are in ``failures``, by
+    the name of the part.
+    """
+    main = next(iter(study.worlds.values()))
     environment = Environment(
         loader=FileSystemLoader(HERE),
         undefined=StrictUndefined,
@@ -249,19 +283,21 @@ def _page(study: Study, home: str, failures: dict[str, str], watch: Callable[[st
         title=study.question[0] or _heading_of(study),
         question=study.question[1],
         styles=(HERE / "page.css").read_text("utf-8") + part_of_page("play.css"),
-        player=sections.attempt(failures, "Film", player, study) or "",
+        player=sections.attempt(failures, "Film", player, main) or "",
         script=(HERE / "page.js").read_text("utf-8"),
         sections=shown,
         first=[(plot, for_page(plot)) for plot in first],
         stage=stage,
         suite=study.suite,
         home=home,
-        stamp=stamp(study.runs),
+        stamp=stamp(study.stored),
         folder=study.folder_in_commands,
         version=made_with["coartic"],
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
-        limits=sections.limits(study),
+        limits=sections.limits(main) | sections.failures_in(study.stored),
+        worlds=[*map(world_title, study.worlds)] if [*study.worlds] != [""] else [],
+        in_noise=IN_NOISE if any(of.is_noisy for of in study.worlds.values()) else "",
         conditions={*study.methods.condition},
         failures=failures,
         links=dict(link.split(", ", 1) for link in links),

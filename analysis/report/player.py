@@ -17,6 +17,8 @@ from coartic.robot import HANDS
 def player(study: Study) -> str:
     """Return the interactive figure with the runs of a folder as HTML; empty without a preset.
 
+    It is also empty in another world than the paper's, in which the figure does not move.
+
     Presets:
 
     - There is a preset for each individual task that a method with straight movements solved. It
@@ -31,6 +33,8 @@ def player(study: Study) -> str:
     - otherwise the first method of the first preset.
     """
     presets, first = [], ""
+    if study.world:
+        return ""
     if (shared := shared_goal(study)) is not None and shared.goal == 1:
         (up, down), first = shared.tasks, shared.method
         both = {
@@ -78,11 +82,12 @@ def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
     An item has the id of the HTML cell, the task, and the label of the method's runs. Cells are of
     the tables of ranked methods and of methods that are not ranked.
     """
+    by_method = runs_by_method(study)
     for table in (list_ranking, list_not_ranked):
         frame = table(study)
         columns = [*shown_columns(table, study, frame)]
         for row, method in enumerate(frame.method):
-            for task, label in cells_of(runs_by_method(study)[method]):
+            for task, label in cells_of(by_method[method]) if method in by_method else ():
                 if f"on {task}" in columns:
                     column = columns.index(f"on {task}")
                     yield f"T_{table.id}_row{row}_col{column}", task, label

@@ -6,7 +6,7 @@ import math
 import traceback
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
 from pathlib import Path
@@ -31,8 +31,10 @@ from coartic.analysis.methods import (
     EC1,
     EC4,
     GROUPS,
+    KNOWN_METHODS,
     MARK,
     RANDOM_SEARCH,
+    SEARCHES,
     joined_label,
     title_of,
 )
@@ -64,6 +66,7 @@ from coartic.analysis.words import (
     NO_BREAK,
     capital,
     commonest,
+    ending_of,
     interval,
     listed,
     marked,
@@ -74,6 +77,7 @@ from coartic.errors import CoarticError
 from coartic.estimates import FEWEST, LEVEL
 from coartic.internal.text import error_line, one_line
 from coartic.method import TRIALS
+from coartic.runs.plan import world_title
 
 Made = TypeVar("Made")
 RUNS = 20
@@ -82,6 +86,17 @@ TOO_FEW = f" (too few runs to test, which needs {FEWEST})"
 _WITHOUT_ARTICLE = ("CMA-ES", "random search", "hill climbing", "posture planning")
 """Algorithms whose names have no article in a sentence."""
 NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer runs as points."
+
+
+IN_NOISE = (
+    "In a world with motor noise the reward of a run is minus the mean ticks of 100 fresh "
+    "executions of what its method recommends. The same draws of the noise judge all methods and "
+    "the corrective process. The best of this folder is one of the five best runs, by 1000 further "
+    "executions, so that a gap can be negative by chance. Signatures and pictures are of an "
+    "execution without noise. Running times are not shown, because the reward of a single trial is "
+    "partly luck."
+)
+"""What is different in a world with noise."""
 
 
 @dataclass(frozen=True)
@@ -180,6 +195,8 @@ exceed by so many percentage points (negative: their gap is smaller): \
 
 {% endfor %}""",
         note="The gap is the ticks of the mean reward beyond the {reference}, in per cent of it. "
+        "With motor noise a solution, found without noise, is executed with it, and the gap is to "
+        "the {reference} without noise. "
         "The share of the gain is 0 % for the corrective process alone with its best hands (with "
         "the task's initial hands if there are more than 4096 hand sequences), and 100 % for the "
         "{reference}; tasks on which both are equal have none. Intervals "
@@ -295,6 +312,22 @@ ascending=[true, false]) %}
 )
 
 
+def section_of_world(study: Study) -> Section:
+    """Return the section of the page that shows the study of a further world of a folder."""
+    return replace(
+        SECTIONS[0],
+        id=f"world{ending_of(study)}",
+        title=capital(world_title(study.world)),
+        tables=(*SECTIONS[0].tables, list_methods, list_failed),
+        figures=(draw_ranking, draw_learning_curves),
+        note="Methods practised and were judged in this world, and are only compared with each "
+        "other. Gaps are to the {reference} in this world, and the share of the gain is 0 % for "
+        "the corrective process with its best hands in this world. "
+        + f"{IN_NOISE} {NEEDS_RUNS}"
+        * study.is_noisy,
+    )
+
+
 def shown(text: str) -> str:
     """Return text as one printable line, with no-break spaces before per cent signs and daggers."""
     return one_line(text).replace(" %", f"{NO_BREAK}%").replace(" †", f"{NO_BREAK}†")
@@ -334,7 +367,7 @@ def finding(study: Study, section: Section) -> list[str]:
     section has no sentence, or if its first table has no rows and is not the ranking.
     """
     if not section.sentence or not len(section.tables[0](study)):
-        return ["No method is ranked."] * (section.id == "ranking")
+        return ["No method is ranked."] * (section.tables[0] is list_ranking)
     methods = study.methods
     built_in = methods.index[methods.built_in.astype(bool)]
     subjects = methods.apply(subject_of, axis=1)
@@ -442,7 +475,8 @@ def limits(study: Study) -> dict[str, Any]:
 
     A value is 0, False or empty if the limit does not apply.
 
-    - ``runs``, ``failed``: numbers of runs and of failed runs; ``reasons``: the most frequent ones;
+    - ``runs``, ``failed``, ``reasons``: as in :func:`failures_in`;
+    - ``searches``: ids of searches for the optimum in the study's world;
     - ``reconstructed``: titles of the individual tasks that are reconstructed;
     - ``unproven``, ``unknown``, ``own``: titles of the individual tasks whose best reward is not
       proven, is unknown, or is known only from this folder;
@@ -455,7 +489,6 @@ def limits(study: Study) -> dict[str, Any]:
     - ``imports``: packages that methods import, by title of the method.
     """
     runs, made_with = study.runs, study.made_with
-    failed = runs[runs.status != "ok"]
     algorithm, papers = study.methods.algorithm, study.methods.is_learner
     trials = {int(n) for n in runs[runs.label.map(algorithm) == "learner"].trials.dropna()}
     fewest = min(
@@ -467,12 +500,11 @@ def limits(study: Study) -> dict[str, Any]:
         unproven = "" if best is None or best.proven else "unproven"
         kind = "unknown" if best is None else "own" if best.only_here else unproven
         optima[kind].append(marked(task))
-    reasons = failed.reason.fillna("")
-    others = len(failed) - sum(reasons.value_counts()[:3])
+    model = next(iter(study.models.values()))
+    searches = [name for name in SEARCHES if KNOWN_METHODS[name].refuses(model) is None]
     return {
-        "runs": len(runs),
-        "failed": len(failed),
-        "reasons": commonest(reasons) + [f"{others} for other reasons"] * bool(others),
+        **failures_in(runs),
+        "searches": searches[-1:] if study.is_noisy else searches[:1],
         "reconstructed": [task.label for task in tasks if task.reconstructed],
         "trials": sorted(trials - {TRIALS}),
         "few": fewest if fewest < RUNS else 0,
@@ -486,6 +518,18 @@ def limits(study: Study) -> dict[str, Any]:
         "imports": {
             title_of(study.declared[name]): listed(used) for name, used in study.imports.items()
         },
+    }
+
+
+def failures_in(runs: pd.DataFrame) -> dict[str, Any]:
+    """Return numbers of ``runs`` and of ``failed`` runs, and the most frequent ``reasons``."""
+    failed = runs[runs.status != "ok"]
+    reasons = failed.reason.fillna("")
+    others = len(failed) - sum(reasons.value_counts()[:3])
+    return {
+        "runs": len(runs),
+        "failed": len(failed),
+        "reasons": commonest(reasons) + [f"{others} for other reasons"] * bool(others),
     }
 
 

@@ -63,7 +63,8 @@ def report(
     ):
         display.show(f"Reading {folder}")
         study = load(folder, against=against or "")
-        if against and not len(TABLES["differences"](study)):
+        differences = map(TABLES["differences"], study.worlds.values())
+        if against and not any(map(len, differences)):
             raise CoarticError(
                 f"--against {against} has no effect: there are no tasks on which this method and "
                 "another one solved all runs"
@@ -82,15 +83,30 @@ def report(
 
 
 def say_ranking(study: Study, folder: Path) -> None:
-    """Print the ranking of a study, with these notes:
+    """Print the ranking of each world of a study, and the command that writes its report.
+
+    Worlds have headings, unless there is only the paper's.
+    """
+    from coartic.analysis.words import capital
+    from coartic.runs.plan import world_title
+
+    has_headings = [*study.worlds] != [""]
+    for world, of_world in study.worlds.items():
+        say(*[f"{capital(world_title(world))}:"] * has_headings)
+        _say_ranking_of_world(of_world)
+        say(*[""] * has_headings)
+    page = folder / "report" / "report.html"
+    say_pairs([("Report", f"`coartic report {quote(str(folder))}` writes {page}")])
+
+
+def _say_ranking_of_world(study: Study) -> None:
+    """Print the ranking of a study of one world, with these notes:
 
     - the answer in words, if the study varies parameters or no method is ranked;
     - which methods are not ranked, and why;
     - the reference of the gaps;
-    - how many runs failed, and why;
-    - the command that writes the report of ``folder``.
+    - how many runs failed, and why.
     """
-    from coartic.analysis.methods import SEARCHES
     from coartic.analysis.report.sections import SECTIONS, finding, limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
@@ -104,11 +120,12 @@ def say_ranking(study: Study, folder: Path) -> None:
     ]
     methods = methods.assign(name=names)
     ranked, unranked = methods[methods.why == ""], methods[methods.why != ""]
-    headings = ["method", "gap (%)", "share (%)", "noisy gap (%)", "runs"]
+    has_noise = not ranked.noisy_gap.isna().all()  # solutions of the paper's world, in noise
+    headings = ["method", "gap (%)", "share (%)", *["noisy gap (%)"] * has_noise, "runs"]
     headings += ["note"] * any(ranked.note)
     cells = [
         [row["name"], interval(row, "gap", scale=100), interval(row, "share", 0, 100),
-         interval(row, "noisy_gap", scale=100), number(row["runs"]),
+         *[interval(row, "noisy_gap", scale=100)] * has_noise, number(row["runs"]),
          row["note"]][: len(headings)]
         for row in ranked.to_dict("records")
     ]  # fmt: skip
@@ -123,13 +140,16 @@ def say_ranking(study: Study, folder: Path) -> None:
     ]
     if len(ranked):
         known = f"gaps are to the {reference(study, ranked_tasks(study))}"
-        noise = f"noisy gaps, too, of solutions executed with motor noise {MOTOR_NOISE}"
-        pairs.append(("Reference", f"{known}; {noise}"))
+        known += " in this world" * bool(study.world)
+        noise = f"; noisy gaps, too, of solutions executed with motor noise {MOTOR_NOISE}"
+        pairs.append(("Reference", known + noise * has_noise))
     if notes["own"]:
         known = f"for {listed(notes['own'])} only the best reward of this folder is known"
-        all_methods = ",".join(dict.fromkeys([*study.declared, *SEARCHES]))
-        search = f"repeat the command with `--methods {quote(all_methods)}`"
-        pairs.append(("", f"{known}; to search for the optimum, {search}"))
+        if searches := notes["searches"]:
+            all_methods = ",".join(dict.fromkeys([*study.declared, *searches]))
+            search = f"repeat the command with `--methods {quote(all_methods)}`"
+            known += f"; to search for the optimum, {search}"
+        pairs.append(("", known))
     if notes["unknown"]:
         pairs.append(("", f"for {listed(notes['unknown'])} no reward is known"))
     stochastic = study.methods.stochastic
@@ -141,8 +161,7 @@ def say_ranking(study: Study, folder: Path) -> None:
         reasons = "; ".join(notes["reasons"])
         pairs.append(("Failed", f"{notes['failed']} of {counted(notes['runs'], 'run')}: {reasons}"))
     pairs += [("‡", sentence) for sentence in notes["late"]]
-    page = folder / "report" / "report.html"
-    say_pairs([*pairs, ("Report", f"`coartic report {quote(str(folder))}` writes {page}")])
+    say_pairs(pairs)
 
 
 def verify(
@@ -252,6 +271,9 @@ def _describe_run(run: Row, code: str) -> None:
     cell, result = run.cell, f"{run['status']}: {run['reason']}"
     if run["reward"] is not None:
         result = f"reward {number(run['reward'])}, hands {run['hands']}"
+    elif run["mean_ticks"] is not None:
+        result = f"mean ticks {number(run['mean_ticks'])}, hands {run['hands']}"
+    world = [("World", cell.world)] * bool(cell.world)
     say_pairs(
         [
             (
@@ -260,6 +282,7 @@ def _describe_run(run: Row, code: str) -> None:
             ),
             ("Seed", str(run["seed"])),
             ("Parameters", in_words(cell.parameters)),
+            *world,
             ("Result", result),
         ]
     )
@@ -294,7 +317,10 @@ def cite(
         with open_store(folder) as store:
             plan, made_with, imports = store.plan(), store.made_with(), store.imports()
         declared = {job.cell.method.name: job.cell.method for job in plan}
-        text = bibliography(declared, analysis=analysis, environment=made_with, imports=imports)
+        worlds = [*dict.fromkeys(job.cell.world for job in plan)]
+        text = bibliography(
+            declared, analysis=analysis, environment=made_with, imports=imports, worlds=worlds
+        )
     say(*text.rstrip("\n").split("\n"))
 
 
@@ -412,12 +438,15 @@ def _film(
     for run_id in run_ids:
         stored = find_run(run_id, folder)
         movement = trajectory_of(stored)
-        title = f"{movement.task.label}\n{title_of(stored.cell.method)}, run {stored['run']}"
+        world = stored.cell.world
+        subject = movement.task.label + f", {world}" * bool(world)
+        title = f"{subject}\n{title_of(stored.cell.method)}, run {stored['run']}"
         movements.append((title, movement))
     if initial:
-        task = movements[0][1].task
-        initial_solution = trajectory(task, corrective_trial(task, initial_hands(task)).movements)
-        movements.insert(0, (f"{task.label}\ncorrective process alone", initial_solution))
+        task, model = stored.cell.task, stored.cell.model.without_noise()
+        trial = corrective_trial(task, initial_hands(task, model=model), model=model)
+        alone = trajectory(task, trial.movements, model)
+        movements.insert(0, (f"{subject}\ncorrective process alone", alone))
     frames, ticks_a_second = write_film(movements, out, width=width, replace=replace)
     say(f"{out}: {frames} frames, {ticks_a_second:.0f} ticks a second.")
 

@@ -265,6 +265,10 @@ def _list_runs(folder: Path) -> None:
     with open_store(folder) as store:
         runs = store.runs()
     columns = ["run_id", "task", "method", "setting", "run", "reward", "status"]
+    if (runs.world != "").any():
+        columns.insert(4, "world")
+    if runs.mean_ticks.notna().any():
+        columns.insert(-1, "mean_ticks")
     say_table(columns, runs[columns].astype("string").fillna("").to_numpy().tolist())
     say(f"{folder}: {counted(len(runs), 'run')}.")
 

@@ -209,6 +209,14 @@ def judge_seed(suite_seed: int, task: str, number: int) -> int:
     return _seed_of(suite_seed, f"{task} judge", number)
 
 
+def reference_seed(suite_seed: int, task: str) -> int:
+    """Return the seed of the noise by which best known solutions of a task are judged.
+
+    No run is practised or judged with this seed.
+    """
+    return _seed_of(suite_seed, f"{task} reference", 0)
+
+
 def _seed_of(suite_seed: int, text: str, number: int) -> int:
     """Return a seed from 0 to 2^63 - 1 that depends on a seed, a text and a number."""
     words = np.frombuffer(hashlib.sha256(text.encode()).digest()[:16], dtype="<u4")
@@ -225,6 +233,12 @@ def hash_of(content: Any) -> str:
 def in_words(parameters: Mapping[str, Any]) -> str:
     """Return parameters as a string, such as ``noise_sd=0.1, trials=100``; empty for none."""
     return ", ".join(f"{name}={value}" for name, value in parameters.items())
+
+
+def world_title(world: str) -> str:
+    """Return the name of a world for readers, from :attr:`Cell.world`: ``the paper's world`` or
+    ``the world motor_noise=0.01``."""
+    return f"the world {world}" if world else "the paper's world"
 
 
 def trials_in(parameters: Mapping[str, Any]) -> int:

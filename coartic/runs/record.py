@@ -12,6 +12,7 @@ from types import SimpleNamespace
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, InstanceOf
 
 from coartic.errors import SolutionError
@@ -19,9 +20,11 @@ from coartic.internal.limits import real_array
 from coartic.method import CORRECTIONS_BY_TENTH, MOST_COUNT, Meter
 from coartic.model import PAPER, MotionModel
 from coartic.motion.doors import segment_lengths
-from coartic.motion.execution import Execution, execute_many, other_arm_travel
+from coartic.motion.execution import Execution, execute_many, execute_noisy, other_arm_travel
+from coartic.motion.initial_hands import best_hands
 from coartic.motion.solution import Movement
 from coartic.motion.trials import compiled_task
+from coartic.robot import Array
 from coartic.runs.plan import Cell, Job
 from coartic.tasks.task import Task, hands_of
 
@@ -411,6 +414,45 @@ def execute_all(
     short = [s for s, error in zip(solutions, errors, strict=True) if error is None]
     executions = iter(execute_many(compiled_task(task, exact), short))
     return [next(executions) if error is None else error for error in errors]
+
+
+def judge(
+    task: Task,
+    answers: Sequence[Sequence[Movement]],
+    model: MotionModel,
+    seeds: Sequence[int],
+    executions: int = NOISY_EXECUTIONS,
+) -> tuple[Array, NDArray[np.int64]]:
+    """Execute answers of a task many times in a world with noise, and return their mean ticks.
+
+    A failed execution counts as twice the ticks of the corrective process with its best hands, in
+    this world without noise.
+
+    Parameters
+    ----------
+    task : Task
+    answers : sequence of sequence of Movement
+        K answers (:func:`.next_action`).
+    model : MotionModel
+        The world, with its motor noise.
+    seeds : sequence of int
+        Seed of the noise of each answer.
+    executions : int
+        Number of executions of each answer.
+
+    Returns
+    -------
+    ndarray, shape (K,)
+        Mean ticks; NaN if an execution failed and the corrective process does not complete the
+        task with any hands.
+    ndarray of int, shape (K,)
+        How many executions failed.
+    """
+    exact = model.without_noise()
+    ticks = execute_noisy(task, answers, model.motor_noise, executions, seeds, exact)
+    best = best_hands(task, exact)
+    capped = np.where(np.isnan(ticks), np.nan if best is None else 2.0 * best[1], ticks)
+    return capped.mean(axis=1), np.isnan(ticks).sum(axis=1)
 
 
 def too_long(

@@ -13,8 +13,10 @@ from coartic.analysis.methods import KNOWN_METHODS
 from coartic.analysis.optima import BestKnown
 from coartic.analysis.study import Study
 from coartic.estimates import Estimate
+from coartic.model import model_from
 from coartic.runs.method_info import BUILT_IN, MethodInfo
 from coartic.runs.plan import Cell, Job
+from coartic.runs.record import NOISE_RULE
 from common.judging import Finding
 
 MADE_WITH = {
@@ -70,8 +72,9 @@ def row(method, reward, *, task="two-armed-1", run=0, setting="", **more):
     return {
         "task": task, "method": method, "setting": setting, "run": run, "seed": run,
         "status": "ok" if reward is not None else "infeasible", "reason": "", "reward": reward,
-        "run_id": f"{task}-{method}-{setting}-{run}", "hands": "LRLR",
-        "noisy_ticks": None if reward is None else -1.1 * reward,
+        "run_id": f"{task}-{method}-{setting}-{run}{more.get('world', '')}", "hands": "LRLR",
+        "noisy_ticks": None if reward is None else -1.1 * reward, "noise_rule": NOISE_RULE,
+        "world": "", "mean_ticks": None, "failed_executions": None, "practice": None,
         "information": "corrective process, reward by trial", "parameters": "{}", "trials": 10,
         "movement_ticks": 5000, "forward_kinematics": 1_234_567, "jacobians": 950,
         "solver_iterations": 0, "build_s": 0.5, "solve_s": 0.25, "wall_s": 1.0, "cpu_s": 0.5,
@@ -90,12 +93,36 @@ def runs_of(task, method, rewards, **more):
     ]  # fmt: skip
 
 
+def runs_in_noise(task, method, ticks, world="motor_noise=0.01", **more):
+    """Return rows of the runs of a cell in a world with noise, whose mean ticks are given.
+
+    Those of a failed run are None.
+    """
+    of_noise = {
+        "mean_ticks": ticks, "noisy_ticks": None, "trials": 10,
+        "failed_executions": [None if each is None else 0 for each in ticks],
+        "status": ["infeasible" if each is None else "ok" for each in ticks],
+        "practice": "[330, 325, 322, null, 320, 318, 317, 316, 315, 314]",
+    }  # fmt: skip
+    return runs_of(task, method, [None] * len(ticks), world=world, **{**of_noise, **more})
+
+
 def declared(method, deterministic=()):
     """Return a declaration of a method. Planners and ``deterministic`` are not stochastic."""
     planners = "trajectory-optimisation", "corrective-alone"
     stochastic = not method.startswith((*planners, *deterministic))
     origin = BUILT_IN if method in KNOWN_METHODS else "file.py"
     return MethodInfo(method, method, "", (), stochastic, {}, origin, "")
+
+
+def _values_in(words):
+    """Return the values in words such as ``sigma=0.1, norm=maximum``, by name."""
+    values = {}
+    for key, value in (item.split("=") for item in words.split(", ") if item):
+        with suppress(ValueError):  # the value is a string
+            value = ast.literal_eval(value)
+        values[key] = value
+    return values
 
 
 def study_of(rows, tasks=(), *, deterministic=(), **parts):
@@ -106,14 +133,12 @@ def study_of(rows, tasks=(), *, deterministic=(), **parts):
     runs = pd.DataFrame(rows).reset_index(drop=True)
     runs = runs.astype({"reward": "Int64"})
     by_name, plan = {task.name: task for task in tasks}, []
-    for (name, method, setting), _ in runs.groupby(["task", "method", "setting"], sort=False):
-        parameters = {}
-        for key, value in (item.split("=") for item in setting.split(", ") if item):
-            with suppress(ValueError):  # the value is a string
-                value = ast.literal_eval(value)
-            parameters[key] = value
+    keys = ["task", "method", "setting", "world"]
+    for (name, method, *texts), _ in runs.groupby(keys, sort=False):
+        parameters, constants = map(_values_in, texts)
         task = by_name.get(name) or load_task(name)
-        cell = Cell(task, declared(method, deterministic), parameters)
+        info = declared(method, deterministic)
+        cell = Cell(task, info, parameters, model=model_from(constants))
         plan.append(Job(cell, 0, range(3), suite="paper"))
     parts = {"rewards": lambda: iter(()), **parts}
     return MadeUp(Study(Path("made-up"), plan, MADE_WITH, runs), **parts)

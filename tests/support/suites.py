@@ -74,7 +74,7 @@ def planned(cells=None, *, runs=2, trials=150, seed=0, time_limit_s=300.0, trial
     for each in paper_cells() if cells is None else cells:
         defaults, numbers = each.method.defaults, range(runs if each.method.stochastic else 1)
         changed = {k: v for k, v in each.parameters.items() if v != defaults.get(k)}
-        whole = cell_of(each.task, each.method, changed, trials, trial_budget)
+        whole = cell_of(each.task, each.method, changed, trials, trial_budget, each.model)
         plan.append(Job(whole, seed, numbers, time_limit_s, "paper"))
     return plan
 
