@@ -36,6 +36,9 @@ from coartic.runs.plan import label_of, world_title
 SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
+LEAST_GAIN = 0.01
+"""Smallest possible gain of which there are shares in noise, as a share of the best known reward:
+smaller ones are about as large as the standard errors of the two means."""
 DUPLICATE = (
     "a run must not occur twice (if runs of two sources have the same numbers, add a column seed, "
     "folder or run_id; number the draws of a bootstrap in a column run)"
@@ -152,7 +155,8 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     share = (value - zero) / (best known - zero), where zero is column :data:`ZERO`
 
     Both are NaN if the value or the best known reward is NaN. ``share`` is also NaN if zero is NaN,
-    or not below the best known reward.
+    or not below the best known reward; in noise also if zero is on average less than 1 % below it
+    (:data:`LEAST_GAIN`), because the share would be chance.
 
     Raises
     ------
@@ -175,7 +179,10 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
         return columns
     possible = columns.best_known - columns[ZERO]
     refuse_rows(columns, ZERO, (possible < 0) & ~columns.is_noisy, highest)
-    return columns.assign(share=(columns.value - columns[ZERO]) / possible.where(possible > 0))
+    of_task = possible.groupby(columns.best_known).transform("mean")  # in noise zeros differ by run
+    is_chance = columns.is_noisy & (of_task < LEAST_GAIN * columns.best_known.abs())
+    possible = possible.where((possible > 0) & ~is_chance)
+    return columns.assign(share=(columns.value - columns[ZERO]) / possible)
 
 
 def _refuse_worlds(frame: pd.DataFrame) -> None:
@@ -300,8 +307,8 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     -------
     Series
         (reward - corrective_best) / (best_known - corrective_best) by the frame's index. It is
-        negative if the corrective process does better, and NaN if nothing can be gained or a
-        reward is NaN.
+        negative if the corrective process does better, and NaN if nothing can be gained (in noise
+        less than 1 % of the best known reward) or a reward is NaN.
 
     Raises
     ------

@@ -91,8 +91,12 @@ def test_the_zero_of_the_share_meets_the_draws_of_each_run():
     assert runs.gap["a", 1] == pytest.approx((312 - BEST) / BEST)
 
 
-def test_no_share_where_the_corrective_process_is_the_best_known():
-    assert np.isnan(standings(planted(best=400.0).worlds[NOISE]).share["a"])
+def test_no_share_where_nothing_but_chance_is_gained():
+    """The corrective process needs some 320.5 ticks: 0.2 % more than the second reference."""
+    for best, has_share in ((400.0, False), (320.0, False), (310.0, True)):
+        rows = standings(planted(best=best).worlds[NOISE])
+        assert np.isfinite(rows.share["a"]) == has_share
+        assert rows.without_gain["a"] == (not has_share)
 
 
 def test_values_of_all_worlds_are_in_one_frame():
