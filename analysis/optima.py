@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from coartic import Task
 from coartic.analysis.methods import SEARCHES
+from coartic.model import PAPER, MotionModel
 from coartic.robot import Array
 from coartic.runs.plan import label_of
 from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
@@ -21,13 +22,6 @@ from coartic.tasks.optima import BASE, KnownOptimum, best_shipped
 class BestKnown(KnownOptimum):
     """The best known reward of a task in a world, and its source."""
 
-    reward: float  # type: ignore[assignment]  # a mean in a world with noise
-    """Total reward: minus the ticks; in a world with noise minus the mean ticks of 1,000
-    executions."""
-    bound: int | None
-    """Reward that no solution exceeds; None if nothing is proven."""
-    hands: str = ""
-    """Hand sequence of a solution with this reward."""
     source: str = "shipped"
     """Where the reward comes from:
 
@@ -75,14 +69,13 @@ def best_known(
     runs: pd.DataFrame,
     tasks: Iterable[Task],
     *,
-    world: str = "",
+    models: Mapping[str, MotionModel] | None = None,
     fresh: Callable[[str, Sequence[str]], Sequence[float]] | None = None,
 ) -> dict[str, BestKnown]:
     """Return the best known reward of each task in one world, from shipped rewards and runs.
 
     All solved runs count, including searches and runs copied from other folders. Runs with another
-    base do not count, because they solve another task. Shipped rewards count in the paper's world
-    only. A task is left out if
+    base do not count, because they solve another task. A task is left out if
 
     - its best reward is 0, because a gap could not be computed;
     - no reward is known;
@@ -98,8 +91,8 @@ def best_known(
         Stored runs of one world, with ``task``, ``method``, ``setting``, ``run_id``, ``status``,
         ``parameters``, ``reward`` and ``mean_ticks`` (:func:`run_values`), ``hands``.
     tasks : iterable of Task
-    world : str
-        What differs from the paper's world; empty for the paper's.
+    models : mapping of MotionModel, optional
+        The world by the name of the task; the paper's if it is missing.
     fresh : callable, only in a world with noise
         Function of a task's name and ids of runs on it. It returns minus the mean ticks of
         :data:`FRESH_EXECUTIONS` executions of each run.
@@ -115,20 +108,21 @@ def best_known(
     ]
     is_search = solved.method.isin(SEARCHES)
     solved = pd.concat([solved[is_search], solved[~is_search]])  # in a tie, a search comes first
-    by_task, rewards = dict([*solved.groupby("task")]), {}
+    by_task, rewards, models = dict([*solved.groupby("task")]), {}, models or {}
     for task in tasks:
-        here, shipped = by_task.get(task.name, solved[:0]), None if world else best_shipped(task)
+        here = by_task.get(task.name, solved[:0])
+        shipped = best_shipped(task, models.get(task.name, PAPER))
         searches = here[is_search[here.index]]
         labels = {*map(label_of, here.method, here.setting)}
         if shipped is None and not len(searches) and len(labels) < 2:
             continue
         bound = None if shipped is None else shipped.bound
+        if fresh is not None and len(here):
+            here = here.nlargest(CANDIDATES, "value")
+            here = here.assign(value=fresh(task.name, [*map(str, here.run_id)]))
         if shipped is not None and not (here.value > shipped.reward).any():
             best = BestKnown(shipped.reward, bound, shipped.hands)
         else:
-            if fresh is not None:
-                here = here.nlargest(CANDIDATES, "value")
-                here = here.assign(value=fresh(task.name, [*map(str, here.run_id)]))
             run = here.iloc[int(here.value.to_numpy().argmax())]
             reward = int(run.value) if fresh is None else float(run.value)
             only_here = shipped is None and not len(searches)

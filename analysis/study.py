@@ -298,7 +298,7 @@ class Study:
         """
         fresh = self._executed_afresh if self.is_noisy else None
         runs, tasks = self.stored, self.tasks.values()
-        rewards = best_known(runs, tasks, world=self.world, fresh=fresh)
+        rewards = best_known(runs, tasks, models=self.models, fresh=fresh)
         for name, best in rewards.items():
             alone, hands = self._corrective_reference(name)
             if alone > best.reward:

@@ -27,7 +27,7 @@ from coartic.estimates import Estimate, mean
 from coartic.internal.limits import MOST_CELLS, brief_value, check_limits, real_array
 from coartic.method import Method, MethodError, run_method
 from coartic.method.optimisers import FAILED
-from coartic.model import PAPER, MotionModel, model_from, same_world
+from coartic.model import PAPER, MotionModel, model_from
 from coartic.motion.execution import execute, execute_noisy, initial_hands, initial_reward
 from coartic.motion.solution import Movement, corrective_movements, next_action
 from coartic.motion.trials import (
@@ -558,10 +558,7 @@ def score(
     rewards["corrective process"] = [
         _corrective_rewards(task, seed, setting.model) for task in tasks
     ]
-    optima = [
-        best_shipped(task) if same_world(setting.model, PAPER, task.radius) else None
-        for task in tasks
-    ]
+    optima = [best_shipped(task, setting.model) for task in tasks]
     rewards["best known"] = [[None if optimum is None else optimum.reward] for optimum in optima]
     return _table({name: np.array(values, np.float64) for name, values in rewards.items()})
 

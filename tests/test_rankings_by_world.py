@@ -20,7 +20,7 @@ from coartic import (
 )
 from coartic.analysis import FIGURES, TABLES, frames, load, ranking, runtimes, verify
 from coartic.analysis.figures.drawings import practice_curves
-from coartic.analysis.optima import BestKnown, run_values
+from coartic.analysis.optima import BestKnown, best_known, run_values
 from coartic.analysis.report.build import write_report
 from coartic.analysis.standings import reference, standings
 from coartic.cli.read import say_ranking
@@ -28,6 +28,7 @@ from coartic.motion.initial_hands import best_hands
 from coartic.motion.solution import corrective_movements
 from coartic.runs.plan import judge_seed, reference_seed
 from coartic.runs.store import open_store
+from coartic.tasks.optima import best_shipped
 from tests.support.made_up import runs_in_noise, runs_of, study_of
 from tests.support.strategies import failing_task, tiny_task
 from tests.support.suites import KNOWN, cell_on, edit, run_and_write
@@ -190,24 +191,36 @@ def study(folder):
 
 
 def test_references_in_noise_are_executed_afresh(study):
-    """Of the runs on a task the best by 1,000 executions with a seed of their own."""
+    """Of the runs on an own task the best by 1,000 executions with a seed of their own."""
     noise = study.worlds[NOISE]
-    for task in (load_task(TASK), OWN):
-        runs = noise.runs[noise.runs.task == task.name]
-        with open_store(study.folder) as store:
-            answers = {run_id: store.run(run_id).part("solution") for run_id in runs.run_id}
-        seed = reference_seed(0, task.name)
-        ticks = execute_noisy(task, answers.values(), 0.01, 1_000, seed).mean(axis=1)
-        means = dict(zip(answers, ticks, strict=True))
-        best = noise.optima[task.name]
-        tried = runs.sort_values("mean_ticks").run_id[:5]
-        assert best.reward == pytest.approx(-min(means[run_id] for run_id in tried))
-        assert (best.bound, best.only_here, best.proven) == (None, True, False)
-        if best.run_id:
-            assert -best.reward == pytest.approx(means[best.run_id])
-        assert {*runs.best_known} == {best.reward}
-    assert reference(noise, noise.optima) == "best of this folder"
+    runs = noise.runs[noise.runs.task == OWN.name]
+    with open_store(study.folder) as store:
+        answers = {run_id: store.run(run_id).part("solution") for run_id in runs.run_id}
+    seed = reference_seed(0, OWN.name)
+    ticks = execute_noisy(OWN, answers.values(), 0.01, 1_000, seed).mean(axis=1)
+    means = dict(zip(answers, ticks, strict=True))
+    best = noise.optima[OWN.name]
+    tried = runs.sort_values("mean_ticks").run_id[:5]
+    assert best.reward == pytest.approx(-min(means[run_id] for run_id in tried))
+    assert (best.bound, best.only_here, best.proven) == (None, True, False)
+    if best.run_id:
+        assert -best.reward == pytest.approx(means[best.run_id])
+    assert {*runs.best_known} == {best.reward}
+    assert reference(noise, [OWN.name]) == "best of this folder"
+
+
+def test_shipped_references_are_those_of_the_world(study):
+    """A run that is better by its 1,000 executions takes the place of a shipped solution."""
     assert study.worlds[""].optima[TASK].source == "shipped"
+    best = study.worlds[NOISE].optima[TASK]
+    assert (best.source, best.reward) == ("shipped", best_shipped(load_task(TASK), NOISY).reward)
+    rows = study.worlds[NOISE].stored
+    models = dict.fromkeys(rows.task.unique(), NOISY)
+    better = best_known(
+        rows, [load_task(TASK)], models=models, fresh=lambda _, ids: [-290.5] * len(ids)
+    )
+    assert better[TASK].reward == -290.5
+    assert better[TASK].source != "shipped"
 
 
 def test_other_lengths_have_other_zeros_and_references(study):
@@ -290,7 +303,7 @@ def test_commands_name_the_worlds(study, coartic, capsys):
     assert noise.startswith(f"{NOISE}:\n")
     assert "noisy gap" in paper
     assert "noisy gap" not in noise + of_norm
-    assert "best of this folder in this world" in noise
+    assert "best known reward or best of this folder in this world" in " ".join(noise.split())
     assert "Not ranked  1 of 2 tasks: CMA-ES" in noise
     assert "no runs in this world: random search" in of_norm
     assert "optimum/search" not in of_norm  # it takes no other norm

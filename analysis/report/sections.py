@@ -91,8 +91,9 @@ NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer run
 IN_NOISE = (
     "In a world with motor noise the reward of a run is minus the mean ticks of 100 fresh "
     "executions of what its method recommends. The same draws of the noise judge all methods and "
-    "the corrective process. The best of this folder is one of the five best runs, by 1000 further "
-    "executions, so that a gap can be negative by chance. Tasks on which less than 1 % can be "
+    "the corrective process. References are means of 1000 further executions: of a solution that "
+    "comes with coartic, or of the best of this folder. A gap can be negative by "
+    "chance. Tasks on which less than 1 % can be "
     "gained have no share of the gain. Signatures and pictures are of an "
     "execution without noise. Running times are not shown, because the reward of a single trial is "
     "partly luck."

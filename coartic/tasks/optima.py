@@ -1,7 +1,8 @@
 """The best known rewards that come with the package, and what is proven about them.
 
 ``optima.json`` has the best reward that any method found for each of the paper's tasks, with run
-ids and solutions. ``best_known.csv`` has the best reward for test instances of families. The study
+ids and solutions. ``best_known.csv`` has the best reward for test instances of families, and
+``best_in_noise.csv`` the fewest mean ticks in a world with motor noise. The study
 ``studies/optima`` copies better rewards from results folders, and proves the bounds.
 """
 
@@ -15,6 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from coartic.model import PAPER, MotionModel, same_world
 from coartic.tasks.task import Task
 
 BASE = "task"
@@ -25,6 +27,9 @@ DATA = Path(__file__).with_name("optima.json")
 BEST_KNOWN = Path(__file__).with_name("best_known.csv")
 """Columns ``instance``, ``reward``, ``bound`` (empty if nothing is proven), ``nodes`` (of the
 search that proved the bound), ``hands`` and ``essence`` (:func:`task_hash`)."""
+IN_NOISE = Path(__file__).with_name("best_in_noise.csv")
+"""Columns ``task``, ``motor_noise`` (length units of the base, rad), ``mean_ticks`` over 1,000
+executions, its ``standard_error``, ``hands``, the ``method`` of the solution and ``essence``."""
 
 HASHED_FIELDS = ("start", "radius", "hands", "locked_base", "robot")
 """Fields that, with the goals, define a task."""
@@ -32,10 +37,11 @@ HASHED_FIELDS = ("start", "radius", "hands", "locked_base", "robot")
 
 @dataclass(frozen=True)
 class KnownOptimum:
-    """The best known reward of a task with both arms free, for the paper's model."""
+    """The best known reward of a task in a world, with both arms free."""
 
-    reward: int
-    """Total reward: minus the ticks."""
+    reward: int | float
+    """Total reward: minus the ticks, an integer; in a world with motor noise minus the mean ticks
+    of 1,000 executions."""
     bound: int | None
     """Reward that no solution exceeds; None if nothing is proven."""
     hands: str = ""
@@ -58,20 +64,23 @@ def task_hash(task: Task) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def best_shipped(task: Task) -> KnownOptimum | None:
-    """Return the best known reward of a task and its bound, from the shipped files.
+def best_shipped(task: Task, model: MotionModel = PAPER) -> KnownOptimum | None:
+    """Return the best known reward of a task in a world, and its bound, from the shipped files.
 
     The task is recognised by :func:`task_hash`, whatever its name. Return None if the files do not
-    have the task. Of a shipped family they have only the first 40 instances of the test split.
+    have the task in this world. They have the paper's world, and the paper's world with motor noise
+    0.01. Of a shipped family they have only the first 40 instances of the test split.
     """
-    return _by_task_hash().get(task_hash(task))
+    if not same_world(model.without_noise(), PAPER, task.radius):
+        return None
+    return _by_task_hash().get((task_hash(task), model.motor_noise))
 
 
 @cache
-def _by_task_hash() -> dict[str, KnownOptimum]:
+def _by_task_hash() -> dict[tuple[str, float], KnownOptimum]:
     with BEST_KNOWN.open(encoding="ascii", newline="") as lines:
         optima = {
-            row["essence"]: KnownOptimum(
+            (row["essence"], 0.0): KnownOptimum(
                 int(row["reward"]), int(row["bound"]) if row["bound"] else None, row["hands"]
             )
             for row in csv.DictReader(lines)
@@ -79,7 +88,11 @@ def _by_task_hash() -> dict[str, KnownOptimum]:
     for entry in entries():
         if (entry["base"], entry["other_arm"]) == (BASE, "free") and "reward" in entry:
             best = KnownOptimum(entry["reward"], entry["bound"], entry["hands"])
-            optima[entry["essence"]] = best
+            optima[entry["essence"], 0.0] = best
+    with IN_NOISE.open(encoding="ascii", newline="") as lines:
+        for row in csv.DictReader(lines):
+            best = KnownOptimum(-float(row["mean_ticks"]), None, row["hands"])
+            optima[row["essence"], float(row["motor_noise"])] = best
     return optima
 
 

@@ -2,6 +2,7 @@
 
 ``coartic/tasks/optima.json`` has entries for the paper's tasks. ``best_known.csv`` has rows for
 instances of families, whose solutions are in ``solutions.json.xz`` in this folder.
+``best_in_noise.csv`` has rows in a world with motor noise, and ``in_noise.json.xz`` solutions.
 """
 
 import contextlib
@@ -13,15 +14,19 @@ from pathlib import Path
 import numpy as np
 
 from coartic import CoarticError, Movement, execute, load_task
-from coartic.tasks.optima import BASE, BEST_KNOWN, DATA, entries
+from coartic.tasks.optima import BASE, BEST_KNOWN, DATA, IN_NOISE, entries
 
 SOLUTIONS = Path(__file__).with_name("solutions.json.xz")
+SOLUTIONS_IN_NOISE = SOLUTIONS.with_name("in_noise.json.xz")
 FREE = (BASE, "free")
 """Base and other arm of entries without a restriction."""
 OUT, LOG = Path("results", "optima"), "proofs.jsonl"
 """Default folder of the log of proofs, and name of the log."""
 _NUMBERS = ("reward", "bound", "nodes")
 _COLUMNS = ("instance", *_NUMBERS, "hands", "essence")
+_COLUMNS_IN_NOISE = (
+    "task", "motor_noise", "mean_ticks", "standard_error", "hands", "method", "essence"
+)  # fmt: skip
 _DIGITS = 5  # decimals of joints in a solution, if rounding does not change the reward
 
 
@@ -91,6 +96,43 @@ def write(known):
     SOLUTIONS.write_bytes(lzma.compress(solutions, preset=9))
     optima = {"optima": [entry for entry in ranked if "/" not in entry["task"]]}
     DATA.write_text(f"{json.dumps(optima, indent=1, ensure_ascii=False)}\n", encoding="utf-8")
+
+
+def read_in_noise():
+    """Return the entries of the world with motor noise 0.01, by task: dictionaries with the columns
+    of ``best_in_noise.csv`` and ``solution``."""
+    if not SOLUTIONS_IN_NOISE.exists():
+        return {}
+    solutions = json.loads(lzma.decompress(SOLUTIONS_IN_NOISE.read_bytes()))
+    with IN_NOISE.open(encoding="ascii", newline="") as lines:
+        rows = [*csv.DictReader(lines)]
+    return {row["task"]: row | {"solution": solutions[row["task"]]} for row in rows}
+
+
+def write_in_noise(known):
+    """Write the entries of the world with motor noise into their files."""
+    with IN_NOISE.open("w", encoding="ascii", newline="") as file:
+        writer = csv.DictWriter(file, _COLUMNS_IN_NOISE, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(known[task] for task in sorted(known))
+    content = json.dumps({task: known[task]["solution"] for task in sorted(known)}).encode()
+    SOLUTIONS_IN_NOISE.write_bytes(lzma.compress(content, preset=9))
+
+
+def answer_in_short(movements):
+    """Return what to do next as ``[goal, hand, kind, target, waypoints]`` for each movement.
+
+    The joints are rounded. None stands for a joint that keeps still.
+    """
+    content = []
+    for each in movements:
+        targets = [each.target, *(each.waypoints if each.waypoints is not None else ())]
+        short = [
+            None if q is None else [None if np.isnan(x) else round(float(x), _DIGITS) for x in q]
+            for q in targets
+        ]
+        content.append([each.goal, each.hand, each.kind, short[0], short[1:] or None])
+    return content
 
 
 def solution_in_short(task, movements, reward):

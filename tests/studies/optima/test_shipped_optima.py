@@ -3,15 +3,18 @@
 import json
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
-from coartic import CoarticError, execute, load_task
+from coartic import CoarticError, MotionModel, execute, execute_noisy, load_task
 from coartic.baselines.optimum import OptimumSearch
 from coartic.motion.execution import corrective_trial, other_arm_travel
+from coartic.runs.plan import reference_seed
 from coartic.runs.shipped import open_shipped
+from coartic.runs.store import open_store
 from coartic.tasks import optima
 from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import best_shipped, task_hash
@@ -21,7 +24,7 @@ from tests.support.strategies import tiny_task
 from tests.support.suites import KNOWN, cell_on, run_and_write
 
 FOLDER = ROOT / "studies" / "optima"
-RENEW, PROVE, STUDY = programs("optima", "renew", "prove", "study")
+RENEW, PROVE, STUDY, IN_NOISE = programs("optima", "renew", "prove", "study", "renew_in_noise")
 SHIPPED = RENEW.shipped
 ENTRIES = SHIPPED.read()
 DRAWN = [entry for (name, *_), entry in ENTRIES.items() if "/" in name]
@@ -162,3 +165,55 @@ def test_a_task_of_ones_own_is_searched_and_proven(tmp_path, monkeypatch, capsys
     (sentence,), (row,) = capsys.readouterr().out.splitlines(), SHIPPED.read_log(tmp_path)
     assert sentence.startswith(f"{file} (base task, other arm free): {row['reward']}, proven opti")
     assert -200 < row["reward"] == row["bound"] < -100
+
+
+# ---- In noise ----
+
+
+def test_solutions_in_noise_come_to_their_mean_ticks():
+    """By executions of the motion module, under the seed of references."""
+    known = SHIPPED.read_in_noise()
+    assert {"ascending", "descending", "two-armed-1", "two-armed-2"} <= {*known}
+    for name, entry in known.items():
+        task = load_task(name)
+        answer = SHIPPED.movements_of(entry["solution"])
+        ticks = execute_noisy(task, [answer], 0.01, 1_000, reference_seed(0, name))[0]
+        assert ticks.mean() == pytest.approx(float(entry["mean_ticks"]), abs=6e-4)
+        error = ticks.std(ddof=1) / np.sqrt(1_000)
+        assert error == pytest.approx(float(entry["standard_error"]), abs=6e-4)
+        best = best_shipped(task, IN_NOISE.MODEL)
+        assert (best.reward, best.hands, best.bound) == (
+            -float(entry["mean_ticks"]),
+            entry["hands"],
+            None,
+        )
+        assert best.reward < best_shipped(task).bound + 1
+
+
+@pytest.mark.parametrize(
+    "model", [{"motor_noise": 0.02}, {"motor_noise": 0.01, "base_weight": 2.0}]
+)
+def test_nothing_is_shipped_in_other_worlds(model):
+    assert best_shipped(load_task("ascending"), MotionModel(**model)) is None
+
+
+def test_a_better_run_in_noise_is_taken_over(tmp_path):
+    """One that is worse is not, and a task that does not ship is left out."""
+    tasks = load_task("ascending"), tiny_task()
+    cells = [
+        replace(cell_on(task, KNOWN[name]), model=IN_NOISE.MODEL)
+        for task in tasks
+        for name in ("corrective-alone/best-hands", "random-search")
+    ]
+    folder = run_and_write(tmp_path, cells, runs=2, trials=60).folder
+    with open_store(folder) as store:
+        known = {}
+        assert IN_NOISE.take_over(store, known) == 1
+        assert IN_NOISE.take_over(store, known) == 0
+        (entry,) = known.values()
+        runs = store.runs()
+    least = runs[runs.task == "ascending"].mean_ticks.min()
+    assert float(entry["mean_ticks"]) == pytest.approx(least, rel=0.01)
+    known["ascending"]["mean_ticks"] = "1.0"
+    with open_store(folder) as store:
+        assert IN_NOISE.take_over(store, known) == 0
