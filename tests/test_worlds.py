@@ -22,11 +22,13 @@ from coartic.analysis import FIGURES, TABLES, frames, load, ranking, runtimes, v
 from coartic.analysis.figures.drawings import practice_curves
 from coartic.analysis.optima import BestKnown, run_values
 from coartic.analysis.report.build import write_report
+from coartic.analysis.report.player import player
 from coartic.analysis.standings import reference, standings
 from coartic.cli.read import say_ranking
 from coartic.motion.initial_hands import best_hands
 from coartic.motion.solution import corrective_movements
 from coartic.runs.plan import judge_seed, reference_seed
+from coartic.runs.record import judge
 from coartic.runs.store import open_store
 from tests.support.made_up import runs_in_noise, runs_of, study_of
 from tests.support.strategies import failing_task, tiny_task
@@ -166,6 +168,34 @@ def test_older_rules_of_noise_are_no_failures():
     for rule, note in ((2, "2 of 2 solutions can fail with motor noise"), (1, ""), (None, "")):
         rows = runs_of(TASK, "a", [-300, -302], noisy_ticks=None, noise_rule=rule)
         assert standings(study_of(rows, optima=known)).note["a"] == note
+
+
+def test_tests_and_differences_are_of_values():
+    """A learner and an own method with as many runs in noise as tests need: 3 ticks apart."""
+    ticks = np.arange(10.0)
+    study = planted(
+        *runs_in_noise(TASK, "dual-process/EC1", [*310 + ticks / 10]),
+        *runs_in_noise(TASK, "mine", [*307 + ticks / 10]),
+    )
+    noise = study.worlds[NOISE]
+    ranked = TABLES["ranking"](noise)
+    assert ranked.loc["mine", ["better", "worse"]].tolist() == [1, 0]
+    (row,) = TABLES["differences"](noise).query("against == 'mine'").to_dict("records")
+    assert row["method"] == "dual-process/EC1"
+    assert row["difference"] == pytest.approx(3 / BEST)
+    rows = TABLES["methods"](noise)
+    assert rows.reward[f"{TASK} mine"] == pytest.approx(-307.45)
+    assert player(noise) == ""  # the figure only moves in the paper's world
+
+
+def test_a_failed_execution_costs_twice_the_corrective_process():
+    """The left hand cannot leave the start where noise does not move it; the right one can."""
+    task = failing_task(hands="L")
+    answer = corrective_movements("L")
+    means, failed = judge(task, [answer], NOISY, [3], 50)
+    ticks = execute_noisy(task, [answer], 0.01, 50, 3)
+    assert failed.tolist() == [np.isnan(ticks).sum()] == [50]
+    assert means.tolist() == [2 * best_hands(task)[1]]
 
 
 METHODS = "corrective-alone/best-hands", "random-search", "cma-es/bandit"
