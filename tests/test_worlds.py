@@ -261,6 +261,7 @@ def test_answers_in_noise_are_executed_without_it(study):
     """In their world, and the corrective process corrects what misses."""
     noise = study.worlds[NOISE]
     stored = noise.movements()
+    assert stored.keys() == {*noise.runs.run_id}
     executed = noise.executed(TASK, "random-search")
     assert len(executed.runs) == 2
     for run_id, run in zip(executed.run_ids, executed.runs, strict=True):
