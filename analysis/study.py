@@ -681,8 +681,10 @@ class Study:
         runs without a replay are left out.
         """
         if part not in self._movements:
+            ids = {*self.stored.run_id}
             with open_results(self.folder) as store:
-                self._movements[part] = store.movements(part, MOST_EXECUTED)
+                stored = store.movements(part, MOST_EXECUTED)
+            self._movements[part] = {key: stored[key] for key in stored if key in ids}
         return self._movements[part]
 
     @cached_property

@@ -513,9 +513,10 @@ def _gaps_after(study: Study, trials: int) -> pd.Series:
     The gap of a run is the gap of its best trial so far. Runs without rewards of trials keep their
     final gap. The mean is NaN if a run had no solution by then. The index has the labels.
     """
-    learned, runs = improvements(study), compared_runs(study)
+    runs = compared_runs(study)
     if study.is_noisy:
         return pd.Series(math.nan, runs.ranked_as.unique())
+    learned = improvements(study)
     best = [
         float(best_after(learned[run_id], trials))
         if not math.isnan(reward) and len(learned.get(run_id, ((),))[0])

@@ -22,11 +22,13 @@ from coartic.analysis import FIGURES, TABLES, frames, load, ranking, runtimes, v
 from coartic.analysis.figures.drawings import practice_curves
 from coartic.analysis.optima import BestKnown, best_known, run_values
 from coartic.analysis.report.build import write_report
+from coartic.analysis.report.player import player
 from coartic.analysis.standings import reference, standings
 from coartic.cli.read import say_ranking
 from coartic.motion.initial_hands import best_hands
 from coartic.motion.solution import corrective_movements
 from coartic.runs.plan import judge_seed, reference_seed
+from coartic.runs.record import judge
 from coartic.runs.store import open_store
 from coartic.tasks.optima import best_shipped
 from tests.support.made_up import runs_in_noise, runs_of, study_of
@@ -169,6 +171,34 @@ def test_older_rules_of_noise_are_no_failures():
         assert standings(study_of(rows, optima=known)).note["a"] == note
 
 
+def test_tests_and_differences_are_of_values():
+    """A learner and an own method with as many runs in noise as tests need: 3 ticks apart."""
+    ticks = np.arange(10.0)
+    study = planted(
+        *runs_in_noise(TASK, "dual-process/EC1", [*310 + ticks / 10]),
+        *runs_in_noise(TASK, "mine", [*307 + ticks / 10]),
+    )
+    noise = study.worlds[NOISE]
+    ranked = TABLES["ranking"](noise)
+    assert ranked.loc["mine", ["better", "worse"]].tolist() == [1, 0]
+    (row,) = TABLES["differences"](noise).query("against == 'mine'").to_dict("records")
+    assert row["method"] == "dual-process/EC1"
+    assert row["difference"] == pytest.approx(3 / BEST)
+    rows = TABLES["methods"](noise)
+    assert rows.reward[f"{TASK} mine"] == pytest.approx(-307.45)
+    assert player(noise) == ""  # the figure only moves in the paper's world
+
+
+def test_a_failed_execution_costs_twice_the_corrective_process():
+    """The left hand cannot leave the start where noise does not move it; the right one can."""
+    task = failing_task(hands="L")
+    answer = corrective_movements("L")
+    means, failed = judge(task, [answer], NOISY, [3], 50)
+    ticks = execute_noisy(task, [answer], 0.01, 50, 3)
+    assert failed.tolist() == [np.isnan(ticks).sum()] == [50]
+    assert means.tolist() == [2 * best_hands(task)[1]]
+
+
 METHODS = "corrective-alone/best-hands", "random-search", "cma-es/bandit"
 OWN = tiny_task(name="own", goals=[[4.0, 1.2], [4.2, 1.5]])
 
@@ -244,6 +274,7 @@ def test_answers_in_noise_are_executed_without_it(study):
     """In their world, and the corrective process corrects what misses."""
     noise = study.worlds[NOISE]
     stored = noise.movements()
+    assert stored.keys() == {*noise.runs.run_id}
     executed = noise.executed(TASK, "random-search")
     assert len(executed.runs) == 2
     for run_id, run in zip(executed.run_ids, executed.runs, strict=True):
