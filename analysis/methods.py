@@ -69,7 +69,7 @@ MARKS: dict[str, Any] = {
 
 KNOWN_METHODS: Mapping[str, type[Method]] = built_in_methods()
 """Classes of the built-in methods by id, in the order of lists and figures."""
-SEARCHES = ("optimum/search",)
+SEARCHES = ("optimum/search", "optimum/in-model")
 """Ids of the searches for the optimum, which are references and not compared with methods."""
 _WORDS = {
     "other_arm": "other arm ",

@@ -23,6 +23,7 @@ import numpy as np
 from coartic.baselines.uninformed import Attempts, UninformedParameters
 from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
+from coartic.motion.solution import Movement, movements_of
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
@@ -59,7 +60,8 @@ class HillClimbing(Method):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left or all hand sequences have failed.
 
-        Return the movements of the best trial.
+        Return the movements of the best trial. In noise, return movements to the centre of its hand
+        sequence, round which the next trial with these hands would be drawn.
 
         Raises MethodError if no trial hits every goal.
         """
@@ -129,7 +131,11 @@ class HillClimbing(Method):
                 if attempt.rewards[-1] > rewards[hands]:
                     centres[hands] = np.where(explored, attempt.reached[-1], np.nan)
                     rewards[hands] = float(attempt.rewards[-1])
-        return attempts.result(sequences=len(centres))
+
+        def centre() -> tuple[Movement, ...]:
+            return movements_of(attempts.hands, centres[attempts.hands])
+
+        return attempts.result(centre, sequences=len(centres))
 
 
 METHODS: tuple[type[Method], ...] = (HillClimbing,)

@@ -5,7 +5,8 @@ the postures in which the corrective process hits the goals, by default with the
 deviation. With one stage, the default, the noise does not depend on earlier rewards. So random
 search cannot learn to coarticulate: its best trial shows the effect of selecting one of many noisy
 trials by the reward of the whole task. Random search is therefore the control for signatures of
-coarticulation (:mod:`coartic.analysis.control`).
+coarticulation (:mod:`coartic.analysis.control`). It remembers nothing but its best trial, so the
+targets of this trial are its answer in noise, too.
 
 With ``stages`` above 1 the trials are divided into equal parts. After each part the centre of the
 noise moves to the best trial so far: to the postures that this trial reached, or to the targets

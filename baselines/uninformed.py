@@ -8,6 +8,7 @@ and the configurations in which it hit the goals.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import numpy as np
@@ -45,6 +46,8 @@ class Attempts:
         self._session = session
         self.explored = np.tile(explored_joints(session), (session.goals_count, 1))
         """True for the joints that are explored at each goal, shape ``(G, dof)``."""
+        self.is_noisy = session.model.motor_noise > 0.0
+        """True if the world has motor noise, in which the best trial was partly lucky."""
         left = session.trials_left
         self.left = trials if left is None else min(trials, left)
         """Number of trials left."""
@@ -57,7 +60,8 @@ class Attempts:
         self.best_trial = -1
         """Number of the best trial, from 0; -1 before the first success."""
         self.targets: Array = np.empty(0)
-        """Targets of the best trial, shape ``(G, dof)``."""
+        """Targets of the best trial, shape ``(G, dof)``. In noise joints that do not move have NaN,
+        with which they stay in the next trial, too."""
         self.reached: Array = np.empty(0)
         """Configurations in which the best trial hit the goals, shape ``(G, dof)``."""
 
@@ -141,6 +145,8 @@ class Attempts:
             self.hands = hands if isinstance(hands, str) else hands[best]
             self.best_trial = self.trials_made + best
             self.targets, self.reached = trials.targets[best], trials.reached[best]
+            if self.is_noisy:
+                self.targets = targets[best].copy()
         self.trials_made += len(rewards)
         self.left -= len(rewards)
         return trials
@@ -153,10 +159,13 @@ class Attempts:
         """
         return movements_of(self.hands, self.targets)
 
-    def result(self, **details: Any) -> Result:
+    def result(
+        self, recommended: Callable[[], tuple[Movement, ...]] | None = None, **details: Any
+    ) -> Result:
         """Return the movements of the best trial, with its number (from 0) and other details.
 
-        Raises MethodError if no trial has hit every goal.
+        In noise, the movements that ``recommended`` returns take their place; it is called if a
+        trial has hit every goal. Raises MethodError if no trial has.
         """
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)
@@ -167,4 +176,5 @@ class Attempts:
                 f"{self.trials_made} trials",
                 details,
             )
-        return Result(self.solution, {"best_trial": self.best_trial, **details})
+        solution = recommended() if recommended and self.is_noisy else self.solution
+        return Result(solution, {"best_trial": self.best_trial, **details})

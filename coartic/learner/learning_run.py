@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +17,7 @@ from coartic.method import Meter
 from coartic.model import MotionModel
 from coartic.motion.execution import Execution, execute
 from coartic.motion.solution import Movement, hands_in
-from coartic.robot import Array
+from coartic.robot import HANDS, Array
 from coartic.tasks.task import Task
 
 
@@ -76,11 +77,40 @@ class LearningRun:
     def learned(self) -> tuple[Movement, ...]:
         """Movements of the learned solution; empty if its trial did not hit every goal.
 
-        This is the best trial, or the replay if the condition has ``learned="replay"``.
+        This is the best trial, or the replay if the condition has ``learned="replay"``. In a model
+        with motor noise it is :attr:`next_action`, because the best trial was partly lucky.
         """
+        if self.model.motor_noise > 0.0:
+            return self.next_action
         if self.condition.learned == "best":
             return self.solution
         return self.replay
+
+    @property
+    def next_action(self) -> tuple[Movement, ...]:
+        """Movements that the learner would make next without exploration.
+
+        For each goal, in the state that the number of the goal and the hand for the goal before
+        make up, these are the hand with the highest Q and its stored posture q*. A movement has no
+        ticks. Joints of an idle arm that the condition does not move have NaN, with which they
+        stay. Where no posture is stored, the movement is corrective and has no target. The result
+        is empty if no trial was completed.
+        """
+        if self.best_trial is None:
+            return ()
+        movements, robot, previous = list[Movement](), self.task.robot, len(HANDS)
+        codes = sorted(map(HANDS.index, self.condition.hands))
+        for goal, (values, targets) in enumerate(zip(self.values, self.targets, strict=True), 1):
+            code = max(codes, key=values[previous].__getitem__)  # at a tie the left hand
+            hand, target = HANDS[code], targets[previous, code].copy()
+            if values[previous, code] == -math.inf:
+                movements.append(Movement(goal, hand, "corrective"))
+            else:
+                if not self.condition.modify_other:
+                    target[robot.joints(HANDS[1 - code])] = math.nan
+                movements.append(Movement(goal, hand, "learned", target))
+            previous = code
+        return tuple(movements)
 
     @property
     def reason(self) -> str:
@@ -99,7 +129,8 @@ class LearningRun:
         """Total reward of the learned solution; None without a solution.
 
         This is the highest reward of all trials, or the reward of the replay if the condition has
-        ``learned="replay"``.
+        ``learned="replay"``. With motor noise this one trial was partly lucky: judge
+        :attr:`learned` by :func:`coartic.execute_noisy`.
         """
         if self.condition.learned == "replay":
             return self.replay_reward

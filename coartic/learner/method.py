@@ -94,7 +94,8 @@ class DualProcess(Method):
         """Run the learner, and return the movements of its learned solution.
 
         The learned solution is the best trial or, if the condition has ``learned="replay"``, the
-        noiseless trial after learning.
+        noiseless trial after learning. With motor noise it is the learner's next action
+        (:attr:`.LearningRun.next_action`).
 
         Raises MethodError if the trial with the learned solution did not hit every goal, or the
         budget has no trial left.

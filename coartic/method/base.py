@@ -19,7 +19,7 @@ from coartic.internal.validation import in_sentences
 from coartic.method.session import Information, MethodError, Session
 from coartic.model import PAPER, WORLD, MotionModel, check_model, differences
 from coartic.motion.initial_hands import too_many_sequences
-from coartic.motion.solution import Movement
+from coartic.motion.solution import Movement, next_action
 from coartic.robot import Hand
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import INITIAL_POLICIES, Task
@@ -43,7 +43,8 @@ class Result:
     """A solution, and further data that a method returns with it."""
 
     solution: tuple[Movement, ...]
-    """Movements, at least one for each goal, in the order of the goals."""
+    """Movements, at least one for each goal, in the order of the goals. In a world with motor noise
+    these are what the method recommends to do next (:func:`answer_of`)."""
     details: dict[str, Any] = field(default_factory=dict)
     """Plain data to be stored with the solution, but never its score."""
     initial: tuple[Movement, ...] = ()
@@ -51,6 +52,28 @@ class Result:
     replay: tuple[Movement, ...] = ()
     """Movements of a learner's noiseless greedy trial after learning; empty if that trial failed,
     and for other methods."""
+
+
+def answer_of(result: Result, model: MotionModel) -> Result:
+    """Return the result of a method as its answer in a world.
+
+    Without motor noise this is the result itself. With noise the answer is the next action: the
+    movements of the solution have no ticks, corrective movements have no targets
+    (:func:`.next_action`), and there is neither a first trial nor a replay, which one draw of the
+    noise made what they were.
+
+    Examples
+    --------
+    >>> from coartic import PAPER, Movement
+    >>> result = Result((Movement(1, "right", "corrective", target=[0.0] * 10, ticks=7),))
+    >>> answer_of(result, PAPER) is result
+    True
+    >>> answer_of(result, PAPER._replace(motor_noise=0.01)).solution
+    (Movement(goal=1, hand='right', kind='corrective', target=None, ticks=None, waypoints=None),)
+    """
+    if model.motor_noise == 0.0:
+        return result
+    return Result(next_action(result.solution), result.details)
 
 
 class Outline(NamedTuple):
@@ -201,6 +224,9 @@ class Method(ABC):
         -------
         Result
             The solution, with at least one movement for each goal, and further data to be stored.
+            With motor noise (``session.model.motor_noise`` above 0) the best trial was partly
+            lucky. The solution is then what the method recommends to do next, and it is judged by
+            noise in which the method has not practised.
 
         Raises
         ------
@@ -280,7 +306,8 @@ def run_method(
     Returns
     -------
     result : Result
-        The solution with its details, as the method returns it.
+        The solution with its details, as the method returns it (with motor noise:
+        :func:`answer_of`).
     session : Session
         The session in which the method found the solution, with its counts and rewards.
 
@@ -310,4 +337,4 @@ def run_method(
     session = Session(chosen, int(seed), method.information, model=model, trusted=is_ours)
     result = method.solve(session)
     session.check_solution(result.solution)
-    return result, session
+    return answer_of(result, model), session

@@ -392,11 +392,12 @@ class Objective:
         Raises
         ------
         UndeclaredError
-            The call is made in a method, which can use :attr:`solution`.
+            The call is made in a method, which can use :attr:`solution`. With motor noise methods
+            may call it as well.
         ValueError
             ``x`` or ``hands`` does not fit.
         """
-        task, point = self.task, _entries_of("x", x)
+        point = _entries_of("x", x)
         if point.shape != (self.dim,):
             raise ValueError(f"x has shape {point.shape}; it must be ({self.dim},)")
         self._check(point[None])
@@ -404,6 +405,7 @@ class Objective:
         codes, targets = self._session.hand_codes(chosen, 1), self._targets_of(point[None])
         if self._session.model.motor_noise > 0.0:
             return movements_of(chosen, targets[0])
+        task = self.task
         accounts = make_trials(compiled_task(task, self._session.model), codes, targets[:, :, None])
         has_target = ~np.isnan(targets[0]).all(axis=1, keepdims=True)
         targets = self._targets_in(accounts, 0)
@@ -702,6 +704,9 @@ class Optimiser(Method):
     def solve(self, session: Session) -> Result:
         """Call :meth:`optimise` until it returns or no trial is left; return the best trial.
 
+        In a world with motor noise, return the movements of the point that :meth:`optimise`
+        recommends; if it recommends none, return the best trial, which was partly lucky.
+
         Raises
         ------
         MethodError
@@ -710,7 +715,8 @@ class Optimiser(Method):
         NotApplicableError
             There are more than 4096 hand sequences, and no initial one is found.
         ValueError
-            Parameter ``hands`` does not fit the task.
+            Parameter ``hands`` does not fit the task. In noise: :meth:`optimise` returned what is
+            not a point.
         """
         parameters: OptimiserParameters = self.parameters
         try:
@@ -722,16 +728,65 @@ class Optimiser(Method):
             )
         except BudgetError:
             raise MethodError("infeasible", "the trial budget leaves no trial to make") from None
+        recommended = None
         with session.solving(), suppress(BudgetError):
-            self.optimise(cost, session.rng)
+            recommended = self.optimise(cost, session.rng)
         if cost.evaluations == 0 and cost.trials_left > 0:
             raise MethodError("solver-failed", "optimise ended without evaluating a point")
-        return Result(cost.solution, {"evaluations": cost.evaluations})
+        solution = cost.solution
+        if session.model.motor_noise > 0.0 and recommended is not None:
+            point = recommended if isinstance(recommended, tuple) else (recommended,)
+            try:
+                solution = cost.movements(*point)
+            except (TypeError, ValueError) as error:
+                raise ValueError(
+                    f"optimise returned {brief_value(recommended)}; it must return a point of "
+                    f"{cost.dim} numbers, a tuple of a point and its hands, or None ({error})"
+                ) from None
+        return Result(solution, {"evaluations": cost.evaluations})
 
     @abstractmethod
-    def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
-        """Minimise ``objective``, which remembers the best point; nothing is returned.
+    def optimise(self, objective: Objective, rng: np.random.Generator) -> Any:
+        """Minimise ``objective``, which remembers its best trial.
 
-        Do not catch its BudgetError, which ends the run when no trial is left. ``rng`` is the
-        session's random generator.
+        Parameters
+        ----------
+        objective : Objective
+            The cost. It raises BudgetError when no trial is left, which ends the run.
+        rng : numpy.random.Generator
+            The session's random generator.
+
+        Returns
+        -------
+        array_like, shape (dim,), or tuple, or None
+            The point that the method recommends, such as the mean of an evolution strategy; or a
+            tuple of this point and its hand sequence, if it is not :attr:`Objective.hands`. It
+            counts only in a world with motor noise, where the best trial was partly lucky. Without
+            noise, and if None is returned, the best trial is the solution.
+
+        Notes
+        -----
+        A search that goes on until BudgetError is raised returns nothing. To recommend a point
+        nevertheless, write ``with contextlib.suppress(BudgetError):`` around the search, and
+        ``return`` after it.
+
+        Examples
+        --------
+        >>> from contextlib import suppress
+        >>> from coartic import MotionModel
+        >>> from coartic.method import run_method
+        >>> class Average(Optimiser):
+        ...     name, title = "average", "Average of good points"
+        ...
+        ...     def optimise(self, objective, rng):
+        ...         x = objective.x0
+        ...         with suppress(BudgetError):
+        ...             while True:
+        ...                 points = x + 0.03 * rng.standard_normal((20, objective.dim))
+        ...                 x = points[objective.many(points).argsort()[:5]].mean(axis=0)
+        ...         return x
+        >>> average = Average(Average.Parameters(trials=200))
+        >>> result, _ = run_method(average, "ascending", model=MotionModel(motor_noise=0.01))
+        >>> [movement.kind for movement in result.solution]
+        ['learned', 'learned', 'learned']
         """
