@@ -1,4 +1,4 @@
-"""Hill climbing and CMA-ES against closed forms and their own rules."""
+"""Hill climbing, CMA-ES and policy gradient against closed forms and their own rules."""
 
 import math
 from types import SimpleNamespace
@@ -6,15 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coartic import MotionModel, corrective_trial, hand_sequences, load_task
+from coartic import PAPER, MotionModel, corrective_trial, hand_sequences, load_task
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
 from coartic.baselines.hill_climbing import HillClimbing
+from coartic.baselines.policy_gradient import PolicyGradient
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands
 from coartic.method import MethodError, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from tests.support.strategies import failing_task, solve, tiny_task
 
-METHODS = (HillClimbing, CMAES, GoalByGoal)
+METHODS = (HillClimbing, CMAES, GoalByGoal, PolicyGradient)
 
 
 def test_hands_chosen_goal_by_goal():
@@ -73,7 +74,7 @@ def trials_of_hill_climbing(monkeypatch, **options):
         return results
 
     monkeypatch.setattr(Session, "trials", recorded)
-    solve(HillClimbing, "two-armed-1", trials=600, **options)
+    solve(HillClimbing, "two-armed-1", **{"trials": 600, **options})
     return made
 
 
@@ -98,6 +99,51 @@ def test_where_hill_climbing_begins_a_hand_sequence(begin, monkeypatch):
             best = reward, hands, reached
     assert first > 8
     assert (shared > 8) == (begin == "best")
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.035])
+def test_the_one_fifth_rule(floor, monkeypatch):
+    """Recomputed from the trials: centres, good trials, and the scatter of targets in a window."""
+    centres, spreads, windows = {}, {}, {}
+    ratios, kept = [], 0
+    options = {"spread": "learned", "window": 50, "floor": floor, "trials": 4000}
+    for hands, targets, reward, reached in trials_of_hill_climbing(monkeypatch, **options):
+        if hands in centres:
+            spread, (scatter, good) = spreads.setdefault(hands, 0.05), windows[hands]
+            scatter.extend((targets - centres[hands][1])[~np.isnan(targets)])
+            good.append(reward >= centres[hands][0])
+            if len(good) == 50:
+                ratios.append(np.std(scatter) / spread)
+                wanted = spread * (1.5 if sum(good) > 10 else 1.5**-0.25)
+                spreads[hands] = max(wanted, floor)
+                kept += wanted < floor
+                windows[hands] = [], []
+        if hands not in centres or reward > centres[hands][0]:
+            centres[hands] = reward, reached
+            windows.setdefault(hands, ([], []))
+    assert len(ratios) > 50  # each is of at least 1,800 normal numbers
+    assert max(np.abs(np.array(ratios) - 1.0)) < 0.08
+    assert (kept > 10) == (floor > 0.0)
+    assert len({*spreads.values()}) > 1
+
+
+@pytest.mark.parametrize("method", [HillClimbing, CMAES, PolicyGradient])
+@pytest.mark.parametrize("world", [PAPER, MotionModel(motor_noise=0.01)])
+def test_hands_given(method, world):
+    """All trials have them, also if other hands are better."""
+    options = {"trials": 300, "sequence": "RLRR", "model": world}
+    result, execution, session = solve(method, "two-armed-2", **options)
+    assert execution.hands == "RLRR"
+    assert session.meter.trials == 300
+    if not world.motor_noise:
+        assert session.rewards[0] == corrective_trial("two-armed-2", "RLRR").reward
+        assert execution.reward == max(session.rewards) > session.rewards[0]
+    else:
+        assert {movement.kind for movement in result.solution} == {"learned"}
+    with pytest.raises(ValueError, match="hands"):
+        solve(method, "two-armed-2", trials=300, sequence="RLX")
+    with pytest.raises(MethodError):
+        solve(method, failing_task(hands="R"), trials=50, sequence="L")
 
 
 class HalfOfAPlain:
