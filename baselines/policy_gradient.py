@@ -22,7 +22,11 @@ and rewards R::
   batch has hit every goal, it counts as twice the ticks of the corrective process.
 - The last batch changes nothing if it is incomplete.
 
-With ``spread="fixed"`` ν stays. The hands are chosen by the same bandit as in ``cma-es/bandit``.
+With ``spread="fixed"`` ν stays. The hands are chosen by the same bandit as in ``cma-es/bandit``. A
+softmax for each goal, whose preferences follow the same gradient, was tried on the development
+instances on which the method was tuned. With the better of two steps for the preferences its
+answers take 23 % more ticks (geometric mean) than the bandit's. The difference is in the families
+with two arms. With one arm there is none.
 
 In noise the answer is a mean: that of the hand sequence whose last complete batch has the best mean
 reward.
