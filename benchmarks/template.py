@@ -1,36 +1,44 @@
 """NAME: write here what your method does. Check it with: coartic check NAME --method-file FILE."""
 
+from contextlib import suppress
+
 import numpy as np
 
-from coartic import Objective, Optimiser
+from coartic import BudgetError, Objective, Optimiser
 
 
 class Mine(Optimiser):
     """Random steps from the best point, as a start for your own method.
 
-    On the paper's tasks its gap is 6.0 [5.9, 6.1] %, smaller than that of the paper's learner, 7.9
-    %.
+    The one-fifth rule sets their length: it grows after a batch with a point at least as good as
+    the best point before, and shrinks after any other batch. It stays as it is if this happens in
+    one batch of five. On the paper's tasks the gap is 6.1 [5.9, 6.4] %, smaller than that of the
+    paper's learner, 7.9 %. With motor noise the best cost was partly lucky, so the steps get too
+    short: begin there.
     """
 
     name = "NAME"  # id in commands and tables
     title = "Random steps from the best point"  # title in lists and citations
     citation = "I. Rechenberg (1973). Evolutionsstrategie."  # work that others should cite
-    tuned_on = "nothing"  # tasks on which you chose its constants, here the step of 0.03
+    tuned_on = "nothing"  # tasks on which you chose its constants
 
-    def optimise(self, objective: Objective, rng: np.random.Generator) -> None:
-        """Minimise the cost of a trial.
+    def optimise(self, objective: Objective, rng: np.random.Generator) -> np.ndarray:
+        """Minimise the cost of a trial, and return the point that the method recommends.
 
-        When no trial is left, ``objective`` raises BudgetError. Do not catch it: the best point so
-        far is the solution.
+        When no trial is left, ``objective`` raises BudgetError. The solution is the best trial, or
+        in a world with motor noise, where the best trial was partly lucky, the returned point.
         """
         # Use only rng for random numbers. A point has the joints at all goals (length units, rad).
-        x = objective.x0  # the postures of the corrective process
-        best = objective(x)  # ticks
-        while True:
-            points = x + 0.03 * rng.standard_normal((10, objective.dim))
-            costs = objective.many(points)  # faster than one by one
-            if costs.min() < best:
-                x, best = points[costs.argmin()], costs.min()
+        x, step = objective.x0, 0.05  # the postures of the corrective process; length units and rad
+        with suppress(BudgetError):
+            best = objective(x)  # ticks
+            while True:
+                points = x + step * rng.standard_normal((10, objective.dim))
+                costs = objective.many(points)  # faster than one by one
+                step *= 1.5 if costs.min() <= best else 1.5**-0.25
+                if costs.min() < best:
+                    x, best = points[costs.argmin()], costs.min()
+        return x
 
 
 # This method uses the corrective process and the rewards of its trials. A method that uses more
