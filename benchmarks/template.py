@@ -23,10 +23,11 @@ class Mine(Optimiser):
     tuned_on = "nothing"  # tasks on which you chose its constants
 
     def optimise(self, objective: Objective, rng: np.random.Generator) -> np.ndarray:
-        """Minimise the cost of a trial, and return the point that the method recommends.
+        """Minimise the cost of a trial, and return the point that you recommend.
 
-        When no trial is left, ``objective`` raises BudgetError. The solution is the best trial, or
-        in a world with motor noise, where the best trial was partly lucky, the returned point.
+        When no trial is left, ``objective`` raises BudgetError, which ends the search. Without
+        motor noise the solution is the best trial. With noise the best trial was partly lucky, and
+        the solution is the point that is returned: the one from which the search would go on.
         """
         # Use only rng for random numbers. A point has the joints at all goals (length units, rad).
         x, step = objective.x0, 0.03  # the postures of the corrective process; length units and rad

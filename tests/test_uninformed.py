@@ -1,18 +1,23 @@
 """Hill climbing, CMA-ES and policy gradient against closed forms and their own rules."""
 
 import math
+from collections import namedtuple
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from coartic import PAPER, MotionModel, corrective_trial, hand_sequences, load_task
+from coartic import MotionModel, corrective_trial, execute_noisy, hand_sequences, load_task
+from coartic.baselines import cma_es
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
+from coartic.baselines.evolution import EvolutionStrategy
 from coartic.baselines.hill_climbing import HillClimbing
 from coartic.baselines.policy_gradient import PolicyGradient
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands
 from coartic.method import MethodError, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
+from coartic.motion.solution import movements_of
+from coartic.tasks.task import letters_of
 from tests.support.strategies import failing_task, solve, tiny_task
 
 METHODS = (HillClimbing, CMAES, GoalByGoal, PolicyGradient)
@@ -63,18 +68,23 @@ def test_sequences_that_cannot_be_completed_are_left(method):
     assert execution.hands[1] == "R"
 
 
-def trials_of_hill_climbing(monkeypatch, **options):
-    """Return hands, targets, reward and postures of each trial of hill climbing, in order."""
+Trial = namedtuple("Trial", "hands targets reward reached")
+
+
+def trials_of(method, monkeypatch, **options):
+    """Return hands, targets, reward and postures of each trial of a method, in order."""
     made, trials = [], Session.trials
 
     def recorded(self, hands, targets, *args, **kwargs):
         results = trials(self, hands, targets, *args, **kwargs)
         names = [hands] * len(targets) if isinstance(hands, str) else hands
-        made.extend(zip(names, targets, results.rewards, results.reached))  # noqa: B905 (budget)
+        rows = zip(names, targets.copy(), results.rewards, results.reached)  # noqa: B905 (budget)
+        made.extend(map(Trial._make, rows))
         return results
 
-    monkeypatch.setattr(Session, "trials", recorded)
-    solve(HillClimbing, "two-armed-1", **{"trials": 600, **options})
+    with monkeypatch.context() as patch:
+        patch.setattr(Session, "trials", recorded)
+        solve(method, "two-armed-1", **options)
     return made
 
 
@@ -83,7 +93,9 @@ def test_where_hill_climbing_begins_a_hand_sequence(begin, monkeypatch):
     """With ``best``: at the best trial's postures where hand and hand before are the same."""
     best, first, shared = (-np.inf, "", None), 0, 0
     known = set()
-    for hands, targets, reward, reached in trials_of_hill_climbing(monkeypatch, begin=begin):
+    for hands, targets, reward, reached in trials_of(
+        HillClimbing, monkeypatch, trials=600, begin=begin
+    ):
         if hands not in known:
             known.add(hands)
             first += 1
@@ -101,49 +113,85 @@ def test_where_hill_climbing_begins_a_hand_sequence(begin, monkeypatch):
     assert (shared > 8) == (begin == "best")
 
 
-@pytest.mark.parametrize("floor", [0.0, 0.035])
-def test_the_one_fifth_rule(floor, monkeypatch):
-    """Recomputed from the trials: centres, good trials, and the scatter of targets in a window."""
-    centres, spreads, windows = {}, {}, {}
-    ratios, kept = [], 0
-    options = {"spread": "learned", "window": 50, "floor": floor, "trials": 4000}
-    for hands, targets, reward, reached in trials_of_hill_climbing(monkeypatch, **options):
-        if hands in centres:
-            spread, (scatter, good) = spreads.setdefault(hands, 0.05), windows[hands]
-            scatter.extend((targets - centres[hands][1])[~np.isnan(targets)])
-            good.append(reward >= centres[hands][0])
-            if len(good) == 50:
-                ratios.append(np.std(scatter) / spread)
-                wanted = spread * (1.5 if sum(good) > 10 else 1.5**-0.25)
-                spreads[hands] = max(wanted, floor)
-                kept += wanted < floor
-                windows[hands] = [], []
-        if hands not in centres or reward > centres[hands][0]:
-            centres[hands] = reward, reached
-            windows.setdefault(hands, ([], []))
-    assert len(ratios) > 50  # each is of at least 1,800 normal numbers
-    assert max(np.abs(np.array(ratios) - 1.0)) < 0.08
-    assert (kept > 10) == (floor > 0.0)
-    assert len({*spreads.values()}) > 1
+NOISY = MotionModel(motor_noise=0.02)
 
 
-@pytest.mark.parametrize("method", [HillClimbing, CMAES, PolicyGradient])
-@pytest.mark.parametrize("world", [PAPER, MotionModel(motor_noise=0.01)])
-def test_hands_given(method, world):
-    """All trials have them, also if other hands are better."""
-    options = {"trials": 300, "sequence": "RLRR", "model": world}
-    result, execution, session = solve(method, "two-armed-2", **options)
-    assert execution.hands == "RLRR"
-    assert session.meter.trials == 300
-    if not world.motor_noise:
-        assert session.rewards[0] == corrective_trial("two-armed-2", "RLRR").reward
-        assert execution.reward == max(session.rewards) > session.rewards[0]
-    else:
-        assert {movement.kind for movement in result.solution} == {"learned"}
-    with pytest.raises(ValueError, match="hands"):
-        solve(method, "two-armed-2", trials=300, sequence="RLX")
-    with pytest.raises(MethodError):
-        solve(method, failing_task(hands="R"), trials=50, sequence="L")
+def test_hill_climbing_answers_the_point_round_which_it_would_draw_next(monkeypatch):
+    """With next to no perturbation: the next trial with these hands is at their centre."""
+    options = {"model": NOISY, "sigma": 1e-9}
+    made = trials_of(HillClimbing, monkeypatch, trials=900, **options)
+    for trials in (60, 150, 300):
+        result, *_ = solve(HillClimbing, "two-armed-1", trials=trials, **options)
+        hands = letters_of([movement.hand for movement in result.solution])
+        rewards = [trial.reward for trial in made[:trials]]
+        assert hands == made[int(np.argmax(rewards))].hands
+        following = next(trial for trial in made[trials:] if trial.hands == hands)
+        targets = [movement.target for movement in result.solution]
+        np.testing.assert_allclose(targets, following.targets, atol=1e-7)
+
+
+@pytest.mark.parametrize("method", [RandomSearch, RandomSearchHands])
+def test_random_search_answers_the_targets_of_its_best_trial(method, monkeypatch):
+    made = trials_of(method, monkeypatch, trials=400, model=NOISY, idle_arm=False)
+    result, *_ = solve(method, "two-armed-1", trials=400, model=NOISY, idle_arm=False)
+    best = made[int(np.argmax([trial.reward for trial in made]))]
+    assert result.solution == movements_of(best.hands, best.targets)
+
+
+@pytest.mark.parametrize("method", [CMAES, GoalByGoal])
+def test_cma_es_answers_the_mean_with_the_best_last_generation(method, monkeypatch):
+    """Of all restarts and hand sequences, each with the mean after its last generation."""
+    lasts = {}
+
+    class Recorded(EvolutionStrategy):
+        def tell(self, points, costs):
+            super().tell(points, costs)
+            lasts[id(self)] = costs.mean(), self.mean, self  # kept, so that ids stay its own
+
+    monkeypatch.setattr(cma_es, "EvolutionStrategy", Recorded)
+    result, *_ = solve(method, "two-armed-1", trials=2500, model=NOISY)
+    cost, mean, _ = min(lasts.values(), key=lambda last: last[0])
+    assert len(lasts) > 3
+    targets = np.array([movement.target for movement in result.solution])
+    np.testing.assert_array_equal(targets[~np.isnan(targets)], mean)
+    assert execute_noisy("two-armed-1", [result.solution], 0.02, 50, 0).mean() < cost + 10
+
+
+def test_cma_es_without_a_generation_answers_postures_of_the_corrective_process(monkeypatch):
+    (made,) = trials_of(CMAES, monkeypatch, trials=1, model=NOISY)
+    result, *_ = solve(CMAES, "two-armed-1", trials=1, model=NOISY)
+    targets = np.array([movement.target for movement in result.solution])
+    moves = ~np.isnan(targets)
+    np.testing.assert_array_equal(targets[moves], made.reached[moves])
+    assert moves.sum() == 4 * 9  # the base is locked in y
+
+
+def test_a_mean_is_nearer_to_the_optimum_than_the_luckiest_point():
+    """Of a planted quadratic cost, of which one trial in 50 is lucky by 100 ticks."""
+
+    class Noisy(HalfOfAPlain):
+        def __init__(self, seed):
+            super().__init__()
+            self.rng, self.reward, self.point = np.random.default_rng(seed), -math.inf, None
+
+        def around(self, hands, values):
+            exact = -300.0 - 1000.0 * ((values - 0.3) ** 2).sum(axis=1)
+            rewards = exact + 100.0 * (self.rng.random(len(values)) < 0.02)
+            if rewards.max() > self.reward:
+                self.reward, self.point = rewards.max(), values[rewards.argmax()]
+            return SimpleNamespace(rewards=rewards)
+
+    away = []
+    for seed in range(10):
+        attempts = Noisy(seed)
+        session = Session(load_task("ascending"), seed, OPTIMISER_INFORMATION)
+        strategy = Strategy(session, attempts, "R", 0.05)
+        for _ in range(60):
+            strategy.generation()
+        _, mean = strategy.answer
+        away.append([np.linalg.norm(point - 0.3) for point in (mean, attempts.point)])
+    mean_away, luckiest_away = np.mean(away, axis=0)
+    assert 10 * mean_away < luckiest_away < 0.1
 
 
 class HalfOfAPlain:
@@ -200,3 +248,48 @@ def test_a_single_joint_to_explore():
     # Turns by pi/2 - 0.5 less the angle under which half the disc's chord is seen.
     turn = math.pi / 2 - 0.5 - 2 * math.asin(0.1 / 2)
     assert max(session.rewards) == -(math.ceil(turn / 0.01) + 1)
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.035])
+def test_the_one_fifth_rule(floor, monkeypatch):
+    """Recomputed from the trials: centres, good trials, and the scatter of targets in a window."""
+    centres, spreads, windows = {}, {}, {}
+    ratios, kept = [], 0
+    options = {"spread": "learned", "window": 50, "floor": floor, "trials": 4000}
+    for hands, targets, reward, reached in trials_of(HillClimbing, monkeypatch, **options):
+        if hands in centres:
+            spread, (scatter, good) = spreads.setdefault(hands, 0.05), windows[hands]
+            scatter.extend((targets - centres[hands][1])[~np.isnan(targets)])
+            good.append(reward >= centres[hands][0])
+            if len(good) == 50:
+                ratios.append(np.std(scatter) / spread)
+                wanted = spread * (1.5 if sum(good) > 10 else 1.5**-0.25)
+                spreads[hands] = max(wanted, floor)
+                kept += wanted < floor
+                windows[hands] = [], []
+        if hands not in centres or reward > centres[hands][0]:
+            centres[hands] = reward, reached
+            windows.setdefault(hands, ([], []))
+    assert len(ratios) > 50  # each is of at least 1,800 normal numbers
+    assert max(np.abs(np.array(ratios) - 1.0)) < 0.08
+    assert (kept > 10) == (floor > 0.0)
+    assert len({*spreads.values()}) > 1
+
+
+@pytest.mark.parametrize("method", [HillClimbing, CMAES, PolicyGradient])
+@pytest.mark.parametrize("world", [MotionModel(), MotionModel(motor_noise=0.01)])
+def test_hands_given(method, world):
+    """All trials have them, also if other hands are better."""
+    options = {"trials": 300, "sequence": "RLRR", "model": world}
+    result, execution, session = solve(method, "two-armed-2", **options)
+    assert execution.hands == "RLRR"
+    assert session.meter.trials == 300
+    if not world.motor_noise:
+        assert session.rewards[0] == corrective_trial("two-armed-2", "RLRR").reward
+        assert execution.reward == max(session.rewards) > session.rewards[0]
+    else:
+        assert {movement.kind for movement in result.solution} == {"learned"}
+    with pytest.raises(ValueError, match="hands"):
+        solve(method, "two-armed-2", trials=300, sequence="RLX")
+    with pytest.raises(MethodError):
+        solve(method, failing_task(hands="R"), trials=50, sequence="L")
