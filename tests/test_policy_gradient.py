@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coartic import MotionModel, load_task
+from coartic import MotionModel, execute_noisy, load_task
 from coartic.baselines.policy_gradient import Policy, PolicyGradient, PolicyGradientParameters
 from tests.support.strategies import solve
 
@@ -92,6 +92,22 @@ def test_a_fixed_spread_stays():
         means.append(policy.mean)
     assert (policy.log_spread == np.log(0.04)).all()
     np.testing.assert_allclose(np.mean(means[200:], axis=0), OPTIMUM, atol=0.01)
+    wide = policy_on(plain, sigma=0.5, spread="fixed", batch=50)  # beyond a learned one's bounds
+    wide.generation()
+    assert (wide.log_spread == np.log(0.5)).all()
+
+
+def test_what_is_better_for_all_targets_alike_moves_nothing():
+    """Rewards that rise from the first batch to the second, whatever the targets: advantages are
+    then positive, but their products with z and z² - 1 have a mean of 0."""
+    rise = [0.0]
+    plain = Plain(lambda x: np.full(len(x), rise[0] - 100.0), 4, noise=10.0)
+    policy = policy_on(plain, batch=100_000, step=1.0, spread_step=0.2)
+    policy.generation()
+    rise[0] = 20.0
+    policy.generation()
+    np.testing.assert_allclose(policy.mean, 0.0, atol=0.05 * 0.05)
+    np.testing.assert_allclose(policy.log_spread, np.log(0.05), atol=0.2 * 0.05)
 
 
 def test_a_unit_of_reward_does_not_matter():
@@ -171,4 +187,6 @@ def test_an_answer_in_noise_is_a_mean():
     first, *_ = solve(PolicyGradient, task, trials=1, **options)
     targets, start = ([m.target for m in each.solution] for each in (result, first))
     np.testing.assert_allclose(targets, start, atol=1e-3)
-    assert all(movement.ticks is None for movement in result.solution)
+    learned, *_ = solve(PolicyGradient, task, trials=3000, sequence="LRLR", model=world)
+    ticks = execute_noisy(task, [learned.solution, first.solution], 0.01, 50, 0).mean(axis=1)
+    assert ticks[0] < 0.95 * ticks[1]

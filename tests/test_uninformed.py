@@ -254,12 +254,14 @@ def test_a_single_joint_to_explore():
 def test_the_one_fifth_rule(floor, monkeypatch):
     """Recomputed from the trials: centres, good trials, and the scatter of targets in a window."""
     centres, spreads, windows = {}, {}, {}
-    ratios, kept = [], 0
+    ratios, first_ratios, kept = [], [], 0
     options = {"spread": "learned", "window": 50, "floor": floor, "trials": 4000}
     for hands, targets, reward, reached in trials_of(HillClimbing, monkeypatch, **options):
         if hands in centres:
             spread, (scatter, good) = spreads.setdefault(hands, 0.05), windows[hands]
             scatter.extend((targets - centres[hands][1])[~np.isnan(targets)])
+            if not good:
+                first_ratios.append(np.mean(np.square(scatter)) / spread**2)
             good.append(reward >= centres[hands][0])
             if len(good) == 50:
                 ratios.append(np.std(scatter) / spread)
@@ -272,6 +274,7 @@ def test_the_one_fifth_rule(floor, monkeypatch):
             windows.setdefault(hands, ([], []))
     assert len(ratios) > 50  # each is of at least 1,800 normal numbers
     assert max(np.abs(np.array(ratios) - 1.0)) < 0.08
+    assert np.mean(first_ratios) == pytest.approx(1.0, abs=0.1)  # it changes with the window
     assert (kept > 10) == (floor > 0.0)
     assert len({*spreads.values()}) > 1
 
