@@ -62,10 +62,10 @@ class HillClimbingParameters(SequenceParameters):
     spread: Literal["fixed", "learned"] = "fixed"
     """``"fixed"`` if the standard deviation is always ``sigma``; ``"learned"`` if it begins with
     ``sigma`` and follows the one-fifth rule."""
-    window: Annotated[int, Field(ge=1)] = 50
+    window: Annotated[int, Field(ge=1)] = 100
     """Number W of trials with a hand sequence after which its spread changes under the one-fifth
     rule."""
-    floor: Annotated[float, Field(ge=0, le=0.3)] = 0.01
+    floor: Annotated[float, Field(ge=0, le=0.3)] = 0.03
     """Smallest standard deviation under the one-fifth rule, in length units and rad."""
 
 

@@ -51,7 +51,7 @@ _EXPLORATION = 0.2  # constant of the bandit, the default of CMA-ES
 _CLIP = 3.0  # largest advantage
 _RATE = 0.1  # of the running means b and d, for each batch
 _LOG_BOUNDS = math.log(0.005), math.log(0.3)  # of a learned spread, in length units and rad
-_TUNED = {"learned": (50, 2.0, 0.3), "fixed": (50, 2.0, 0.0)}
+_TUNED = {"learned": (25, 2.0, 0.1), "fixed": (25, 1.0, 0.0)}
 """Defaults of ``batch``, ``step`` and ``spread_step``, by ``spread``."""
 
 

@@ -130,7 +130,7 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     make_runs(folder / "runs.csv")
     table = table_of(pd.read_csv(folder / "runs.csv"))
-    table.to_csv(stored / "rivals.csv", index=False, float_format="%.5f", lineterminator="\n")
+    table.to_csv(stored / "rivals.csv", index=False, float_format="%.6g", lineterminator="\n")
     print(table.to_string())
 
 
