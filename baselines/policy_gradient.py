@@ -18,8 +18,8 @@ and rewards R::
   standard deviation, but at least 1 tick. A batch uses b and d from before it, the first batch its
   own. Then both move by a tenth towards the values of the batch, d with the b from before it.
 - Without the bound on A, one bad batch can carry the policy away.
-- A failed trial counts as the worst reward of all batches so far, less one tick. While no trial of a
-  batch has hit every goal, it counts as twice the ticks of the corrective process.
+- A failed trial counts as the worst reward of all batches so far, less one tick. While no trial of
+  a batch has hit every goal, it counts as twice the ticks of the corrective process.
 - The last batch changes nothing if it is incomplete.
 
 With ``spread="fixed"`` ν stays. The hands are chosen by the same bandit as in ``cma-es/bandit``. A
