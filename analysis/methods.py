@@ -78,6 +78,8 @@ _WORDS = {
     "hands": "hands ",
     "sigma": "σ ",
     "stop": "stop ",
+    "spread": "spread ",
+    "sequence": "hands ",
 }
 """Words that stand before the values of parameters."""
 

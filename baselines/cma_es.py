@@ -41,34 +41,30 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
 from operator import itemgetter
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
+from coartic.baselines.bandit import Search, recommend, sequences_to_try, spend_trials
 from coartic.baselines.evolution import EvolutionStrategy
-from coartic.baselines.uninformed import Attempts, UninformedParameters
+from coartic.baselines.uninformed import Attempts, SequenceParameters, UninformedParameters
 from coartic.method import Facts, Method, Result, Session
-from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
-from coartic.motion.solution import Movement, movements_of
+from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
 
-class BanditParameters(UninformedParameters):
+class BanditParameters(SequenceParameters):
     """Parameters of CMA-ES with a bandit over hand sequences."""
 
     exploration: Annotated[float, Field(ge=0, le=100)] = 0.2
     """Constant c of UCB1, as a multiple of the range of the first rewards (at least 1 tick)."""
 
 
-class Strategy:
+class Strategy(Search):
     """CMA-ES over the targets of one hand sequence.
-
-    Making a strategy makes a trial by the corrective process. :attr:`reward` is -inf if that trial
-    fails, and the strategy then cannot make generations.
 
     Parameters
     ----------
@@ -82,40 +78,30 @@ class Strategy:
     """
 
     def __init__(self, session: Session, attempts: Attempts, hands: str, sigma: float) -> None:
-        self.hands = hands
+        super().__init__(attempts, hands)
         self.sigma = sigma
-        self.generations = 1  # the trial by the corrective process counts as a generation
-        self.trials = 1
         self._rng = session.rng
-        self._attempts = attempts
-        corrective_trial = attempts.run_corrective(hands)
-        self.reward = float(corrective_trial.rewards[0])
-        """Best reward so far; -inf if the corrective process does not complete the sequence."""
         self._failure = -2.0 * self.reward
-        self._mean: Array = corrective_trial.reached[0, attempts.explored]
-        self._means: list[tuple[float, Array]] = [(math.inf, self._mean)]
+        self._means: list[tuple[float, Array]] = [(math.inf, self.first_mean)]
         self.evolution: EvolutionStrategy | None = None
         """The present strategy; None before the first generation."""
 
     def generation(self) -> None:
         """Make the trials of a generation, and update CMA-ES from their rewards.
 
-        At least one trial must be left. If the generation is cut short because none is left, CMA-ES
-        is not updated. If CMA-ES has ended, it first restarts with twice the population.
+        If the generation is cut short because no trial is left, CMA-ES is not updated. If CMA-ES
+        has ended, it first restarts with twice the population.
         """
         evolution = self.evolution
         if evolution is None or evolution.has_ended():
-            default = 4 + int(3 * math.log(len(self._mean)))
+            default = 4 + int(3 * math.log(len(self.first_mean)))
             size = default if evolution is None else 2 * evolution.size
-            evolution = EvolutionStrategy(self._mean, self.sigma, size, self._rng)
+            evolution = EvolutionStrategy(self.first_mean, self.sigma, size, self._rng)
             self.evolution = evolution
-            self._means.append((math.inf, self._mean))
-        values = evolution.ask()[: self._attempts.left]
-        rewards = self._attempts.around(self.hands, values).rewards
-        self.generations += 1
-        self.trials += len(values)
-        self.reward = max(self.reward, float(rewards.max()))
-        if len(values) == evolution.size:
+            self._means.append((math.inf, self.first_mean))
+        values = evolution.ask()
+        rewards = self.make_trials(values)
+        if len(rewards) == len(values):
             completed = rewards > -math.inf
             worst = rewards[completed].min() if completed.any() else 0.0
             evolution.tell(values, np.where(completed, -rewards, 1.0 - worst))
@@ -127,39 +113,6 @@ class Strategy:
         """The least mean cost of the last complete generation of a restart, and the mean after
         this generation. Without a complete generation: infinity, and the first mean."""
         return min(self._means, key=itemgetter(0))
-
-
-def recommend(strategies: Iterable[Strategy], attempts: Attempts) -> tuple[Movement, ...]:
-    """Return the movements of the strategies' best answer (:attr:`Strategy.answer`).
-
-    If no strategy has a complete generation, the hand sequence of the best trial decides.
-    """
-    best = min(strategies, key=lambda each: (each.answer[0], each.hands != attempts.hands))
-    targets = np.full(attempts.explored.shape, np.nan)
-    targets[attempts.explored] = best.answer[1]
-    return movements_of(best.hands, targets)
-
-
-def spend_trials(strategies: Sequence[Strategy], attempts: Attempts, exploration: float) -> None:
-    """Let strategies make generations until no trial of ``attempts`` is left.
-
-    The next generation comes from the strategy with the highest upper confidence bound (UCB1). The
-    constant c of UCB1 is ``exploration`` times the range of the strategies' first rewards (at least
-    1 tick). Strategies whose hand sequence the corrective process did not complete make no
-    generation.
-    """
-    promising = [strategy for strategy in strategies if strategy.reward > -math.inf]
-    rewards = [strategy.reward for strategy in promising] or [0.0]
-    width = exploration * max(max(rewards) - min(rewards), 1.0)
-    generations = len(promising)
-
-    def bound(strategy: Strategy) -> float:
-        doubt = math.sqrt(2.0 * math.log(generations) / strategy.generations)
-        return strategy.reward + width * doubt
-
-    while promising and attempts.left > 0:
-        max(promising, key=bound).generation()
-        generations += 1
 
 
 class CMAES(Method):
@@ -179,7 +132,8 @@ class CMAES(Method):
         In noise, return movements to a mean (:func:`recommend`).
 
         Each hand sequence first gets a trial by the corrective process. If there are more than 4096
-        sequences, only the initial one does. If all of these first trials fail, the method stops.
+        sequences, only the initial one does; if parameter ``sequence`` is given, only this one. If
+        all of these first trials fail, the method stops.
 
         Raises MethodError if no trial hits every goal.
         """
@@ -187,7 +141,7 @@ class CMAES(Method):
         with session.solving():
             strategies = [
                 Strategy(session, attempts, hands, self.parameters.sigma)
-                for hands in sequences_of(session)[: attempts.left]
+                for hands in sequences_to_try(session, self.parameters.told_hands(session))[: attempts.left]
             ]
             spend_trials(strategies, attempts, self.parameters.exploration)
         return attempts.result(

@@ -10,17 +10,28 @@ the trial's targets instead would gain more: on the paper's tasks random search 
 Hands are explored as in the learner: for each goal of the best sequence known, with probability ε,
 a random hand replaces the hand. The default standard deviation and ε are the learner's; they were
 not tuned.
+
+With ``spread="learned"`` each hand sequence has its own standard deviation, which follows the
+one-fifth rule (Beyer and Schwefel 2002). After every W trials with the sequence it is multiplied by
+1.5 if more than a fifth of these trials were at least as good as the centre was at their time;
+otherwise it is divided by 1.5^(1/4). It stays between a floor and 0.3.
+
+In noise the value of a centre is the reward of the trial that made it, which was partly lucky, as
+in the learner.
 """
 
 from __future__ import annotations
 
+import math
+from collections import Counter, defaultdict
 from itertools import pairwise
 from operator import eq
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
-from coartic.baselines.uninformed import Attempts, UninformedParameters
+from coartic.baselines.uninformed import Attempts, SequenceParameters
 from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
 from coartic.motion.solution import Movement, movements_of
@@ -28,10 +39,13 @@ from coartic.robot import Array
 from coartic.tasks.task import letters_of
 
 _EPSILON = 0.2  # probability of a random hand, for each goal
+_GROWTH = 1.5  # factor of the one-fifth rule
+_SHRINKAGE = 1.0 / math.sqrt(math.sqrt(_GROWTH))  # square roots round alike on all machines
+_LARGEST_SPREAD = 0.3  # under the one-fifth rule, in length units and rad
 _MOST_DRAWN = 128  # largest number of trials that are drawn ahead
 
 
-class HillClimbingParameters(UninformedParameters):
+class HillClimbingParameters(SequenceParameters):
     """Parameters of hill climbing.
 
     The default ``trials`` and ``sigma`` are the learner's; ``begin`` is not.
@@ -45,13 +59,21 @@ class HillClimbingParameters(UninformedParameters):
       in the best sequence so far, its target is the centre of that sequence plus noise. At the
       other goals, and at all goals before the first success, **A** acts.
     """
+    spread: Literal["fixed", "learned"] = "fixed"
+    """``"fixed"`` if the standard deviation is always ``sigma``; ``"learned"`` if it begins with
+    ``sigma`` and follows the one-fifth rule."""
+    window: Annotated[int, Field(ge=1)] = 100
+    """Number W of trials with a hand sequence after which its spread changes under the one-fifth
+    rule."""
+    floor: Annotated[float, Field(ge=0, le=0.3)] = 0.03
+    """Smallest standard deviation under the one-fifth rule, in length units and rad."""
 
 
 class HillClimbing(Method):
     """Hill climbing for each hand sequence, from its best trial so far."""
 
     name = "hill-climbing"
-    tuned_on = "nothing: the paper's values"
+    tuned_on = "nothing: the paper's values; a learned spread: d000 to d002 of five families"
     title = "hill climbing"
     facts = Facts(works=("beyer2002",))
     information = OPTIMISER_INFORMATION
@@ -65,13 +87,18 @@ class HillClimbing(Method):
 
         Raises MethodError if no trial hits every goal.
         """
-        initial_hands, rng = session.find_initial_hands(), session.rng
+        parameters: HillClimbingParameters = self.parameters
+        is_learned, window = parameters.spread == "learned", parameters.window
+        given, rng = parameters.told_hands(session), session.rng
+        initial_hands = session.find_initial_hands() if given is None else given
         letters = letters_of(session.hands)
-        attempts = Attempts(session, self.parameters.trials)
-        sequences, ahead = len(letters) ** session.goals_count, 1
+        attempts = Attempts(session, parameters.trials)
+        sequences, ahead = 1 if given else len(letters) ** session.goals_count, 1
         explored, dim = attempts.explored, attempts.explored.sum()
         centres: dict[str, Array] = {}  # by hand sequence, (G, dof); NaN for joints not explored
         rewards: dict[str, float] = {}  # of the centre, by hand sequence
+        spreads = defaultdict[str, float](lambda: parameters.sigma)  # by hand sequence
+        since, good = Counter[str](), Counter[str]()  # trials since a spread changed; good ones
         hopeless: set[str] = set()  # sequences that the corrective process does not complete
 
         def draw() -> str:
@@ -80,6 +107,8 @@ class HillClimbing(Method):
             Its hands are random before the first success. Later they are the hands of the best
             trial, each replaced by a random hand with probability 0.2.
             """
+            if given is not None:
+                return given
             while True:
                 chosen = list(attempts.hands or letters[0] * session.goals_count)
                 for goal in range(len(chosen)):
@@ -88,22 +117,33 @@ class HillClimbing(Method):
                 if (hands := "".join(chosen)) not in hopeless:
                     return hands
 
+        def adapt(hands: str, is_good: bool) -> None:
+            """Count a trial of a hand sequence, and follow the one-fifth rule."""
+            since[hands] += 1
+            good[hands] += is_good
+            if since[hands] == window:
+                factor = _GROWTH if good[hands] > window / 5 else _SHRINKAGE
+                wanted = max(spreads[hands] * factor, parameters.floor)
+                spreads[hands] = min(wanted, _LARGEST_SPREAD)
+                since[hands] = good[hands] = 0
+
         def begin(hands: str) -> Array:
             """Return the targets of the first trial of a hand sequence, shape ``(G, dof)``."""
             targets = np.full(explored.shape, np.nan)
-            if self.parameters.begin == "best" and attempts.hands:
+            if parameters.begin == "best" and attempts.hands:
                 states, of_best = ([*pairwise(f" {each}")] for each in (hands, attempts.hands))
                 shared = np.array([*map(eq, states, of_best)])
                 aimed = shared[:, None] & explored
-                noise = self.parameters.sigma * rng.standard_normal(aimed.sum())
+                noise = parameters.sigma * rng.standard_normal(aimed.sum())
                 targets[aimed] = centres[attempts.hands][aimed] + noise
             return targets
 
         with session.solving():
             while attempts.left > 0 and len(hopeless) < sequences:
-                # Draws do not depend on rewards until a centre moves, which is rare. So trials are
-                # drawn ahead and made side by side. After a trial that moves a centre, the draws
-                # beyond it are discarded, and the generator goes back to its state after the trial.
+                # Draws do not depend on rewards until a centre moves, which is rare, or a spread
+                # changes. So trials are drawn ahead and made side by side, up to the end of a
+                # window. After a trial that moves a centre, the draws beyond it are discarded, and
+                # the generator goes back to its state after the trial.
                 drawn, noise, states = list[str](), list[Array](), [rng.bit_generator.state]
                 while len(drawn) < min(ahead, attempts.left):
                     hands = draw() if attempts.trials_made else initial_hands
@@ -112,16 +152,24 @@ class HillClimbing(Method):
                     drawn.append(hands)
                     noise.append(rng.standard_normal(dim))
                     states.append(rng.bit_generator.state)
+                    if is_learned and since[hands] + drawn.count(hands) == window:
+                        break
                 if drawn:
                     thresholds = np.array([rewards[hands] for hands in drawn])
                     targets = np.array([centres[hands] for hands in drawn])
-                    targets[:, explored] += self.parameters.sigma * np.array(noise)
+                    scales = np.array([spreads[hands] for hands in drawn])
+                    targets[:, explored] += scales[:, None] * np.array(noise)
                     attempt = attempts.run_targets(drawn, targets, until=thresholds)
                     tried = len(attempt.rewards)
                     rng.bit_generator.state = states[tried]
                     hands, ahead = drawn[tried - 1], min(2 * ahead, _MOST_DRAWN)
                     if attempt.rewards[-1] > rewards[hands]:
                         ahead = tried
+                    if is_learned:
+                        for each, is_good in zip(
+                            drawn[:tried], attempt.rewards >= thresholds[:tried], strict=True
+                        ):
+                            adapt(each, bool(is_good))
                 else:
                     rewards[hands] = -np.inf
                     targets = begin(hands)

@@ -22,13 +22,25 @@ from coartic.robot import Array
 
 
 class UninformedParameters(Parameters):
-    """Parameters of CMA-ES and hill climbing; the defaults are the learner's."""
+    """Parameters of CMA-ES, hill climbing and policy gradient; the defaults are the learner's."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Number of trials of a run."""
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
     """Standard deviation of the perturbations (in CMA-ES, of the first ones), in length units
     (base) and rad (joints)."""
+
+
+class SequenceParameters(UninformedParameters):
+    """Parameters of methods that can be told the hands."""
+
+    sequence: str | None = None
+    """Hand sequence of all trials, such as ``"RRLR"``, or ``"given"`` for the task's initial hands
+    (:meth:`.Session.find_initial_hands`). By default the method finds the hands itself."""
+
+    def told_hands(self, session: Session) -> str | None:
+        """Return the hand sequence that the method is told, such as ``"RRLR"``, or None."""
+        return session.find_initial_hands() if self.sequence == "given" else self.sequence
 
 
 class Attempts:

@@ -1,4 +1,4 @@
-"""Hill climbing and CMA-ES against closed forms and their own rules."""
+"""Hill climbing, CMA-ES and policy gradient against closed forms and their own rules."""
 
 import math
 from collections import namedtuple
@@ -12,6 +12,7 @@ from coartic.baselines import cma_es
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
 from coartic.baselines.evolution import EvolutionStrategy
 from coartic.baselines.hill_climbing import HillClimbing
+from coartic.baselines.policy_gradient import PolicyGradient
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands
 from coartic.method import MethodError, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
@@ -19,7 +20,7 @@ from coartic.motion.solution import movements_of
 from coartic.tasks.task import letters_of
 from tests.support.strategies import failing_task, solve, tiny_task
 
-METHODS = (HillClimbing, CMAES, GoalByGoal)
+METHODS = (HillClimbing, CMAES, GoalByGoal, PolicyGradient)
 
 
 def test_hands_chosen_goal_by_goal():
@@ -247,3 +248,54 @@ def test_a_single_joint_to_explore():
     # Turns by pi/2 - 0.5 less the angle under which half the disc's chord is seen.
     turn = math.pi / 2 - 0.5 - 2 * math.asin(0.1 / 2)
     assert max(session.rewards) == -(math.ceil(turn / 0.01) + 1)
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.035])
+def test_the_one_fifth_rule(floor, monkeypatch):
+    """Recomputed from the trials: centres, good trials, and the scatter of targets in a window."""
+    centres, spreads, windows = {}, {}, {}
+    ratios, first_ratios, kept = [], [], 0
+    options = {"spread": "learned", "window": 50, "floor": floor, "trials": 4000}
+    for hands, targets, reward, reached in trials_of(HillClimbing, monkeypatch, **options):
+        if hands in centres:
+            spread, (scatter, good) = spreads.setdefault(hands, 0.05), windows[hands]
+            scatter.extend((targets - centres[hands][1])[~np.isnan(targets)])
+            if not good:
+                first_ratios.append(np.mean(np.square(scatter)) / spread**2)
+            good.append(reward >= centres[hands][0])
+            if len(good) == 50:
+                ratios.append(np.std(scatter) / spread)
+                wanted = spread * (1.5 if sum(good) > 10 else 1.5**-0.25)
+                spreads[hands] = max(wanted, floor)
+                kept += wanted < floor
+                windows[hands] = [], []
+        if hands not in centres or reward > centres[hands][0]:
+            centres[hands] = reward, reached
+            windows.setdefault(hands, ([], []))
+    assert len(ratios) > 50  # each is of at least 1,800 normal numbers
+    assert max(np.abs(np.array(ratios) - 1.0)) < 0.08
+    assert np.mean(first_ratios) == pytest.approx(1.0, abs=0.1)  # it changes with the window
+    assert (kept > 10) == (floor > 0.0)
+    assert len({*spreads.values()}) > 1
+
+
+@pytest.mark.parametrize("method", [HillClimbing, CMAES, PolicyGradient])
+@pytest.mark.parametrize("world", [MotionModel(), MotionModel(motor_noise=0.01)])
+def test_hands_given(method, world):
+    """All trials have them, also if other hands are better."""
+    options = {"trials": 300, "sequence": "RLRR", "model": world}
+    result, execution, session = solve(method, "two-armed-2", **options)
+    assert execution.hands == "RLRR"
+    assert session.meter.trials == 300
+    if not world.motor_noise:
+        assert session.rewards[0] == corrective_trial("two-armed-2", "RLRR").reward
+        assert execution.reward == max(session.rewards) > session.rewards[0]
+    else:
+        assert {movement.kind for movement in result.solution} == {"learned"}
+    task = load_task("two-armed-1").replace(initial_hands="LLRR")
+    assert set(solve(method, task, trials=60, sequence="given")[1].hands) == set("LR")
+    assert solve(method, task, trials=60, sequence="given")[1].hands == "LLRR"
+    with pytest.raises(ValueError, match="hands"):
+        solve(method, "two-armed-2", trials=300, sequence="RLX")
+    with pytest.raises(MethodError):
+        solve(method, failing_task(hands="R"), trials=50, sequence="L")

@@ -272,6 +272,7 @@ MODULES = (
     "coartic.baselines.trajectory_optimisation",
     "coartic.baselines.receding_horizon",
     "coartic.baselines.optimum",
+    "coartic.baselines.policy_gradient",
 )
 """Modules of the built-in methods, each with a list ``METHODS``, in the order of lists and figures.
 Add a new one at the end, so that the others keep their looks."""
