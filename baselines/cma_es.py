@@ -138,10 +138,11 @@ class CMAES(Method):
         Raises MethodError if no trial hits every goal.
         """
         attempts = Attempts(session, self.parameters.trials)
+        told = self.parameters.told_hands(session)
         with session.solving():
             strategies = [
                 Strategy(session, attempts, hands, self.parameters.sigma)
-                for hands in sequences_to_try(session, self.parameters.told_hands(session))[: attempts.left]
+                for hands in sequences_to_try(session, told)[: attempts.left]
             ]
             spend_trials(strategies, attempts, self.parameters.exploration)
         return attempts.result(

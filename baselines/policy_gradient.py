@@ -165,10 +165,11 @@ class PolicyGradient(Method):
         """
         parameters: PolicyGradientParameters = self.parameters
         attempts = Attempts(session, parameters.trials)
+        told = parameters.told_hands(session)
         with session.solving():
             policies = [
                 Policy(session.rng, attempts, hands, parameters)
-                for hands in sequences_to_try(session, parameters.told_hands(session))[: attempts.left]
+                for hands in sequences_to_try(session, told)[: attempts.left]
             ]
             spend_trials(policies, attempts, _EXPLORATION)
         return attempts.result(
