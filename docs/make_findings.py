@@ -45,9 +45,11 @@ def table(suite: str, name: str) -> pd.DataFrame:
     path = folder / f"{name}.csv"
     if suite in NEW:
         if name == "by-task":  # no table of the report: pages compute means over tasks from it
-            frame = by_task(load(NEW[suite]).runs).set_index("task")
+            frame = by_task(load(NEW[suite]).worlds[""].runs).set_index("task")
         else:
             frame = pd.read_csv(NEW[suite] / "report" / "tables" / path.name, index_col="row")
+            if "world" in frame:
+                frame = frame[frame.pop("world").isna()]  # the paper's world
         frame = frame.drop(columns="run_ids", errors="ignore")
         frame.to_csv(path, float_format="%.6g", lineterminator="\n")
     return pd.read_csv(path, index_col=0)

@@ -118,7 +118,7 @@ def of_methods(rows):
 
 def of_comparison():
     """Return the leans of the methods' shipped runs on tasks ascending and descending."""
-    rows = TABLES["contexts"](load("shipped")).set_index("method").loc[[*METHODS]]
+    rows = TABLES["contexts"](load("shipped").worlds[""]).set_index("method").loc[[*METHODS]]
     columns = ["lean", "lean_low", "lean_high", "distance", "next_apart", "lean_runs"]
     return rows[columns].rename(index=METHODS)
 

@@ -34,7 +34,7 @@ VERDICTS = "not supported", "depends on the goals", "undecided", "supported"
 
 def measure(folders):
     """Return the tables of results folders by name."""
-    studies = [load(folder) for folder in folders]
+    studies = [load(folder).worlds[""] for folder in folders]
     return {
         "claims": judge_by_first(studies),
         "rewards": compare_rewards(studies[0]),
