@@ -38,7 +38,8 @@ def computed(base):
     """Yield the numbers with their names, from views ``runs`` and ``solutions``."""
 
     def of(column, method, task, setting=""):
-        query = f"SELECT {column} FROM runs WHERE method = ? AND task = ? AND setting = ?"
+        where = "world = '' AND method = ? AND task = ? AND setting = ?"
+        query = f"SELECT {column} FROM runs WHERE {where}"
         return np.array([value for (value,) in base.execute(query, (method, task, setting))])
 
     def first(method, task):

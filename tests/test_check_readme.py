@@ -25,7 +25,7 @@ RANKING = pd.DataFrame(
 
 def test_equal_numbers_are_equal():
     assert check_readme.differences(TEXT, RANKING) == (3, [])
-    assert len(check_readme.rows_of(check_readme.README.read_text("utf-8"))) == 10
+    assert len(check_readme.rows_of(check_readme.README.read_text("utf-8"))) == 13
 
 
 @pytest.mark.parametrize(
@@ -43,6 +43,15 @@ def test_each_number_counts(row, column, value):
     count, (line,) = check_readme.differences(TEXT, changed)
     assert count == 3
     assert line.startswith(f"{row.partition(' (')[0]}: gap ")
+
+
+def test_rows_with_a_setting_have_their_own_rows():
+    """The row of the method without a setting comes first, wherever it stands in the ranking."""
+    other = RANKING.loc[["CMA-ES"]].set_axis(["CMA-ES (hands given)"]) / 2.0
+    assert check_readme.differences(TEXT, pd.concat([other, RANKING])) == (3, [])
+    cells = "each trial | 0.5 % [0.4, 0.7] | 7.9 % [6.9, 9.0] | 47 % [46, 48]"
+    row = f"| CMA-ES (hands given) | {cells} |"
+    assert check_readme.differences(TEXT + row, pd.concat([other, RANKING])) == (4, [])
 
 
 def test_a_row_that_the_folder_lacks_is_named():

@@ -37,7 +37,7 @@ def test_shipped_results_are_read_as_a_study(tmp_path, monkeypatch):
     """Read-only, whatever folder is here; by their own names as others."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "shipped").mkdir()
-    study = load("shipped")
+    study = load("shipped").worlds[""]
     assert study.suite == "comparison"
     assert len(study.runs) > 3_000
     (alone,) = study.cells["ascending", "corrective-alone/best-hands"].reward

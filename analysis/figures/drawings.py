@@ -581,9 +581,12 @@ def draw_runtimes(study: Study) -> Parts | None:
     style.letters(panels)
     ends = data.groupby("method", sort=False).tail(1)
     ends = ends.assign(share=100 * ends.share).sort_values("share")
-    height = -math.inf
-    for end in ends.to_dict("records"):
-        height = max(end["share"], height + (9 if style.is_narrow() else 6.5))
+    gap, heights = 9 if style.is_narrow() else 6.5, list[float]()
+    for share in ends.share:
+        heights.append(max(share, heights[-1] + gap if heights else -math.inf))
+    over = np.arange(len(heights))[::-1] * gap  # the names below one whose place is the top
+    heights = np.minimum(heights, 100 - over).tolist()
+    for end, height in zip(ends.to_dict("records"), heights, strict=True):
         at, look = panels[-1].get_yaxis_transform(), looks[end["method"]]
         mark: Any = {"color": look["color"], "markersize": 4, "markeredgewidth": 0}
         panels[-1].plot(1.03, height, look["marker"], transform=at, clip_on=False, **mark)

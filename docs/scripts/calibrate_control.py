@@ -44,4 +44,6 @@ def calibrate(study):
 
 
 if __name__ == "__main__":
-    calibrate(load("shipped").worlds[""]).to_csv(Path(sys.argv[1]) / "calibration.csv", float_format="%.3f")
+    calibrate(load("shipped").worlds[""]).to_csv(
+        Path(sys.argv[1]) / "calibration.csv", float_format="%.3f"
+    )

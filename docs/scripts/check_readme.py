@@ -36,7 +36,8 @@ def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
     """
     lines, rows = [], rows_of(text)
     for name, printed in rows.items():
-        titles = [title for title in ranking.index if title.partition(" (")[0] == name]
+        titles = [title for title in ranking.index if name in (title, title.partition(" (")[0])]
+        titles.sort(key=len)  # without a setting before those with one
         if not titles:
             lines.append(f"{name}: not in this folder")
             continue

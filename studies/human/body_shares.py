@@ -82,4 +82,6 @@ def measure_body(study):
 
 
 if __name__ == "__main__":
-    measure_body(load("shipped").worlds[""]).to_csv(Path(__file__).with_name("body.csv"), float_format="%.6g")
+    measure_body(load("shipped").worlds[""]).to_csv(
+        Path(__file__).with_name("body.csv"), float_format="%.6g"
+    )
