@@ -36,20 +36,20 @@ NEW = dict[str, Path]()
 
 
 @cache
-def table(suite: str, name: str) -> pd.DataFrame:
-    """Return a stored table of a suite or a study, with its rows by name.
+def table(suite: str, name: str, world: str = "") -> pd.DataFrame:
+    """Return a stored table of a suite or a study in one world, with its rows by name.
 
     If the suite is in :data:`NEW`, the table is first copied from its report, without run ids.
     """
     folder = STUDIES / suite if (STUDIES / suite).is_dir() else STORED / suite
-    path = folder / f"{name}.csv"
+    path = folder / f"{name}{' in ' * bool(world)}{world}.csv".replace(" ", "-")
     if suite in NEW:
         if name == "by-task":  # no table of the report: pages compute means over tasks from it
             frame = by_task(load(NEW[suite]).worlds[""].runs).set_index("task")
         else:
-            frame = pd.read_csv(NEW[suite] / "report" / "tables" / path.name, index_col="row")
+            frame = pd.read_csv(NEW[suite] / "report" / "tables" / f"{name}.csv", index_col="row")
             if "world" in frame:
-                frame = frame[frame.pop("world").isna()]  # the paper's world
+                frame = frame[frame.pop("world").fillna("") == world]
         frame = frame.drop(columns="run_ids", errors="ignore")
         frame.to_csv(path, float_format="%.6g", lineterminator="\n")
     return pd.read_csv(path, index_col=0)
