@@ -208,6 +208,7 @@ class Study:
         for world in names:
             plan = [job for job in self.plan if job.cell.world == world]
             here = {job.cell.label for job in plan}
+            used = {job.cell.method.name for job in plan}
             others = [label for label in methods.index if label not in here]
             others = [label for label in others if label in {*labelled.label}]
             studies[world] = Study(
@@ -217,7 +218,7 @@ class Study:
                 self.stored[self.stored.world == world],
                 self.marks,
                 self.against if self.against in here else "",
-                self.imports,
+                {name: self.imports[name] for name in self.imports if name in used},
                 methods.loc[others],
             )
         return studies

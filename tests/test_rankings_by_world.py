@@ -102,6 +102,15 @@ def test_no_share_where_nothing_but_chance_is_gained():
         assert rows.without_gain["a"] == (not has_share)
 
 
+def test_imports_are_those_of_methods_of_the_world():
+    """Of a method from a file that has runs only in the paper's world."""
+    rows = [runs_of(TASK, "b", [-300]), runs_of(TASK, "c", [-301])]
+    study = study_of([*rows[0], *rows[1], *runs_in_noise(TASK, "b", [310.0])])
+    study.imports.update(b=["numpy 2"], c=["scipy 1"])
+    imports = {world: {*of_world.imports} for world, of_world in study.worlds.items()}
+    assert imports == {"": {"b", "c"}, NOISE: {"b"}}
+
+
 def test_values_of_all_worlds_are_in_one_frame():
     runs = planted().runs
     assert runs.value.tolist()[:6] == [-300, -302, -310, -312, -305, -306]
