@@ -165,11 +165,13 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     of_suite = {planned.cell.method.name for planned in jobs}
     cells = {(planned.cell.task.name, planned.cell.label) for planned in jobs}
     jobs += [
-        job(task, method)
-        for task, method in itertools.product(tasks.values(), methods)
+        job(task, method, world=world)
+        for task, method, world in itertools.product(
+            tasks.values(), methods, _worlds_beside(jobs, request)
+        )
         if (task.name in own or method.name not in of_suite)
         and (task.name, method.name) not in cells
-        and method.refuses(_world_of(request)) is None
+        and method.refuses(world) is None
         and method.why_not(task) is None
     ]
     if wrong := [name for name in names if name not in tasks]:
@@ -322,6 +324,17 @@ def _asked_tasks(
 def _world_of(request: Request) -> MotionModel:
     """Return the world of a request, by default the paper's."""
     return request.model[0] if request.model else PAPER
+
+
+def _worlds_beside(jobs: Sequence[Job], request: Request) -> list[MotionModel]:
+    """Return the worlds of methods and tasks that no block names.
+
+    That is the world of the request, by default the paper's; but if no block has the paper's world,
+    it is each world of the blocks.
+    """
+    worlds = {made.cell.world: PAPER._replace(**differences(made.cell.model)) for made in jobs}
+    is_usual = request.model or not worlds or "" in worlds
+    return [_world_of(request)] if is_usual else [*worlds.values()]
 
 
 def _suite_jobs(

@@ -80,6 +80,19 @@ def test_a_command_sets_the_world_of_blocks_without_one(suite):
     assert {job.cell.task.name for job in plan} == {"ascending"}
 
 
+def test_methods_beside_the_blocks_run_in_the_worlds_of_the_suite(suite):
+    """In the paper's world if a block has it, or else in all that the blocks have."""
+    noisy = BLOCK + "model = { motor_noise = [0.01, 0.02] }\n"
+    for blocks, worlds in (
+        ([noisy], ["motor_noise=0.01", "motor_noise=0.02"]),
+        ([noisy, BLOCK], [""]),
+    ):
+        plan = plan_suite(suite(*blocks), methods=["random-search", "hill-climbing"])
+        assert [job.cell.world for job in plan if job.cell.method.name == "hill-climbing"] == worlds
+    plan = plan_suite(suite(BLOCK), methods=["hill-climbing"], model={"motor_noise": 0.01})
+    assert worlds_in(plan) == ["motor_noise=0.01"]
+
+
 def test_ids_are_those_of_the_paper_unless_the_world_is_another():
     """A constant that has its default is no part of an id, and each that has not is."""
     info, task = KNOWN["random-search"], load_task("ascending")

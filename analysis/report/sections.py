@@ -197,8 +197,8 @@ exceed by so many percentage points (negative: their gap is smaller): \
 
 {% endfor %}""",
         note="The gap is the ticks of the mean reward beyond the {reference}, in per cent of it. "
-        "With motor noise a solution, found without noise, is executed with it, and the gap is to "
-        "the {reference} without noise. "
+        "A gap with motor noise beside it is of solutions that were practised without noise and "
+        "executed with it; that gap is to the {reference} without noise. "
         "The share of the gain is 0 % for the corrective process alone with its best hands (with "
         "the task's initial hands if there are more than 4096 hand sequences), and 100 % for the "
         "{reference}; tasks on which both are equal have none. Intervals "
