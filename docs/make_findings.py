@@ -42,7 +42,7 @@ def table(suite: str, name: str, world: str = "") -> pd.DataFrame:
     If the suite is in :data:`NEW`, the table is first copied from its report, without run ids.
     """
     folder = STUDIES / suite if (STUDIES / suite).is_dir() else STORED / suite
-    path = folder / f"{name}{' in ' * bool(world)}{world}.csv".replace(" ", "-")
+    path = folder / f"{f'{name}-in-{world}' if world else name}.csv"
     if suite in NEW:
         if name == "by-task":  # no table of the report: pages compute means over tasks from it
             frame = by_task(load(NEW[suite]).worlds[""].runs).set_index("task")

@@ -18,7 +18,8 @@ def test_every_method_runs_in_some_suite():
     blocks = [block for suite in every for block in suite.blocks]
     patterns = {pattern for block in blocks for pattern in block.methods}
     run = {name for name in KNOWN for pattern in patterns if fnmatch(name, pattern)}
-    assert not {*KNOWN} - run, "add a block with these methods to benchmarks/suites/ablations.toml"
+    missing = ", ".join(sorted({*KNOWN} - run))
+    assert not missing, f"add a block with {missing} to benchmarks/suites/ablations.toml"
 
 
 ASCENDING = 'tasks = ["ascending"]\nmethods = ["dual-process/EC1"]\n'

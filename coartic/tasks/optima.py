@@ -27,7 +27,7 @@ DATA = Path(__file__).with_name("optima.json")
 BEST_KNOWN = Path(__file__).with_name("best_known.csv")
 """Columns ``instance``, ``reward``, ``bound`` (empty if nothing is proven), ``nodes`` (of the
 search that proved the bound), ``hands`` and ``essence`` (:func:`task_hash`)."""
-IN_NOISE = Path(__file__).with_name("best_in_noise.csv")
+BEST_IN_NOISE = Path(__file__).with_name("best_in_noise.csv")
 """Columns ``task``, ``motor_noise`` (length units of the base, rad), ``mean_ticks`` over 1,000
 executions, its ``standard_error``, ``hands``, the ``method`` of the solution and ``essence``."""
 
@@ -90,7 +90,7 @@ def _by_task_hash() -> dict[tuple[str, float], KnownOptimum]:
         if (entry["base"], entry["other_arm"]) == (BASE, "free") and "reward" in entry:
             best = KnownOptimum(entry["reward"], entry["bound"], entry["hands"])
             optima[entry["essence"], 0.0] = best
-    with IN_NOISE.open(encoding="ascii", newline="") as lines:
+    with BEST_IN_NOISE.open(encoding="ascii", newline="") as lines:
         for row in csv.DictReader(lines):
             best = KnownOptimum(-float(row["mean_ticks"]), None, row["hands"])
             optima[row["essence"], float(row["motor_noise"])] = best

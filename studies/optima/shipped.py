@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from coartic import CoarticError, Movement, execute, load_task
-from coartic.tasks.optima import BASE, BEST_KNOWN, DATA, IN_NOISE, entries
+from coartic.tasks.optima import BASE, BEST_IN_NOISE, BEST_KNOWN, DATA, entries
 
 SOLUTIONS = Path(__file__).with_name("solutions.json.xz")
 SOLUTIONS_IN_NOISE = SOLUTIONS.with_name("in_noise.json.xz")
@@ -104,14 +104,14 @@ def read_in_noise():
     if not SOLUTIONS_IN_NOISE.exists():
         return {}
     solutions = json.loads(lzma.decompress(SOLUTIONS_IN_NOISE.read_bytes()))
-    with IN_NOISE.open(encoding="ascii", newline="") as lines:
+    with BEST_IN_NOISE.open(encoding="ascii", newline="") as lines:
         rows = [*csv.DictReader(lines)]
     return {row["task"]: row | {"solution": solutions[row["task"]]} for row in rows}
 
 
 def write_in_noise(known):
     """Write the entries of the world with motor noise into their files."""
-    with IN_NOISE.open("w", encoding="ascii", newline="") as file:
+    with BEST_IN_NOISE.open("w", encoding="ascii", newline="") as file:
         writer = csv.DictWriter(file, _COLUMNS_IN_NOISE, extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
         writer.writerows(known[task] for task in sorted(known))
