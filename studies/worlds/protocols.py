@@ -4,14 +4,27 @@
     PYTHONPATH=studies python studies/worlds/protocols.py results/development d000..d001
 
 The results folder has a folder for each world, and beside it the suite that made it, with the task
-files of worlds with another radius. Stored runs are not made again. Worlds are run one after the
-other, in the order of :data:`worlds.WORLDS`, so that an interrupted study has whole worlds.
+files of worlds with another radius. Stored runs are not made again. All worlds have their runs of
+random tasks before one of them has its runs of the paper's tasks, and hill climbing, about which
+there is no claim, runs last; so an interrupted study has whole worlds. The command can name worlds.
+All takes about an hour of CPU time.
 """
 
 import sys
 from pathlib import Path
 
-from worlds import CONTROL, CONTROL_SETS, INSTANCES, LONG, RUNS, RUNS_OF_PAIRS, WORLDS
+from settings import (
+    CONTROL,
+    CONTROL_SETS,
+    FAMILIES,
+    INSTANCES,
+    LONG,
+    PAPER,
+    RUNS,
+    RUNS_OF_PAIRS,
+    STAGES,
+    WORLDS,
+)
 
 from coartic import load_task
 from coartic.benchmarks import run_suite
@@ -19,110 +32,124 @@ from coartic.benchmarks.pool import Local
 from coartic.tasks.task import task_text
 from people.protocols import pair
 
-PAPER = ("ascending", "descending", "two-armed-1", "two-armed-2")
-FAMILIES = ("one-armed", "two-armed", "aligned")
-SEARCHES = ("random-search", "hill-climbing", "policy-gradient")
-"""Methods of tasks with one arm and with two, beside the learner. CMA-ES has runs of its own."""
+LEARNERS = {
+    "dual-process/EC1": ("ascending", "descending", "one-armed"),
+    "dual-process/EC4": ("two-armed", "aligned"),
+}
+"""Conditions of the learner, with the beginnings of the names of their tasks."""
 
 
 def numbers(instances):
-    """Return the names of a range of instances, such as ``d000..d001``."""
+    """Return the numbers of a range of instances, such as ``d000..d001``."""
     first, last = instances.split("..")
     return [f"{first[0]}{number:03d}" for number in range(int(first[1:]), int(last[1:]) + 1)]
 
 
-def with_radius(task, name, radius):
-    """Return a task whose goals have another radius."""
-    return task.model_copy(update={"name": name, "radius": radius})
-
-
-def blocks_of(world, folder, instances):
-    """Return the blocks of a world's suite as TOML, and write its task files into a folder."""
-    names, made = [*PAPER] if instances == INSTANCES else [], {}
-    names += [f"{family}/v1/{number}" for family in FAMILIES for number in numbers(instances)]
+def with_radius(task, world, name):
+    """Return a task as it is in a world: with the radius of its goals, and another name."""
     if world.radius is None:
-        tasks = dict(zip(names, names, strict=True))
-    else:
-        tasks = {name: f"{name.replace('/v1/', '-')}-radius-{world.radius}" for name in names}
-        made |= {new: with_radius(load_task(old), new, world.radius) for old, new in tasks.items()}
-    pairs = []
-    for number in numbers(instances):
-        for task in pair(f"one-armed/v1/{number}"):
-            made[task.name] = (
-                task if world.radius is None else with_radius(task, task.name, world.radius)
-            )
-            pairs.append(task.name)
+        return task
+    return task.model_copy(update={"name": name, "radius": world.radius})
+
+
+def places_of(world, folder, instances):
+    """Return what a suite names a world's tasks, by task: its name, or a file that is written.
+
+    The first mapping has the tasks of the paper and of families, the second the pairs.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    for name, task in made.items():
-        (folder / f"{name}.toml").write_text(task_text(task), encoding="utf-8")
-    places = {name: str(folder / f"{name}.toml") if name in made else name
-              for name in (*tasks.values(), *pairs)}  # fmt: skip
 
-    def block(which, methods, runs, more=""):
-        paths = [places[name] for name in which]
-        text = f"\n[[blocks]]\ntasks = {paths}\nmethods = {[*methods]}\nruns = {runs}\n{more}"
-        return text.replace("'", '"')
+    def write(task):
+        path = folder / f"{task.name}.toml"
+        path.write_text(task_text(task), encoding="utf-8")
+        return str(path)
 
+    tasks = [*PAPER] if instances == INSTANCES else []  # the paper's tasks are not for development
+    tasks += [f"{family}/v1/{number}" for family in FAMILIES for number in numbers(instances)]
+    places = dict(zip(tasks, tasks, strict=True))
+    if world.radius is not None:
+        for name in tasks:
+            new = f"{name.replace('/v1/', '-')}-radius-{world.radius}"
+            places[name] = write(with_radius(load_task(name), world, new))
+    pairs = [task for number in numbers(instances) for task in pair(f"one-armed/v1/{number}")]
+    return places, {task.name: write(with_radius(task, world, task.name)) for task in pairs}
+
+
+def block(places, methods, runs):
+    """Return a block of a suite."""
+    text = f"\n[[blocks]]\ntasks = {[*places]}\nmethods = {[*methods]}\nruns = {runs}\n"
+    return text.replace("'", '"')
+
+
+def blocks_of(world, folder, instances, stages):
+    """Return the blocks of some stages of a world's suite."""
+    tasks, pairs = places_of(world, folder, instances)
     text = ""
-    arms = {"EC1": ("ascending", "descending", "one-armed"),
-            "EC4": ("two-armed-", "two-armed/", "aligned")}  # fmt: skip
-    for condition, beginnings in arms.items():
-        for of_paper in (True, False):
-            which = [new for old, new in tasks.items()
-                     if old.startswith(beginnings) and (old in PAPER) == of_paper]  # fmt: skip
-            methods = (f"dual-process/{condition}", *SEARCHES)
-            if world.trials > 10_000:
-                methods = (methods[0], "random-search", "policy-gradient")
-            if not which:
+    for stage in stages:
+        for learner, beginnings in LEARNERS.items():
+            places = [
+                place
+                for name, place in tasks.items()
+                if name.startswith(beginnings)
+                and (stage == "hill climbing" or (name in PAPER) == (stage == "paper"))
+            ]
+            if not places:
                 continue
-            runs = RUNS["paper"] if of_paper else RUNS["families"]
-            if world.trials > 10_000:
-                runs = 1 if not of_paper else 5
-            text += block(which, methods, runs)
-            text += block(which, ["cma-es/bandit"], runs if of_paper else 1)
-            text += block(which, ["corrective-alone/best-hands"], 1)
-    if world.trials == 10_000:
-        text += block(pairs, ["dual-process/EC1", "random-search"], RUNS_OF_PAIRS)
+            if stage == "hill climbing":
+                text += block(places, ["hill-climbing"], RUNS["families"])
+                continue
+            runs = RUNS[stage] if world is not LONG else 1
+            text += block(places, [learner, "random-search", "policy-gradient"], runs)
+            text += block(places, ["cma-es/bandit"], runs if stage == "paper" else 1)
+            text += block(places, ["corrective-alone/best-hands"], 1)
+        if stage == "families" and world is not LONG:
+            text += block(pairs.values(), ["dual-process/EC1", "random-search"], RUNS_OF_PAIRS)
     return text
 
 
-def suite_of(world, folder, instances):
-    """Return the suite of a world as TOML."""
+def head(title, world):
+    """Return the head of a suite as TOML."""
+    text = f'title = "{title}"\ndescription = "A world of study worlds."\n'
+    text += f"runs = 1\ntrials = {world.trials}\n"
     model = ", ".join(f"{key} = {value!r}" for key, value in world.model.items()).replace("'", '"')
-    head = f'title = "{world.title}"\ndescription = "Methods in one world of study worlds."\n'
-    head += f"runs = 1\ntrials = {world.trials}\n" + (f"model = {{ {model} }}\n" if model else "")
-    return head + blocks_of(world, folder / "tasks" / world.name, instances)
+    return text + (f"model = {{ {model} }}\n" if model else "")
+
+
+def run_world(world, folder, instances, stages):
+    """Run some stages of a world."""
+    file = folder / f"{world.name}.toml"
+    blocks = blocks_of(world, folder / "tasks" / world.name, instances, stages)
+    file.write_text(head(world.title, world) + blocks, encoding="utf-8")
+    print(world.name, run_suite(file, folder / world.name, executor=Local(1)), flush=True)
 
 
 def run_control(folder, instances):
     """Run random search in the paper's world with further seeds, in place of the learner."""
     world = WORLDS["paper"]
-    tasks = folder / "tasks" / "paper"
-    names = [f"{family}/v1/{number}" for family in FAMILIES for number in numbers(instances)]
-    pairs = [str(tasks / f"{task.name}.toml")
-             for number in numbers(instances) for task in pair(f"one-armed/v1/{number}")]  # fmt: skip
-    text = f'title = "Control"\ndescription = "Random search in place of the learner."\n'
-    text += f"runs = 1\ntrials = {world.trials}\n"
-    for which, each in ((names, RUNS["families"]), (pairs, RUNS_OF_PAIRS)):
-        runs = each * (1 + CONTROL_SETS)
-        text += f'\n[[blocks]]\ntasks = {which}\nmethods = ["random-search"]\nruns = {runs}\n'
+    tasks, pairs = places_of(world, folder / "tasks" / CONTROL, instances)
+    text = head("Control", world)
+    for places, runs in (
+        ([place for name, place in tasks.items() if name not in PAPER], RUNS["families"]),
+        (pairs.values(), RUNS_OF_PAIRS),
+    ):
+        text += block(places, ["random-search"], runs * (1 + CONTROL_SETS))
     file = folder / f"{CONTROL}.toml"
-    file.write_text(text.replace("'", '"'), encoding="utf-8")
-    print(run_suite(file, folder / CONTROL, executor=Local(1)), flush=True)
+    file.write_text(text, encoding="utf-8")
+    print(CONTROL, run_suite(file, folder / CONTROL, executor=Local(1)), flush=True)
 
 
-def main(folder="results/worlds", instances=INSTANCES, *which):
-    """Run the worlds one after the other, then the control; or those that the command names."""
+def main(folder="results/worlds", instances=INSTANCES, *names):
+    """Run stage after stage, each in all worlds, and the control last."""
     folder = Path(folder).resolve()
-    for name in which or (*WORLDS, LONG.name, CONTROL):
-        if name == CONTROL:
+    wanted = names or (*WORLDS, LONG.name, CONTROL)
+    for number in range(len(STAGES)):
+        for world in WORLDS.values():
+            if world.name in wanted:
+                run_world(world, folder, instances, STAGES[: number + 1])
+        if STAGES[number] == "families" and LONG.name in wanted:
+            run_world(LONG, folder, instances, ["families"])
+        if STAGES[number] == "paper" and CONTROL in wanted:
             run_control(folder, instances)
-            continue
-        world = LONG if name == LONG.name else WORLDS[name]
-        file = folder / f"{name}.toml"
-        text = suite_of(world, folder, instances)
-        file.write_text(text, encoding="utf-8")
-        print(name, run_suite(file, folder / name, executor=Local(1)), flush=True)
 
 
 if __name__ == "__main__":

@@ -26,25 +26,21 @@ Rules, committed before the runs:
   10 of 100 sets of seeds.
 """
 
-import sys
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from protocols import PAPER
 from scipy import stats
-from worlds import CONTROL, CONTROL_SETS, LONG, RUNS, RUNS_OF_PAIRS, WORLDS
+from settings import CONTROL, CONTROL_SETS, FAMILIES, LONG, RUNS, RUNS_OF_PAIRS, WORLDS
 
-from coartic.analysis import TwoContexts, figures, load, mean
+from coartic.analysis import TwoContexts, load, mean
 from coartic.analysis.statistics import holm
 from coartic.estimates import LEVEL, Estimate, difference_of_means
 from common.judging import mean_beyond
-from common.writing import write_study
 
 HERE = Path(__file__).parent
 CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
-FAMILIES = ("one-armed", "two-armed", "aligned")
 LEARNER, RANDOM, GRADIENT, CMA = "learner", "random-search", "policy-gradient", "cma-es/bandit"
 BETTER = {
     "learner-gains": (RANDOM, LEARNER),

@@ -40,7 +40,11 @@ CONTROL = "control"
 """Name of the folder of the planted control."""
 CONTROL_SETS = 100
 """Sets of runs of random search that take the learner's place."""
+PAPER = ("ascending", "descending", "two-armed-1", "two-armed-2")
+FAMILIES = ("one-armed", "two-armed", "aligned")
 INSTANCES = "i200..i219"
+STAGES = ("families", "paper", "hill climbing")
+"""Parts of a world's runs, in the order in which they are made in all worlds."""
 RUNS = {"paper": 20, "families": 3}
-"""Runs of a method on a task. CMA-ES has one on each random task."""
+"""Runs of a method on a task of the paper, and on a random one, where CMA-ES has one run."""
 RUNS_OF_PAIRS = 5
