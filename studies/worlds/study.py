@@ -26,18 +26,21 @@ Rules, committed before the runs:
   10 of 100 sets of seeds.
 """
 
+import sys
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.lines import Line2D
 from scipy import stats
 from settings import CONTROL, CONTROL_SETS, FAMILIES, LONG, RUNS, RUNS_OF_PAIRS, WORLDS
 
-from coartic.analysis import TwoContexts, load, mean
+from coartic.analysis import TwoContexts, figures, load, mean, means
 from coartic.analysis.statistics import holm
 from coartic.estimates import LEVEL, Estimate, difference_of_means
 from common.judging import mean_beyond
+from common.writing import write_study
 
 HERE = Path(__file__).parent
 CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
@@ -146,12 +149,12 @@ def values_of(runs, claim):
     used = used[used.method.isin(methods)]
     used = used.assign(share=shares(used, claim))
     keys = ["world", "group", "task"]
-    means = used.groupby([*keys, "method"], sort=False).share.mean().unstack("method")
+    by_method = used.pivot_table("share", keys, "method", dropna=False)
     lost = used.failed if claim in BETTER else used.share.isna()
     counts = used.assign(lost=lost).groupby(keys, sort=False).agg(
         runs=("failed", "size"), failed=("failed", "sum"), lost=("lost", "sum")
     )  # fmt: skip
-    return counts.assign(value=means[[*methods]].sum(axis=1, min_count=2).reindex(counts.index))
+    return counts.assign(value=by_method[[*methods]].sum(axis=1, min_count=2).reindex(counts.index))
 
 
 def values_of_pairs(leans, claim):
@@ -306,6 +309,59 @@ def judge_control(values):
     return counts.assign(sets=table.groupby("claim", sort=False).size(), bound=0.1)
 
 
+LABELS = {
+    "learner-gains": "learner gains more\nthan random search (%)",
+    "cma-es-ahead": "CMA-ES ahead of\nthe learner (%)",
+    "policy-gradient-ahead": "policy gradient ahead\nof the learner (%)",
+    "first-movement-slower": "first movement slower\nthan in random search (%)",
+    "learner-leans": "leans more than\nrandom search (points)",
+    "joints-lean": "joints lean\n(points)",
+}
+"""Labels of the axes of claims."""
+
+
+def legend_line(label, **look):
+    """Return an entry of a legend: a mark with its label."""
+    return Line2D([], [], label=label, linestyle="", marker="o", **look)
+
+
+@figures.styled
+def draw(table):
+    """Draw the matrix: estimate and interval of each cell with a verdict; open cells stay blank."""
+    worlds = [name for name in WORLDS if (table.world == name).any()]
+    figure, panels = figures.panels((len(CLAIMS), 1), (figures.TWO, 7.6), sharex=True)
+    for axes, claim in zip(panels, CLAIMS, strict=True):
+        cells = table[(table.claim == claim) & table.verdict.isin(["holds", "reversed"])]
+        axes.axhline(0, color=figures.GREY, linewidth=0.6)
+        for number, family in enumerate(FAMILIES):
+            of_family = cells[cells.group == family]
+            shift = 0.24 * (number - 1) if claim not in ("learner-leans", "joints-lean") else 0.0
+            places = of_family.assign(place=of_family.world.map(worlds.index) + shift)
+            for verdict, rows in places.groupby("verdict"):
+                face = figures.PALETTE[number] if verdict == "holds" else "white"
+                figures.means(axes, rows, x="place", y="value", color=figures.PALETTE[number],
+                              linestyle="", marker="o", markerfacecolor=face)  # fmt: skip
+        for place in range(1, len(worlds)):
+            axes.axvline(place - 0.5, color=figures.GREY, linewidth=0.2)
+        axes.set(ylabel=LABELS[claim], xlim=(-0.5, len(worlds) - 0.5))
+    titles = [WORLDS[name].title.replace(" ", "\n", 1) for name in worlds]
+    panels[-1].set_xticks(range(len(worlds)), titles)
+    handles = [
+        legend_line(family, color=figures.PALETTE[number]) for number, family in enumerate(FAMILIES)
+    ]
+    handles.append(legend_line("reversed", color=figures.GREY, markerfacecolor="white"))
+    figures.legend(figure, handles, 4)
+    return figure
+
+
+def describe_long(runs):
+    """Return the mean values of claims at radius 0.02 after 100,000 trials, with one run a task."""
+    rows = [values_of(runs[runs.world == LONG.name], claim).reset_index().assign(claim=claim)
+            for claim in CLAIMS if claim in BETTER or claim == "first-movement-slower"]  # fmt: skip
+    table = means(pd.concat(rows), ["claim", "group"], ["value"]).rename(columns={"rows": "tasks"})
+    return table.set_index((table.claim + " " + table.group).rename("row"))
+
+
 def measure(folder):
     """Return the tables of a results folder by name; each becomes a CSV file."""
     found = [of_world(name, load(folder / name)) for name in (*WORLDS, LONG.name)
@@ -313,7 +369,13 @@ def measure(folder):
     runs, leans = (pd.concat(parts) for parts in zip(*found, strict=True))
     tables = {"results": tabulate(runs, leans), "runs": runs,
               "leans": leans.set_index(["world", "pair", "part", "method"])}  # fmt: skip
+    if (runs.world == LONG.name).any():
+        tables["long"] = describe_long(runs)
     if (folder / CONTROL).is_dir():
         values = control_values(load(folder / CONTROL), runs, leans)
         tables |= {"control": judge_control(values), "control_values": values.set_index("set")}
     return tables
+
+
+if __name__ == "__main__":
+    write_study(HERE, measure(Path(sys.argv[1])) if sys.argv[1:] else {}, draw)
