@@ -120,7 +120,7 @@ def run_world(world, folder, instances, stages):
     file = folder / f"{world.name}.toml"
     blocks = blocks_of(world, folder / "tasks" / world.name, instances, stages)
     file.write_text(head(world.title, world) + blocks, encoding="utf-8")
-    print(world.name, run_suite(file, folder / world.name, executor=Local(1)), flush=True)
+    print(world.name, run_suite(file, folder / world.name, executor=Local(2)), flush=True)
 
 
 def run_control(folder, instances):
@@ -135,7 +135,7 @@ def run_control(folder, instances):
         text += block(places, ["random-search"], runs * (1 + CONTROL_SETS))
     file = folder / f"{CONTROL}.toml"
     file.write_text(text, encoding="utf-8")
-    print(CONTROL, run_suite(file, folder / CONTROL, executor=Local(1)), flush=True)
+    print(CONTROL, run_suite(file, folder / CONTROL, executor=Local(2)), flush=True)
 
 
 def main(folder="results/worlds", instances=INSTANCES, *names):

@@ -310,14 +310,14 @@ def judge_control(values):
 
 
 LABELS = {
-    "learner-gains": "learner gains more\nthan random search (%)",
-    "cma-es-ahead": "CMA-ES ahead of\nthe learner (%)",
-    "policy-gradient-ahead": "policy gradient ahead\nof the learner (%)",
-    "first-movement-slower": "first movement slower\nthan in random search (%)",
-    "learner-leans": "leans more than\nrandom search (points)",
-    "joints-lean": "joints lean\n(points)",
+    "learner-gains": "learner gains more than random search (%)",
+    "cma-es-ahead": "CMA-ES ahead of the learner (%)",
+    "policy-gradient-ahead": "policy gradient ahead of the learner (%)",
+    "first-movement-slower": "first movement slower than in random search (%)",
+    "learner-leans": "learner leans more than random search (points of lean)",
+    "joints-lean": "learner's joints lean (points of lean)",
 }
-"""Labels of the axes of claims."""
+"""Titles of panels."""
 
 
 def legend_line(label, **look):
@@ -343,7 +343,10 @@ def draw(table):
                               linestyle="", marker="o", markerfacecolor=face)  # fmt: skip
         for place in range(1, len(worlds)):
             axes.axvline(place - 0.5, color=figures.GREY, linewidth=0.2)
-        axes.set(ylabel=LABELS[claim], xlim=(-0.5, len(worlds) - 0.5))
+        axes.set(xlim=(-0.5, len(worlds) - 0.5))
+        axes.set_title(LABELS[claim], loc="left")
+        if cells.empty:
+            axes.set(ylim=(-1, 1), yticks=[0])
     titles = [WORLDS[name].title.replace(" ", "\n", 1) for name in worlds]
     panels[-1].set_xticks(range(len(worlds)), titles)
     handles = [

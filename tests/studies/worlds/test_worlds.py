@@ -1,5 +1,9 @@
 """Study worlds: its rules on made-up runs, and its shipped tables, computed again without pandas."""
 
+import csv
+import lzma
+from statistics import fmean
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -96,3 +100,49 @@ def test_names_of_tasks():
         assert STUDY.base_name(name) == name
     assert STUDY.base_name("two-armed-1-radius-0.02") == "two-armed-1"
     assert STUDY.base_name("two-armed-i200-radius-0.02") == "two-armed/v1/i200"
+
+
+def shipped():
+    """The rows that ship, as a list of dicts, and the results by claim, world and group."""
+    text = lzma.open(FOLDER / "runs.csv.xz", "rt").read()
+    with open(FOLDER / "results.csv", encoding="utf-8") as file:
+        results = {(row["claim"], row["world"], row["group"]): row for row in csv.DictReader(file)}
+    return [*csv.DictReader(text.splitlines())], results
+
+
+def ticks_of(rows):
+    """Ticks of runs; a failed run has those of the worst."""
+    known = [float(row["ticks"]) for row in rows if row["ticks"]]
+    return {row["run_id"]: float(row["ticks"]) if row["ticks"] else max(known) for row in rows}
+
+
+def test_the_shipped_matrix_follows_from_the_shipped_rows():
+    rows, results = shipped()
+    ahead = {"learner-gains": ("random-search", "learner"),
+             "cma-es-ahead": ("learner", "cma-es/bandit"),
+             "policy-gradient-ahead": ("learner", "policy-gradient")}  # fmt: skip
+    of_task = {}
+    for row in rows:
+        of_task.setdefault((row["world"], row["group"], row["task"]), []).append(row)
+    values = {}
+    for (world, group, _), runs in of_task.items():
+        ticks, alone = ticks_of(runs), float(runs[0]["alone"])
+        for claim, (more, fewer) in ahead.items():
+            mine, other = (
+                fmean(ticks[row["run_id"]] for row in runs if row["method"] == name)
+                for name in (fewer, more)
+            )
+            values.setdefault((claim, world, group), []).append(100 * (other - mine) / alone)
+        mine, other = (
+            [float(row["first"]) for row in runs if row["method"] == name and row["first"]]
+            for name in ("learner", "random-search")
+        )
+        if mine and other:
+            slower = 100 * (fmean(mine) - fmean(other)) / alone
+            values.setdefault(("first-movement-slower", world, group), []).append(slower)
+    judged = 0
+    for key, row in results.items():
+        if not key[0].endswith(("leans", "lean")):
+            assert float(row["value"]) == pytest.approx(fmean(values[key]), rel=1e-4, abs=1e-4)
+            judged += row["verdict"] != ""
+    assert judged >= 4 * 3 * 5
