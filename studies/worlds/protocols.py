@@ -4,10 +4,10 @@
     PYTHONPATH=studies python studies/worlds/protocols.py results/development d000..d001
 
 The results folder has a folder for each world, and beside it the suite that made it, with the task
-files of worlds with another radius. Stored runs are not made again. All worlds have their runs of
-random tasks before one of them has its runs of the paper's tasks, and hill climbing, about which
-there is no claim, runs last; so an interrupted study has whole worlds. The command can name worlds.
-All takes about an hour of CPU time.
+files of worlds with another radius. Stored runs are not made again. There are stages: one run of
+each method on each random task in all worlds, then further runs, then the paper's tasks, and last
+hill climbing, about which there is no claim; so an interrupted study has whole worlds. The command
+can name worlds and stages. All takes about an hour of CPU time.
 """
 
 import sys
@@ -86,23 +86,24 @@ def blocks_of(world, folder, instances, stages):
     tasks, pairs = places_of(world, folder, instances)
     text = ""
     for stage in stages:
+        if stage == "one-run" and "families" in stages:
+            continue  # the next stage has this run, too
         for learner, beginnings in LEARNERS.items():
             places = [
                 place
                 for name, place in tasks.items()
                 if name.startswith(beginnings)
-                and (stage == "hill climbing" or (name in PAPER) == (stage == "paper"))
+                and (stage == "hill-climbing" or (name in PAPER) == (stage == "paper"))
             ]
             if not places:
                 continue
-            if stage == "hill climbing":
+            if stage == "hill-climbing":
                 text += block(places, ["hill-climbing"], RUNS["families"])
                 continue
-            runs = RUNS[stage] if world is not LONG else 1
-            text += block(places, [learner, "random-search", "policy-gradient"], runs)
-            text += block(places, ["cma-es/bandit"], runs if stage == "paper" else 1)
+            text += block(places, [learner, "random-search", "policy-gradient"], RUNS[stage])
+            text += block(places, ["cma-es/bandit"], RUNS[stage] if stage == "paper" else 1)
             text += block(places, ["corrective-alone/best-hands"], 1)
-        if stage == "families" and world is not LONG:
+        if stage in ("one-run", "families") and world is not LONG:
             text += block(pairs.values(), ["dual-process/EC1", "random-search"], RUNS_OF_PAIRS)
     return text
 
@@ -141,14 +142,17 @@ def run_control(folder, instances):
 def main(folder="results/worlds", instances=INSTANCES, *names):
     """Run stage after stage, each in all worlds, and the control last."""
     folder = Path(folder).resolve()
-    wanted = names or (*WORLDS, LONG.name, CONTROL)
-    for number in range(len(STAGES)):
+    stages = [*names] if {*names} & {*STAGES} else [*STAGES]
+    wanted = {*names} - {*STAGES} or {*WORLDS, LONG.name, CONTROL}
+    for number, stage in enumerate(STAGES):
+        if stage not in stages:
+            continue
         for world in WORLDS.values():
             if world.name in wanted:
                 run_world(world, folder, instances, STAGES[: number + 1])
-        if STAGES[number] == "families" and LONG.name in wanted:
-            run_world(LONG, folder, instances, ["families"])
-        if STAGES[number] == "paper" and CONTROL in wanted:
+        if stage == "families" and LONG.name in wanted:
+            run_world(LONG, folder, instances, ["one-run"])
+        if stage == "families" and CONTROL in wanted:
             run_control(folder, instances)
 
 

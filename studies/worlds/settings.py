@@ -43,8 +43,8 @@ CONTROL_SETS = 100
 PAPER = ("ascending", "descending", "two-armed-1", "two-armed-2")
 FAMILIES = ("one-armed", "two-armed", "aligned")
 INSTANCES = "i200..i219"
-STAGES = ("families", "paper", "hill climbing")
+STAGES = ("one-run", "families", "paper", "hill-climbing")
 """Parts of a world's runs, in the order in which they are made in all worlds."""
-RUNS = {"paper": 20, "families": 3}
+RUNS = {"one-run": 1, "families": 3, "paper": 20}
 """Runs of a method on a task of the paper, and on a random one, where CMA-ES has one run."""
 RUNS_OF_PAIRS = 5
