@@ -33,6 +33,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib.lines import Line2D
+from protocols import LEARNERS
 from scipy import stats
 from settings import (
     CONTROL,
@@ -93,9 +94,24 @@ def of_world(world, study):
         }
     )  # fmt: skip
     is_pair = runs.task.str.endswith(("-goal", "-back")).to_numpy()
-    table["first"] = study.signature("first").to_numpy(np.float64)
+    compared = [
+        study.signature("first", *cell)
+        for cell in study.cells
+        if cell[1] in (*LEARNERS, RANDOM) and not cell[0].endswith(("-goal", "-back"))
+    ]
+    table["first"] = pd.concat(compared).reindex(runs.index).to_numpy(np.float64)
     table = table.set_index(runs.run_id.to_numpy()).rename_axis("run_id")
     return table[~is_pair], leans_of(world, study)
+
+
+def read(folder):
+    """Return the study of a folder without best known rewards.
+
+    The study has no gaps, and in noise each best known reward takes a thousand executions.
+    """
+    study = load(folder)
+    vars(study)["optima"] = {}
+    return study
 
 
 def leans_of(world, study):
@@ -378,7 +394,7 @@ def describe_long(runs):
 
 def measure(folder):
     """Return the tables of a results folder by name; each becomes a CSV file."""
-    found = [of_world(name, load(folder / name)) for name in (*WORLDS, LONG.name)
+    found = [of_world(name, read(folder / name)) for name in (*WORLDS, LONG.name)
              if (folder / name).is_dir()]  # fmt: skip
     runs, leans = (pd.concat(parts) for parts in zip(*found, strict=True))
     tables = {"results": tabulate(runs, leans), "runs": runs,
@@ -387,9 +403,9 @@ def measure(folder):
         tables["long"] = describe_long(runs)
     values = []
     if (folder / CONTROL).is_dir():
-        values.append(control_values(load(folder / CONTROL), runs))
+        values.append(control_values(read(folder / CONTROL), runs))
     if (folder / CONTROL_OF_PAIRS).is_dir():
-        values.append(control_values_of_pairs(load(folder / CONTROL_OF_PAIRS), leans))
+        values.append(control_values_of_pairs(read(folder / CONTROL_OF_PAIRS), leans))
     if values:
         tables["control_values"] = pd.concat(values).set_index("set")
         tables["control"] = judge_control(pd.concat(values))
