@@ -74,7 +74,7 @@ def test_verdicts():
         1.5,
         4.0,
     ]  # p is 0.014 for the fourth part of the level
-    unsure = STUDY.verdicts({number: values for number in range(4)}).iloc[0]
+    unsure = STUDY.verdicts(dict.fromkeys(range(4), values)).iloc[0]
     assert [unsure.all_tasks, unsure.without, unsure.verdict] == ["holds", "holds", "open"]
 
 
