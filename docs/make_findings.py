@@ -220,15 +220,9 @@ def shipped_gaps(method: str) -> dict[str, float]:
 def parts_of_posture_difference() -> dict[str, float]:
     """Return by how much the learner's mean postures at goal 1 of ascending and descending differ:
     ``base`` (length units) and ``joints`` (rad), with the number of ``runs`` of each task."""
-    rows = pd.read_csv(STUDIES / "memory" / "runs.csv.xz").query("label == 'dual-process/EC1'")
-    postures = rows.filter(like="at_").groupby(rows.task).mean()
-    apart = postures.loc["ascending"] - postures.loc["descending"]
-    base, joints = apart[["at_x", "at_y"]], apart.drop(["at_x", "at_y"])
-    return {
-        "base": float((base**2).sum() ** 0.5),
-        "joints": float((joints**2).sum() ** 0.5),
-        "runs": int(rows.groupby("task").size().min()),
-    }
+    learner = row("comparison", "contexts", "ascending descending dual-process/EC1 goal 1 right")
+    parts = {part: learner[f"distance_{part}"] for part in ("base", "joints")}
+    return parts | {"runs": learner["runs"] // 2}
 
 
 def filled_pages() -> dict[str, str]:
