@@ -156,7 +156,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     page.mouse.up()
     page.get_by_label("Place it at").select_option("2")
     page.get_by_label("hit by the").select_option("0")
-    page.get_by_role("button", name="Box").focus()
+    page.get_by_role("button", name="Base").focus()
     page.keyboard.press("ArrowLeft")
     page.keyboard.press("ArrowUp")  # it is on a rail
     postures = re.search(r"own=([^&]+)", settled(page).url)[1]
