@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from inspect import getdoc
@@ -184,6 +185,14 @@ def play() -> Iterator[str]:
     yield '<p><a href="play.html">Open this on its own page</a>; with your own task:'
     yield " <code>coartic play TASK</code></p>"
     yield "```"
+
+
+def first_screen() -> Iterator[str]:
+    """The first screen of README, to the section with the commands, with links from the site."""
+    text = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+    _, opening, first, *_ = re.split(r"(?m)^# .*\n|^(?=## )", text)
+    text = re.sub(r"(?<=\]\()studies/(\w+)/README\.md", r"studies/\1.md", opening + first)
+    yield re.sub(r"(?m)^## ", "### ", re.sub(r"(?<=\]\()docs/", "", text))
 
 
 def finish(app: Sphinx, failure: Exception | None) -> None:

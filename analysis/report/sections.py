@@ -217,7 +217,7 @@ exceed by so many percentage points (negative: their gap is smaller): \
         "coarticulation",
         "Coarticulation",
         (list_contexts, list_signatures),
-        (draw_shared_goal, draw_postures, draw_saved),
+        (draw_shared_goal, draw_saved, draw_postures),
         sentence="""\
 {% set of_best = rows[rows.method == first] if parameters else rows[:0] %}
 {% for row in (of_best if of_best | length else rows).head(1).to_dict("records") %}
