@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from protocols import INSTANCES, METHODS, names
 from rules import (
+    carried,
     contexts_of,
     leans,
     left_out,
@@ -24,6 +25,7 @@ from rules import (
     read,
     sign_flips,
     smallest_shift,
+    tabulate_carry_over_power,
     tabulate_plan,
     tabulate_power,
 )
@@ -82,6 +84,26 @@ def measure_people(table):
     tables = {"leans": rows.set_index("person"), "tests": tests.rename_axis("test")}
     power = tabulate_power(counted)
     return tables | {"power": power, "plan": tabulate_plan(power.sd["repeats"])}, shown
+
+
+def measure_carry_over(table):
+    """Return the carry-over of each person and contrast, and the test with what is beside it."""
+    contrasts = carried(table[left_out(table) == ""])
+    rows = leans(contrasts).rename(columns={"target": "contrast", "more": "carry_over"})
+    described = {
+        "judged": people(leans(contrasts)),
+        "own starts": people(leans(contrasts, own=True)),
+        "medians": people(leans(contrasts, average=np.median)),
+        "all repeats": people(leans(carried(table))),
+    }
+    described |= {name: people(leans({name: each})) for name, each in contrasts.items()}
+    tests = pd.DataFrame({name: over_people(values) for name, values in described.items()}).T
+    kept = ["person", "contrast", "repeats", "carry_over", "low", "high", "difference", "apart"]
+    return {
+        "carry_over": rows[kept].set_index("person"),
+        "carry_over_tests": tests.drop(columns=["at_end", "at_start"]).rename_axis("test"),
+        "carry_over_power": tabulate_carry_over_power(contrasts),
+    }
 
 
 def tabulate_postures(study):
@@ -164,6 +186,7 @@ def measure(folder=""):
     tables, shown = measure_people(read(HERE / "postures.csv"))
     if folder:
         tables["runs"] = tabulate_postures(load(folder))
+    tables |= measure_carry_over(read(HERE / "carry_over_postures.csv"))
     runs = tables.get("runs", pd.read_csv(HERE / "runs.csv.xz", index_col="run_id"))
     tables |= {"pairs": measure_pairs(runs), "comparison": of_comparison()}
     rows = pd.concat([shown, of_methods(tables["pairs"])])
