@@ -1,4 +1,4 @@
-"""Measure whether people lean towards the posture that comes next.
+"""Measure whether people lean towards the next posture, and whether they keep the last one.
 
     python studies/people/make_table.py FOLDER          makes postures.csv from the public files
     python studies/people/protocols.py results/people   runs methods on tasks of the same form
@@ -6,7 +6,7 @@
 
 The expected answer is that people lean. Against it would be a mean over people that sign flips do
 not distinguish from 0. README.md has the rule, which was committed before any lean of a person was
-computed.
+computed, and that of carry-over, which was committed before any carry-over was computed.
 """
 
 import sys
