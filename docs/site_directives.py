@@ -112,7 +112,7 @@ def tasks() -> Iterator[str]:
 def methods(group: str) -> Iterator[str]:
     """Yield the table of the built-in methods that use the reward of trials, its ``formula``, or
     ``none`` of it, with the first sentence of their classes and a letter for each information."""
-    letters = dict(zip(Information, "GFJATUKRS", strict=True))
+    letters = dict(zip(Information, "GFJATUKNRS", strict=True))
 
     def group_of(uses: Sequence[Information]) -> str:
         if Information.REWARD_BY_TRIAL in uses:
@@ -125,7 +125,7 @@ def methods(group: str) -> Iterator[str]:
             title_of(name),
             f"`{name}`",
             (getdoc(built_in_methods()[name]) or "").partition("\n\n")[0],
-            " ".join(sorted(map(letters.get, uses), key="GFJATUKRS".find)),
+            " ".join(sorted(map(letters.get, uses), key="GFJATUKNRS".find)),
         )
         for name, uses in declared.items()
         if group_of(uses) == group

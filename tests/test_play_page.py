@@ -128,7 +128,7 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
         assert after[-1] == due
         # A bar for each movement of the median run, over that of the first trial.
         now, first = (
-            run.execute().ticks_by_goal()
+            [*run.execute().ticks_by_goal()]
             for run in (
                 sorted(runs, key=lambda run: run.reward)[2],
                 learn(name, "EC1", seed=0, trials=1),
@@ -161,7 +161,8 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
 ACT = """<script>
   const figure = document.getElementById("play");
   const button = figure.querySelector("[data-is=play]");
-  ["pointerdown", "click"].forEach((kind) => button.dispatchEvent(new Event(kind, { bubbles: true })));
+  const act = (kind) => button.dispatchEvent(new Event(kind, { bubbles: true }));
+  ["pointerdown", "click"].forEach(act);
   const count = (frames) => {
     if (figure.matches("[data-settled]")) window.frames_until_settled = frames;
     else requestAnimationFrame(() => count(frames + 1));

@@ -925,6 +925,6 @@ def _draw_order(axes: Axes, goals: Array, apart: float) -> None:
     for start, end in itertools.pairwise(places):
         axes.annotate("", end, start, arrowprops={"arrowstyle": "->", "linewidth": 0.8, **ends})
     axes.plot(*places.T, "o", clip_on=False, zorder=4, **_DISC_LOOK)
-    for goal, place in enumerate(places, 1):
+    for goal, (x, y) in enumerate(places, 1):
         text: Any = {"ha": "center", "va": "center_baseline", "fontsize": 7, "zorder": 5}
-        axes.text(*place, str(goal), **text)
+        axes.text(x, y, str(goal), **text)

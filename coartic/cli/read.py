@@ -303,7 +303,8 @@ def cite(
         ),
     ] = None,
     analysis: Annotated[
-        bool, typer.Option("--analysis", help="Also cite works on statistics, signatures and theories.")
+        bool,
+        typer.Option("--analysis", help="Also cite works on statistics, signatures and theories."),
     ] = False,
 ) -> None:
     """Print BibTeX entries of coartic, the paper and the methods."""

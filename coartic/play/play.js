@@ -309,11 +309,11 @@ class Play {
     };
     const lists = ticks.map(([after, before], k) => element("ol", ROLES[k], ...after.map((count, g) => {
       const more = count - before[g];
-      return element("li", "", `goal ${this.labelOf(k, g)} `, element("span", "bars", bar(count), bar(before[g])),
-        ` ${count} (${more > 0 ? "+" : more < 0 ? "−" : "±"}${Math.abs(more)})`);
+      return element("li", "", element("span", "", `goal ${this.labelOf(k, g)} `), element("span", "bars", bar(count), bar(before[g])),
+        element("span", "", ` ${count} (${more > 0 ? "+" : more < 0 ? "−" : "±"}${Math.abs(more)})`));
     })));
-    const words = first.length ? "after practice, and below it before (grey)" : "and below it of the corrective process alone (grey)";
-    this.find("movements").replaceChildren(element("p", "note", `Ticks of each movement ${words}:`), element("div", "pair", ...lists));
+    const words = first.length ? " after practice; below, in grey, before practice" : "; below, in grey, those of the corrective process alone";
+    this.find("movements").replaceChildren(element("p", "note", `Ticks of each movement${words}:`), element("div", "pair", ...lists));
   }
 
   /* The optimum of the task, if it is known. */
@@ -577,9 +577,13 @@ class Play {
   }
 
   nameOf(who) {
-    const { ahead, goals } = this.state;
-    const horizon = ahead < goals.length - 1 ? counted(ahead, "goal") : "all goals";
-    return (this.stored(who) || { name: `${NAMES[who]}${who === "plan" ? `, ${horizon} ahead` : ""}` }).name;
+    return (this.stored(who) || { name: `${NAMES[who]}${who === "plan" ? `, ${this.horizon(this.state.ahead)}` : ""}` }).name;
+  }
+
+  /* The number of goals ahead that a planner sees, in words. */
+  horizon(ahead) {
+    if (!ahead) return "no goal ahead";
+    return `${ahead < this.state.goals.length - 1 ? counted(ahead, "goal") : "all goals"} ahead`;
   }
 
   /* The result, and what its words mean. */
@@ -982,7 +986,7 @@ class Play {
     const changed = !same([goals, others], [preset.task.goals, preset.others || null]);
     fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
     fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => counted(ticks, "tick")).join(" and ")}`])]);
-    fill("ahead", goals.map((_, k) => [k, k ? `${counted(k, "goal")} ahead` : "no goal ahead"]));
+    fill("ahead", goals.map((_, k) => [k, this.horizon(k)]));
     fill("edited", goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
     this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores, drift: DRIFTS.indexOf(drift) });
     this.find("drift").setAttribute("aria-valuetext", `drift ${drift}`);
