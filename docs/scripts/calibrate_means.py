@@ -50,6 +50,13 @@ METHODS = {
 """Methods that study noise compares with the learner."""
 
 
+DEFAULTS = {
+    "dual-process": {"counted": "later", "discount": 0.0},
+    "receding-horizon": {"nodes": 200, "horizon": 1},
+}
+"""Settings that the labels of shipped runs leave out, by the first part of the method."""
+
+
 def program(study):
     """Return the program of a study and its shipped rows."""
     folder = ROOT / "studies" / study
@@ -68,9 +75,13 @@ def with_settings(rows):
         dict(each.split("=") for each in text.split(", ")) if text else {}
         for text in rows.setting.fillna("")
     ]
-    numbers = pd.DataFrame(settings, index=rows.index)
+    numbers = pd.DataFrame(settings, index=rows.index).drop(columns="hands", errors="ignore")
     for name in {"nodes", "horizon", "discount"} & {*numbers}:
         numbers[name] = numbers[name].astype(float)
+    for method, defaults in DEFAULTS.items():
+        is_method = rows.method.str.startswith(method)
+        for name in {*defaults} & {*numbers}:
+            numbers.loc[is_method, name] = numbers.loc[is_method, name].fillna(defaults[name])
     is_random = rows.task.str.contains("/")
     runs = rows.join(numbers).assign(
         setting=rows.setting.fillna(""),
@@ -115,7 +126,9 @@ def samples_of_claims(study):
 
     def record(sentence, values, bound=0.0, side="greater"):
         sample = judging.SIGNS[side] * (np.asarray(values, dtype=float) - bound)
-        samples.append((f"{sentence} ({side} {bound:g})", sample[~np.isnan(sample)]))
+        samples.append(
+            (f"{sentence.replace('{}', '...')} ({side} {bound:g})", sample[~np.isnan(sample)])
+        )
         return judge(sentence, values, bound, side)
 
     with (
