@@ -24,9 +24,19 @@ Columns that describe, and do not count in the choice:
   verdicts are made, without a correction over claims), for the two-sided candidates and the
   one-tailed tests.
 
-All samples of a size have the same resamples, 999 of them. The script takes some minutes.
+All samples of a size have the same resamples, 999 of them.
+
+Two more tables describe intervals over random tasks (``coartic.analysis.other_tasks``):
+
+- ``coverage.csv``: for each method and family, the share of 2,000 samples of gaps in which the 95 %
+  interval holds the mean of the population, which are the shipped gaps of 40 tasks;
+- ``widths.csv``: how many times wider the interval is than it should be, for normal values, by the
+  number of runs on a task and the ratio of the SD over runs to the SD over tasks.
+
+The script takes some minutes.
 """
 
+import itertools
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -35,10 +45,11 @@ from unittest.mock import patch
 import numpy as np
 import pandas as pd
 
+from coartic.analysis import other_tasks
 from common import judging
 
 ROOT = Path(__file__).parents[2]
-SEED, SAMPLES, RESAMPLES, AT_ONCE = 0, 20_000, 999, 1_000
+SEED, SAMPLES, RESAMPLES, AT_ONCE, INTERVALS = 0, 20_000, 999, 1_000, 2_000
 LEVEL, STRICT, MOST_SKEWED = 0.05, 0.01, 2.0
 METHODS = {
     "dual-process/EC1": "learner", "dual-process/EC4": "learner",
@@ -148,8 +159,8 @@ def samples_of_hands():
             for family, values in more.groupby("family", sort=False)}  # fmt: skip
 
 
-def samples_of_noise():
-    """Return gaps of methods less the learner's, without noise and as they aim, by family."""
+def gaps_of_noise(noise):
+    """Return the gaps that ship with study noise, by family and task, with a column a method."""
     rows = pd.read_csv(ROOT / "studies/noise/runs.csv.xz", low_memory=False)
     rows = rows[(rows.question == "order") & rows.setting.isna() & ~rows.signal_dependent]
     rows = rows[rows.task.str.contains("/") & rows.method.isin(METHODS)]
@@ -157,9 +168,15 @@ def samples_of_noise():
     other = rows.method.str.contains("EC4") & one_arm | rows.method.str.contains("EC1") & ~one_arm
     rows = rows[~other].assign(gap=100 * (rows.ticks + rows.best_known) / -rows.best_known)
     rows["name"], rows["family"] = rows.method.map(METHODS), rows.task.str.partition("/")[0]
+    rows = rows[rows.motor_noise == noise]
+    return rows.pivot_table("gap", ["family", "task"], "name", sort=False)
+
+
+def samples_of_noise():
+    """Return gaps of methods less the learner's, without noise and as they aim, by family."""
     samples = {}
     for noise in (0.0, 0.01):
-        gaps = rows[rows.motor_noise == noise].pivot_table("gap", ["family", "task"], "name")
+        gaps = gaps_of_noise(noise)
         for name in gaps.columns.drop("learner"):
             less = (gaps[name] - gaps.learner).dropna()
             groups = {"all families": less} | dict([*less.groupby("family", sort=False)])
@@ -236,14 +253,47 @@ def cell(values, rng):
     return row
 
 
+def coverage():
+    """Return how often the interval over tasks holds the mean gap, by method and family."""
+    rows, rng = [], np.random.default_rng(SEED)
+    for name, of_method in gaps_of_noise(0.0).items():
+        for family, gaps in of_method.groupby("family", sort=False):
+            population, held = gaps.to_numpy(), 0
+            for _ in range(INTERVALS):
+                sample = rng.choice(population, len(population))
+                found = other_tasks({family: [*sample[:, None]]})
+                held += found.low <= population.mean() <= found.high
+            row = {"method": name, "family": family, "tasks": len(population)}
+            row |= {"skewness": float(skewness(population)), "coverage": held / INTERVALS}
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def widths(tasks=40):
+    """Return the mean width of the interval, divided by that of the true 95 % interval."""
+    rows, rng = [], np.random.default_rng(SEED)
+    for runs, ratio in itertools.product((3, 5, 20), (0.5, 1.0, 2.0, 4.0)):
+        found = []
+        for _ in range(INTERVALS // 20):
+            values = rng.normal(size=(tasks, 1)) + ratio * rng.normal(size=(tasks, runs))
+            interval = other_tasks({"family": [*values]})
+            found.append(interval.high - interval.low)
+        true = 2 * 1.96 * np.sqrt((1 + ratio**2 / runs) / tasks)
+        rows.append({"runs": runs, "sd_runs_over_tasks": ratio, "width": np.mean(found) / true})
+    return pd.DataFrame(rows)
+
+
 def main(folder):
-    """Write the table of cells, and print the worst cell of each test."""
+    """Write the three tables, and print the worst cell of each test."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, made in (("coverage", coverage()), ("widths", widths())):
+        made.to_csv(folder / f"{name}.csv", index=False, float_format="%.4g")
+        print(made.to_string())
     rows, rng = [], np.random.default_rng(SEED)
     for study, words, values in every_sample():
         if np.ptp(values):
             rows.append({"study": study, "mean": words} | cell(values, rng))
     table = pd.DataFrame(rows)
-    folder.mkdir(parents=True, exist_ok=True)
     table.to_csv(folder / "cells.csv", index=False, float_format="%.5g")
     tests = table.columns[4:]
     print(len(table), "cells")

@@ -1,6 +1,6 @@
 """Test the learner's rule for hands: a table by state against a centre for each hand sequence.
 
-    python studies/memory/hands.py results/memory-hands
+    PYTHONPATH=studies python studies/memory/hands.py results/memory-hands
 
 runs suite hands.toml, and then random search with the final hands of each run of the learner. It
 writes hands.csv.xz, with a row for each run, and hands.csv, with a row for each family. Stored runs
@@ -18,8 +18,8 @@ from coartic.analysis import load
 from coartic.analysis.statistics import bootstrap_test, holm, task_mean
 from coartic.baselines.random_search import RandomSearch
 from coartic.benchmarks.runner import run_suite
-from coartic.estimates import LEVEL
 from coartic.method import Session
+from common.judging import level_of
 
 HERE = Path(__file__).parent
 TRIALS, RESAMPLES = 10_000, 99_999
@@ -84,10 +84,11 @@ def tabulate(runs):
     """
     runs = runs.assign(gain=runs.reward - runs.corrective_best)
     gains = runs.pivot_table("gain", ["family", "task"], "cell")
-    rows, tests = {}, []
+    rows, tests, levels = {}, [], []
     for family, of_family in gains.groupby("family", sort=False):
         more = of_family.table - of_family.centres
         tests.append(two_tests(more.to_numpy()))
+        levels.append(level_of(more))
         row = {"tasks": len(of_family), **of_family.mean().to_dict(), "median_more": more.median()}
         for name, values in {
             "more": more,
@@ -98,7 +99,7 @@ def tabulate(runs):
         rows[family] = row
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("family")
     table["p"], table["p_without"] = map(holm, zip(*tests, strict=True))
-    sure = table[["p", "p_without"]].max(axis=1) < LEVEL
+    sure = table[["p", "p_without"]].max(axis=1) < levels
     table["verdict"] = np.where(sure, np.where(table.more > 0, "pays", "costs"), "open")
     return table
 
