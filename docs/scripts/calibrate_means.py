@@ -28,7 +28,7 @@ All samples of a size have the same resamples, 999 of them.
 
 Two more tables describe intervals over random tasks (``coartic.analysis.other_tasks``):
 
-- ``coverage.csv``: for each method and family, the share of 2,000 samples of gaps in which the 95 %
+- ``coverage.csv``: for each method and family, the share of 500 samples of gaps in which the 95 %
   interval holds the mean of the population, which are the shipped gaps of 40 tasks;
 - ``widths.csv``: how many times wider the interval is than it should be, for normal values, by the
   number of runs on a task and the ratio of the SD over runs to the SD over tasks.
@@ -49,7 +49,7 @@ from coartic.analysis import other_tasks
 from common import judging
 
 ROOT = Path(__file__).parents[2]
-SEED, SAMPLES, RESAMPLES, AT_ONCE, INTERVALS = 0, 20_000, 999, 1_000, 2_000
+SEED, SAMPLES, RESAMPLES, AT_ONCE, INTERVALS = 0, 20_000, 999, 1_000, 500
 LEVEL, STRICT, MOST_SKEWED = 0.05, 0.01, 2.0
 METHODS = {
     "dual-process/EC1": "learner", "dual-process/EC4": "learner",
@@ -274,7 +274,7 @@ def widths(tasks=40):
     rows, rng = [], np.random.default_rng(SEED)
     for runs, ratio in itertools.product((3, 5, 20), (0.5, 1.0, 2.0, 4.0)):
         found = []
-        for _ in range(INTERVALS // 20):
+        for _ in range(INTERVALS // 5):
             values = rng.normal(size=(tasks, 1)) + ratio * rng.normal(size=(tasks, runs))
             interval = other_tasks({"family": [*values]})
             found.append(interval.high - interval.low)

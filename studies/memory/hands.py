@@ -80,11 +80,15 @@ def tabulate(runs):
     """Tabulate the mean gains (in ticks) of each cell, with a row for each family.
 
     ``more`` is by how much the table gains more than the centres, with tests. ``over_shipped`` and
-    ``over_given`` compare the table with the other two cells.
+    ``over_given`` compare the table with the other two cells. ``same`` is the mean of ``more`` over
+    the runs in which table and centres end with the same hands, and ``same_runs`` their number.
     """
     runs = runs.assign(gain=runs.reward - runs.corrective_best)
     gains = runs.pivot_table("gain", ["family", "task"], "cell")
     rows, tests, levels = {}, [], []
+    by_run = runs.set_index(["family", "task", "run", "cell"]).unstack("cell")  # noqa: PD010
+    same = by_run.hands.table == by_run.hands.centres
+    more_of_same = (by_run.gain.table - by_run.gain.centres)[same]
     for family, of_family in gains.groupby("family", sort=False):
         more = of_family.table - of_family.centres
         tests.append(two_tests(more.to_numpy()))
@@ -96,7 +100,8 @@ def tabulate(runs):
             "over_given": of_family.table - of_family.given,
         }.items():
             row |= task_mean([values]).columns(name)
-        rows[family] = row
+        of_same = more_of_same[family]
+        rows[family] = row | {"same": of_same.mean(), "same_runs": len(of_same)}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("family")
     table["p"], table["p_without"] = map(holm, zip(*tests, strict=True))
     sure = table[["p", "p_without"]].max(axis=1) < levels
