@@ -30,8 +30,8 @@ from coartic.motion.initial_hands import best_hands
 from coartic.runs.plan import judge_seed
 
 HERE = Path(__file__).parent
-REPEATS = 400
-"""Executions of a solution that was found without noise. Some have a heavy tail of ticks."""
+REPEATS = 100
+"""Executions of a solution."""
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 SHIPPED = HERE.parents[1] / "benchmarks" / "shipped"
 STAGES = (1, 2, 4, 10, 30, 100, 1_000)
@@ -138,7 +138,7 @@ def execute_practised(study, folder, repeats=REPEATS):
     by_task(study, folder, {*runs.label} & {*LABELS}, rows_of)
 
 
-def execute_answers(study, folder, repeats=100):
+def execute_answers(study, folder, repeats=REPEATS):
     """Execute the next actions of runs that practised in noise, as the suite does."""
 
     def rows_of(task, solutions, numbers):
@@ -164,7 +164,7 @@ def block(tasks, method, **how):
     return "\n".join(["\n[[blocks]]", f"tasks = [{names}]", f'methods = ["{method}"]', *lines, ""])
 
 
-def run_memory(folder, instances="i160..i179", repeats=100):
+def run_memory(folder, instances="i160..i179", repeats=REPEATS):
     """Run the learner and random search in stages, and execute the best trials.
 
     Random search has the hands of the learner.
