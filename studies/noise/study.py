@@ -33,9 +33,8 @@ def executions_of(folder):
     memory are those that ship if the folder does not have it.
     """
     tables = []
-    for part, question in (
-        ("practised", "practised"), ("answers", "answers"), ("memory-executed", "memory"),
-    ):  # fmt: skip
+    parts = {"practised": "practised", "answers": "answers", "answers-of-cma-es": "answers"}
+    for part, question in (parts | {"memory-executed": "memory"}).items():
         if files := sorted((folder / part).glob("*.csv")):
             rows = pd.concat(map(pd.read_csv, files)).reindex(columns=_KEPT)
             tables.append(rows.assign(question=question))
