@@ -20,8 +20,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import figures, load, mean
+from coartic.analysis import figures, mean
 from coartic.analysis.statistics import task_mean
+from coartic.analysis.study import Study
+from coartic.runs.shipped import open_results
 from common.judging import judge_means
 from common.writing import write_study
 
@@ -70,6 +72,17 @@ def cell_of(method, setting):
     cell = _OF_CELL[method, words.get("spread", default)]
     is_second = {*words} & {"window", "batch", "spread_step"}
     return f"{cell} second" if is_second else cell
+
+
+def read(folder):
+    """Return the study of a folder that has only some runs of a cell: those with its hands.
+
+    ``load`` refuses such a folder, because runs between them are missing.
+    """
+    folder = Path(folder)
+    with open_results(folder) as store:
+        stored = store.plan(), store.made_with(), store.runs(), store.marks()
+        return Study(folder, *stored, imports=store.imports())
 
 
 def stored(study):
@@ -219,13 +232,9 @@ def measure_power(runs):
 
 
 LOOKS = {
-    ("a", "b"): {"label": "hill climbing, keeps postures", "color": figures.PALETTE[0]},
+    ("a", "b"): {"label": "hill climbing", "color": figures.PALETTE[0]},
     ("c", "d"): {"label": "policy gradient", "color": figures.PALETTE[1], "marker": "s"},
-    ("targets, fixed", "targets, learned"): {
-        "label": "hill climbing, keeps targets", "color": figures.PALETTE[2], "marker": "^",
-        "linestyle": ":",
-    },
-}  # fmt: skip
+}
 """Cells with a fixed and with a learned spread, and the look of the line between them."""
 PANELS = (RANDOM, "one-armed", "two-armed", "aligned", "redundancy", "long")
 
@@ -233,7 +242,8 @@ PANELS = (RANDOM, "one-armed", "two-armed", "aligned", "redundancy", "long")
 @figures.styled
 def draw(results):
     """Draw the gaps of the cells, with a row of panels for each world."""
-    figure, panels = figures.panels((len(WORLDS), len(PANELS)), (figures.TWO, 4.2), sharex=True)
+    shared = {"sharex": True, "sharey": "col"}
+    figure, panels = figures.panels((len(WORLDS), len(PANELS)), (figures.TWO, 4.2), **shared)
     for (noise, group), axes in zip(product(WORLDS, PANELS), panels, strict=True):
         here = results[(results.motor_noise == noise) & (results.group == group)]
         here = here.set_index("cell")
@@ -241,7 +251,8 @@ def draw(results):
             rows = here.loc[[*cells]].assign(place=[0, 1])
             figures.means(axes, rows, x="place", y="gap", **look)
         axes.axhline(here.gap["learner"], color=figures.GREY, linestyle="--", label="learner")
-        axes.set(xlim=(-0.3, 1.3), ylim=(min(0, here.gap.min()), None))
+        axes.axhline(0, color=figures.GREY, linewidth=0.5)
+        axes.set_xlim(-0.3, 1.3)
         axes.set_xticks([0, 1], ["fixed", "learned"])
         if noise == 0.0:
             axes.set_title("all families" if group == RANDOM else group)
@@ -265,7 +276,7 @@ def measure(study):
 
 if __name__ == "__main__":
     if sys.argv[2:] == ["development"]:
-        power = measure_power(measure_runs(stored(load(sys.argv[1]))))
+        power = measure_power(measure_runs(stored(read(sys.argv[1]))))
         power.to_csv(HERE / "power.csv", float_format="%.6g")
     else:
-        write_study(HERE, measure(load(sys.argv[1])) if sys.argv[1:] else {}, draw)
+        write_study(HERE, measure(read(sys.argv[1])) if sys.argv[1:] else {}, draw)
