@@ -41,9 +41,23 @@ SECOND = {
     "d second": ("policy-gradient", {"spread": "learned", "spread_step": 0.03}),
 }
 """The second-best settings in docs/stored/tuning/rivals.csv. Cell a was not tuned."""
-PARTS = {"test": ("i000..i019", (3, 20), (1, 5)), "development": ("d003..d010", (1, 0), (0, 0))}
-"""For each part the instances of each family, then the numbers of runs on an instance and on a task
-of the paper: of the cells, and of the second-best settings."""
+JUDGED = ("a", "b", "c", "d")
+PARTS = {
+    "test": (
+        "i000..i019",
+        (3, 20),
+        (
+            dict.fromkeys(JUDGED, (1, 5)),
+            dict.fromkeys(CELLS, (1, 5)),
+            dict.fromkeys([*CELLS, *SECOND], (1, 5)),
+            dict.fromkeys(CELLS, (3, 20)) | dict.fromkeys(SECOND, (1, 5)),
+        ),
+    ),
+    "development": ("d003..d010", (1, 0), (dict.fromkeys(CELLS, (1, 0)),)),
+}
+"""For each part the instances of each family, the numbers of the learner's runs on an instance and
+on a task of the paper, and stages. A stage has such numbers for each cell. After each stage the
+folder has all cells of the stage with these numbers of runs."""
 
 
 def block(tasks, method, parameters, runs, noise, hands=()):
@@ -89,18 +103,16 @@ def hands_of(folder):
     return learner
 
 
-def others(cells, hands, of_instance, of_paper):
-    """Return the blocks of other methods: one for each cell on each task in each world.
-
-    The last two arguments are the numbers of runs on an instance and on a task of the paper.
-    """
+def others(stage, hands):
+    """Return the blocks of a stage: one for each cell on each task in each world."""
     text = ""
     for task, noise in dict.fromkeys((task, noise) for task, noise, _ in hands):
-        runs = of_instance if "/" in task else of_paper
-        numbers = [run for at, in_, run in hands if (at, in_) == (task, noise) and run < runs]
-        sequences = sorted({hands[task, noise, run] for run in numbers})
-        for method, parameters in cells.values() if sequences else ():
-            text += block([task], method, parameters, runs, noise, sequences)
+        for cell, (of_instance, of_paper) in stage.items():
+            runs = of_instance if "/" in task else of_paper
+            found = {hands.get((task, noise, run)) for run in range(runs)} - {None}
+            if found:
+                method, parameters = (CELLS | SECOND)[cell]
+                text += block([task], method, parameters, runs, noise, sorted(found))
     return text
 
 
@@ -117,7 +129,7 @@ def with_hands(plan, hands):
 
 
 def main(folder="results/practice", part="test"):
-    """Run the learner, then the cells, then the second-best settings."""
+    """Run the learner, then the stages."""
     folder = Path(folder)
     file = folder.with_suffix(".toml")  # the suite with the blocks that are known so far
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -127,12 +139,11 @@ def main(folder="results/practice", part="test"):
     file.write_text(text, encoding="utf-8")
     print(perform(plan_suite(file), folder), flush=True)
     hands = hands_of(folder)
-    for cells, runs in zip((CELLS, SECOND), PARTS[part][1:], strict=True):
-        if any(runs):
-            text += others(cells, hands, *runs)
-            file.write_text(text, encoding="utf-8")
-            plan = plan_suite(file, method_files=(HERE / "keeps_targets.py",))
-            print(perform(with_hands(plan, hands), folder), flush=True)
+    for stage in PARTS[part][2]:
+        file.write_text(text + others(stage, hands), encoding="utf-8")
+        files = [HERE / "keeps_targets.py"] if "targets, fixed" in stage else []
+        plan = plan_suite(file, method_files=files)
+        print(perform(with_hands(plan, hands), folder), flush=True)
 
 
 if __name__ == "__main__":
