@@ -28,7 +28,7 @@ import numpy as np
 import pandas as pd
 
 from coartic.analysis.methods import BY_TRIAL, LEARNERS, RANDOM_SEARCH, headline_methods
-from coartic.analysis.signatures import SIGNATURES, TwoContexts, context_pairs
+from coartic.analysis.signatures import SIGNATURES, Part, TwoContexts, context_pairs
 from coartic.analysis.study import MOST_EXECUTED, Study, solved
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
@@ -190,9 +190,9 @@ def selects(study: Study, label: str) -> bool:
 def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | None:
     """Return the runs of random search that are the control of ``contexts``, or None.
 
-    They are runs on the same two tasks, for the same goal and hand, with the same number of trials
-    as the method. On each task, they have the hand sequence that is most frequent in the method's
-    runs. Only the first 500 solved runs on each task count.
+    They are runs on the same two tasks, for the same goal, hand and part of the posture, with the
+    same number of trials as the method. On each task, they have the hand sequence that is most
+    frequent in the method's runs. Only the first 500 solved runs on each task count.
 
     The result is None if
 
@@ -213,16 +213,17 @@ def contexts_of_control(study: Study, contexts: TwoContexts) -> TwoContexts | No
     first, second = (
         study.executed(runs.task.name, label) for runs, label in zip(both, labels, strict=True)
     )
-    pair = TwoContexts(first, second, contexts.goal, contexts.hand)
+    pair = TwoContexts(first, second, contexts.goal, contexts.hand, part=contexts.part)
     return pair if pair.in_both else None
 
 
-def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
+def shared_goals(study: Study, label: str, *, part: Part = "all") -> Iterator[TwoContexts]:
     """Yield a method's runs on two tasks, for each goal that the tasks share.
 
     Two tasks share goals if they begin with the same goals (:func:`.context_pairs`). There is an
     item for each pair of tasks, each shared goal, and each hand that hits this goal on both tasks.
-    Only the first 500 solved runs on each task count.
+    Only the first 500 solved runs on each task count. ``part`` is the part of the posture that is
+    compared.
     """
     for first, second, shared in context_pairs(study.individual_tasks):
         keys = (first, label), (second, label)
@@ -230,13 +231,13 @@ def shared_goals(study: Study, label: str) -> Iterator[TwoContexts]:
             runs = study.executed(first, label), study.executed(second, label)
             for goal in range(1, shared + 1):
                 for hand in HANDS:
-                    contexts = TwoContexts(*runs, goal, hand)
+                    contexts = TwoContexts(*runs, goal, hand, part=part)
                     if contexts.in_both:
                         yield contexts
 
 
 @lru_cache(maxsize=4)
-def shared_goal(study: Study) -> TwoContexts | None:
+def shared_goal(study: Study, *, part: Part = "all") -> TwoContexts | None:
     """Return the first item of :func:`shared_goals` of the first method that has one, or None.
 
     Methods are tried in this order: the paper's learner, methods from files, methods that represent
@@ -245,5 +246,5 @@ def shared_goal(study: Study) -> TwoContexts | None:
     rows = study.methods
     subjects = rows.index[rows.is_learner], rows.index[~rows.built_in]
     order = [*LEARNERS, *itertools.chain(*subjects), *headline_methods(rows), *rows.index]
-    of_methods = (shared_goals(study, label) for label in dict.fromkeys(order))
+    of_methods = (shared_goals(study, label, part=part) for label in dict.fromkeys(order))
     return next(itertools.chain.from_iterable(of_methods), None)

@@ -23,10 +23,10 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, takewhile
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import scipy
@@ -737,7 +737,7 @@ def lean(
 
     All numbers but ``apart`` are NaN if the lean is not applicable:
 
-    - ‖n_A − n_B‖ is below :data:`NEXT_APART`;
+    - ‖n_A − n_B‖ is below :data:`NEXT_APART` in the given coordinates;
     - ‖n_A − n_B‖ is below three of its standard errors (the root of the summed variances of the
       means in all coordinates);
     - a context has a single run, unless ``deterministic``.
@@ -908,6 +908,43 @@ def movable(task: Task, hand: Hand) -> Array:
     return np.array([*base, *np.arange(task.robot.dof)[task.robot.joints(hand)]])
 
 
+Part = Literal["all", "base", "joints"]
+"""Coordinates of a posture that :class:`TwoContexts` compares."""
+
+
+def coordinates(task: Task, hand: Hand, part: Part) -> Array:
+    """Return the indices of the coordinates of a part of the posture, shape ``(k,)``.
+
+    Parameters
+    ----------
+    task : Task
+        Task whose robot has the coordinates.
+    hand : {"left", "right"}
+        Hand whose arm counts.
+    part : {"all", "base", "joints"}
+        - ``"base"``: both coordinates of the base, locked or not, in length units;
+        - ``"joints"``: the joints of the hand's arm, in rad;
+        - ``"all"``: the coordinates that move the hand (:func:`movable`).
+
+    Raises
+    ------
+    ValueError
+        The part is not one of these.
+
+    Examples
+    --------
+    >>> from coartic import load_task
+    >>> coordinates(load_task("ascending"), "right", "joints").tolist()
+    [6, 7, 8, 9]
+    """
+    if part not in get_args(Part):
+        raise ValueError(f"part is {part!r}; it must be one of {', '.join(get_args(Part))}")
+    if part == "all":
+        return movable(task, hand)
+    kept = slice(0, 2) if part == "base" else task.robot.joints(hand)
+    return np.array(range(task.robot.dof)[kept])
+
+
 def motor_equivalence(difference: Array, jacobian: Array) -> tuple[float, float]:
     """Return the motor-equivalent part and the other part of a difference of configurations Δq.
 
@@ -967,12 +1004,36 @@ class TwoContexts:
         Number of the goal, from 1.
     hand : {"left", "right"}
         Hand that hits the goal.
+    part : {"all", "base", "joints"}
+        Coordinates that are compared: all, the two of the base (length units), or the joints of
+        the arm of ``hand`` (rad). The posture difference, the lean and their tests are of this
+        part; :attr:`parts` is always of all. The lean of a part is along the difference of the
+        next postures in the same coordinates, so the leans of base and joints do not add up to
+        that of all.
+
+    Raises
+    ------
+    ValueError
+        The part is not one of the three.
+
+    Examples
+    --------
+    >>> study = coartic.analysis.load("shipped")  # doctest: +SKIP
+    >>> runs = [study.executed(task, "dual-process/EC1") for task in ("ascending", "descending")]
+    ... # doctest: +SKIP
+    >>> TwoContexts(*runs, 1, "right", part="joints").lean.more.value  # doctest: +SKIP
+    -0.056
     """
 
     first: Solutions
     second: Solutions
     goal: int
     hand: Hand
+    part: Part = "all"
+
+    def __post_init__(self) -> None:
+        """Check the part."""
+        coordinates(self.first.task, self.hand, self.part)
 
     @property
     def tasks(self) -> tuple[Task, Task]:
@@ -988,15 +1049,23 @@ class TwoContexts:
     def configurations(self) -> tuple[Array, Array]:
         """Configurations of the compared runs at the goal, for each context.
 
-        Each array has shape ``(runs, dof)``, in length units and rad. A run is compared if it hits
-        ``goal`` with ``hand``.
+        Each array has shape ``(runs, k)``, with the k coordinates of ``part``: all coordinates of
+        the robot in length units and rad, or those of :func:`coordinates`. A run is compared if it
+        hits ``goal`` with ``hand``.
         """
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         first, second = (
             runs.configurations[runs.hands[:, goal] == hand, goal]
             for runs in (self.first, self.second)
         )
-        return first, second
+        if self.part == "all":
+            return first, second
+        kept = coordinates(self.first.task, self.hand, self.part)
+        return first[:, kept], second[:, kept]
+
+    def of_part(self, part: Part) -> TwoContexts:
+        """Return the comparison of the same runs in another part of the posture."""
+        return replace(self, part=part)
 
     @property
     def in_both(self) -> bool:
@@ -1018,7 +1087,11 @@ class TwoContexts:
 
     @property
     def posture_difference(self) -> float:
-        """Distance between the mean postures of the two contexts; it mixes length units and rad."""
+        """Distance between the mean postures of the two contexts.
+
+        Its unit is the length unit for the base, rad for the joints, and a mixture of both for all
+        coordinates.
+        """
         return distance_of_means(*self.configurations)
 
     @cached_property
@@ -1040,14 +1113,15 @@ class TwoContexts:
 
     @cached_property
     def lean(self) -> Lean:
-        """Lean of the postures at the goal, over the coordinates that move the hand.
+        """Lean of the postures at the goal, in the coordinates of ``part``.
 
         The lean (:func:`.lean`) says how much of the difference between the two contexts' next
-        postures is already there at the shared goal, compared with the start of the movement. In
-        each context, only those compared runs count that hit the next goal with the hand that is
+        postures is already there at the shared goal, compared with the start of the movement. The
+        coordinates are those of :func:`coordinates`: of all, only those that move the hand count.
+        In each context, only those compared runs count that hit the next goal with the hand that is
         used most often for it.
         """
-        joints = movable(self.first.task, self.hand)
+        kept = coordinates(self.first.task, self.hand, self.part)
         goal, hand = self.goal - 1, HANDS.index(self.hand)
         contexts = []
         for runs in (self.first, self.second):
@@ -1055,7 +1129,7 @@ class TwoContexts:
             is_compared &= next_hand == np.bincount(next_hand[is_compared]).argmax()
             hits = runs.configurations
             postures = np.stack([runs.starts[:, goal], hits[:, goal], hits[:, goal + 1]], axis=1)
-            contexts.append(postures[is_compared][..., joints])
+            contexts.append(postures[is_compared][..., kept])
         deterministic = self.first.deterministic and self.second.deterministic
         first, second = contexts
         return lean(first, second, self._rng("lean"), deterministic=deterministic)
@@ -1071,13 +1145,14 @@ class TwoContexts:
 
     @cached_property
     def parts(self) -> tuple[float, float]:
-        """Motor-equivalent part of the posture difference, and the other part.
+        """Motor-equivalent part of the posture difference of all coordinates, and the other part.
 
         The first part does not move the hand. Both are per dimension (:func:`motor_equivalence`).
         """
         task, joints = self.first.task, movable(self.first.task, self.hand)
-        posture = np.concatenate(self.configurations).mean(axis=0)
-        first, second = (configurations.mean(axis=0) for configurations in self.configurations)
+        postures = self.of_part("all").configurations
+        posture = np.concatenate(postures).mean(axis=0)
+        first, second = (configurations.mean(axis=0) for configurations in postures)
         jacobian = task.robot.jacobian(posture, self.hand)[:, joints]
         return motor_equivalence((first - second)[joints], jacobian)
 
@@ -1106,9 +1181,15 @@ class TwoContexts:
     def p_beyond(self, other: TwoContexts) -> float:
         """Return p of the permutation test that the posture difference exceeds that of ``other``.
 
-        ``other`` has the runs of another method at the same goal. p is twice the upper tail
-        (:func:`.beyond_p`), and NaN if a context has fewer than five runs.
+        ``other`` has the runs of another method at the same goal, compared in the same part. p is
+        twice the upper tail (:func:`.beyond_p`), and NaN if a context has fewer than five runs.
+        Raises ValueError if the parts differ.
         """
+        if self.part != other.part:
+            raise ValueError(
+                f"part is {self.part!r}, but that of the other method is {other.part!r}; both must "
+                "be compared in the same part"
+            )
         if not (self.can_test and other.can_test):
             return math.nan
         return beyond_p(self.configurations, other.configurations, self._rng("beyond"))

@@ -726,10 +726,16 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
     verdict                 | verdict
     runs                    | runs                                                  | | tex
     distance[]              | posture difference                                    | 2 | tex
+    distance_base[]         | of the base (length units)                            | 2
+    distance_joints[]       | of the joints (rad)                                   | 2
     lean[]                  | lean (share of the way to the next posture)           | 2 | tex
+    lean_base[]             | lean of the base                                      | 2 | tex
+    lean_joints[]           | lean of the joints                                    | 2 | tex
     lean_start              | lean at the start
     lean_runs               | runs of the lean
     next_apart
+    next_apart_base
+    next_apart_joints
     standardised_difference
     p_holm                  | p (corrected)                                         | p | tex
     control                 | random search                                         | 2 | tex
@@ -743,8 +749,9 @@ def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[s
 def list_contexts(study: Study) -> Rows:
     """Yield a row for each method, pair of tasks, goal that both tasks share, and hand.
 
-    It has the posture difference between the tasks with its verdict, the lean (:func:`.lean`), and
-    the posture difference of random search. p is corrected over the rows of a method (Holm).
+    It has the posture difference between the tasks with its verdict, the lean (:func:`.lean`), both
+    also of the base and of the joints alone, and the posture difference of random search. p is
+    corrected over the rows of a method (Holm).
     """
     for label in study.methods.index:
         contexts = list(shared_goals(study, label))
@@ -759,6 +766,7 @@ def list_contexts(study: Study) -> Rows:
                 "runs": shared.n,
                 **shared.difference.columns("distance"),
                 **shared.lean.more.columns("lean"),
+                **_columns_by_part(shared),
                 "lean_start": shared.lean.at_start,
                 "lean_runs": sum(shared.lean.more.n),
                 "next_apart": shared.lean.apart,
@@ -774,6 +782,17 @@ def list_contexts(study: Study) -> Rows:
                 row["p_random_search"] = shared.p_beyond(control)
             row["verdict"] = _verdict_of(study, shared, row)
             yield f"{first.name} {second.name} {label} goal {shared.goal} {shared.hand}", row
+
+
+def _columns_by_part(shared: TwoContexts) -> Row:
+    """Return posture difference, lean, and distance of the next postures of base and joints."""
+    row: Row = {}
+    for part in ("base", "joints"):
+        of_part = shared.of_part(part)
+        row |= of_part.difference.columns(f"distance_{part}")
+        row |= of_part.lean.more.columns(f"lean_{part}")
+        row[f"next_apart_{part}"] = of_part.lean.apart
+    return row
 
 
 def _columns_of(signature: Signature) -> str:

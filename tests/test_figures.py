@@ -80,7 +80,7 @@ def ends_drawn(figure):
 
 INTERVALS = {
     "ranking": (["gap"], 100.0),
-    "shared-goal": (["distance", "lean"], 1.0),
+    "shared-goal": (["distance", "lean", "lean_base", "lean_joints"], 1.0),
     "runtimes": (["share"], 100.0),
     "learning-curves": (["best"], 1.0),
     "gaps-by-family": (["mean"], 1.0),

@@ -234,6 +234,118 @@ def test_lean_of_two_contexts():
     assert contexts.lean.at_start == 0.0
 
 
+def lean_by_hand(contexts, kept):
+    """Lean at the goal less lean at the start of tuples (starts, hits, next), in own code.
+
+    p is of every other run, and n of the others; the result is the mean of both ways round.
+    """
+    leans = []
+    for even in (0, 1):
+        p, q, n = (
+            [np.mean([run[kept] for run in runs[which][parity::2]], axis=0) for runs in contexts]
+            for which, parity in ((0, even), (1, even), (2, 1 - even))
+        )  # start, goal, next
+        way = n[0] - n[1]
+        leans.append(((q[0] - q[1]) - (p[0] - p[1])) @ way / (way @ way))
+    return np.mean(leans)
+
+
+PARTS = {"all": [0, 1, 6, 7, 8, 9], "base": [0, 1], "joints": [6, 7, 8, 9]}
+"""Coordinates of a posture of a two-armed robot that belong to base and right arm, by part."""
+
+
+def test_lean_and_posture_difference_by_part():
+    """The base has gone half of its way, the joints a tenth back; idle joints do not count."""
+    task = load_task("ascending")
+    still = np.repeat(task.q0[None], len(task.goals), axis=0)
+    hits = np.repeat(still[None], 6, axis=0)
+    ahead = np.array(hits)
+    ahead[:, 0, 0] += 0.3
+    ahead[:, 1, 0] += 0.6
+    ahead[:, 0, 6:] -= 0.02
+    ahead[:, 1, 6:] += 0.2
+    ahead[:, :2, 2:6] += 5.0  # of the idle arm
+    both = solutions_with(task, ahead, ["RRR"] * 6), solutions_with(task, hits, ["RRR"] * 6)
+    found = {part: TwoContexts(*both, 1, "right", part=part) for part in PARTS}
+    assert found["base"].lean.more.value == pytest.approx(0.5)
+    assert found["joints"].lean.more.value == pytest.approx(-0.1)
+    # Base and joints do not add up: 0.3 · 0.6 − 4 · 0.02 · 0.2 of 0.6² + 4 · 0.2².
+    assert found["all"].lean.more.value == pytest.approx((0.18 - 0.016) / 0.52)
+    assert found["base"].lean.apart == pytest.approx(0.6)
+    assert found["joints"].lean.apart == pytest.approx(0.4)
+    assert found["base"].posture_difference == pytest.approx(0.3)
+    assert found["joints"].posture_difference == pytest.approx(0.04)
+    assert found["all"].posture_difference == pytest.approx(math.sqrt(0.09 + 0.0016 + 4 * 25))
+    assert found["joints"].of_part("all") == found["all"]
+
+
+@pytest.mark.parametrize(
+    ("base", "joints", "applies"),
+    [(0.2, 0.04, {"all", "base"}), (0.05, 0.1, {"all", "joints"}), (0.09, 0.04, {"all"})],
+)
+def test_each_part_has_its_own_rule_for_no_lean(base, joints, applies):
+    """Next postures that differ by so much in the base and in each of four joints: 0.1 is due."""
+    task = load_task("ascending")
+    hits = np.repeat(np.repeat(task.q0[None], len(task.goals), axis=0)[None], 6, axis=0)
+    ahead = np.array(hits)
+    ahead[:, 1, 0] += base
+    ahead[:, 1, 6:] += joints
+    both = solutions_with(task, ahead, ["RRR"] * 6), solutions_with(task, hits, ["RRR"] * 6)
+    leans = {part: TwoContexts(*both, 1, "right", part=part).lean.more.value for part in PARTS}
+    assert {part for part, lean in leans.items() if not math.isnan(lean)} == applies
+
+
+def test_a_locked_base_has_no_lean_of_its_own():
+    """Its postures are the same, and the joints lean as all coordinates do."""
+    task = changed("ascending", locked_base=["x", "y"])
+    noise = 0.1 * rng(4).standard_normal((2, 12, len(task.goals), 10))
+    noise[..., :2] = 0.0
+    noise[0, :, 1] += 0.5 * (np.arange(10) > 5)
+    both = [solutions_with(task, task.q0 + each, ["RRR"] * 12) for each in noise]
+    every, base, joints = (TwoContexts(*both, 1, "right", part=part) for part in PARTS)
+    assert base.posture_difference == base.lean.apart == 0.0
+    assert math.isnan(base.lean.more.value)
+    assert joints.lean == every.lean
+
+
+def test_other_parts_of_a_posture_are_refused():
+    task = load_task("ascending")
+    runs = posed(task, "", [posture(0.1)] * 5)
+    with pytest.raises(ValueError, match="part is 'arm'; it must be one of all, base, joints"):
+        TwoContexts(runs, runs, 1, "right", part="arm")
+    whole, base = (TwoContexts(runs, runs, 1, "right", part=part) for part in ("all", "base"))
+    with pytest.raises(ValueError, match="'base'.*'all'"):
+        base.p_beyond(whole)
+
+
+@pytest.mark.parametrize("label", [EC1, RANDOM_SEARCH, "cma-es/bandit"])
+def test_lean_by_part_of_shipped_runs_by_own_code(shipped, label):
+    """Postures are taken from the executions of the shipped solutions, run by run."""
+    both = [shipped.executed(task, label) for task in ("ascending", "descending")]
+    contexts = []
+    for runs in both:
+        run_by_run = [run.configurations for run in runs.runs]
+        contexts.append(
+            (
+                [runs.task.q0] * len(run_by_run),
+                [hits[0] for hits in run_by_run],
+                [hits[1] for hits in run_by_run],
+            )
+        )
+    of_control = contexts_of_control(shipped, TwoContexts(*both, 1, "right", part="joints"))
+    assert (of_control is None) == (label == RANDOM_SEARCH)
+    assert of_control is None or of_control.part == "joints"
+    table = TABLES["contexts"](shipped).loc[f"ascending descending {label} goal 1 right"]
+    for part, kept in PARTS.items():
+        ending = "" if part == "all" else f"_{part}"
+        expected = lean_by_hand(contexts, kept)
+        assert table[f"lean{ending}"] == pytest.approx(expected, abs=1e-12)
+        means = [np.mean(hits, axis=0) for _, hits, _ in contexts]
+        within = slice(None) if part == "all" else kept
+        distance = np.linalg.norm((means[0] - means[1])[within])
+        assert table[f"distance{ending}"] == pytest.approx(distance, abs=1e-12)
+
+
 def test_interval_of_a_posture_difference():
     task, noise = load_task("ascending"), rng(2).normal(size=(2, 40, 10))
     first, second = (posed(task, "", 0.05 * noise[k] + k) for k in (0, 1))

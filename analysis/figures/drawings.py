@@ -400,8 +400,10 @@ def draw_postures(study: Study) -> Parts | None:
 
 
 DOTS = {
-    "distance": "posture difference\n(length unit and rad)",
-    "lean": "lean\n(share of the way to the next posture)",
+    "distance": "difference\n(length unit and rad)",
+    "lean": "lean\n(share of the way)",
+    "lean_base": "base\n(share of its way)",
+    "lean_joints": "joints\n(share of their way)",
 }
 """Panels of the dot plot by column of :func:`list_contexts`, with the labels of their axes."""
 
@@ -410,14 +412,16 @@ DOTS = {
     "Postures at the shared goal, by method",
     "Posture difference: the distance between the mean postures at the goal that two tasks share "
     "(length units and rad). Lean: the share of the way to the next posture that is already made "
-    "there. Both are 0 if the posture does not depend on the next goal. Lines are "
+    "there, by base and arm together (b), by the base alone (c), and by the joints alone (d). All "
+    "are 0 if the posture does not depend on the next goal. Lines are "
     f"{style.COVERAGE} bootstrap intervals over runs, if there are five runs.",
 )
 def draw_shared_goal(study: Study) -> Parts | None:
     """Draw the posture difference and the lean of each method at the goal of :func:`shared_goal`.
 
-    Each has a panel. Settings of methods that are drawn are left out. Random search, if there is
-    one, is also a vertical line. Returns None if there is no shared goal.
+    Each has a panel, and so have the leans of the base and of the joints alone. Settings of methods
+    that are drawn are left out. Random search, if there is one, is also a vertical line. Returns
+    None if there is no shared goal.
     """
     shared = shared_goal(study)
     if shared is None:
@@ -438,8 +442,12 @@ def draw_shared_goal(study: Study) -> Parts | None:
     control = place[place.method == RANDOM_SEARCH]
     lines = {name: float(value) for name in DOTS for value in control[name][:1]}
     drawing = style.dots(data, DOTS, lines)
-    words = spoken(study, place, "{title} {distance:.2f} and {lean:.2f}").replace("nan", "none")
-    alt = f"Posture difference and lean by method at goal {shared.goal}: {words}."
+    words = spoken(study, place, "{title} {distance:.2f}, {lean:.2f}, {lean_base:.2f} and "
+                   "{lean_joints:.2f}").replace("nan", "none")  # fmt: skip
+    alt = (
+        "Posture difference, lean, lean of the base and lean of the joints by method at goal "
+        f"{shared.goal}: {words}."
+    )
     more = f" Goal {shared.goal} of {marked(first)} and {marked(second)}."
     more += " Dashed: random search." * bool(lines)
     if place.lean.isna().any():

@@ -38,9 +38,10 @@ TALLEST = 225 / INCH
 _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Settings of Matplotlib for all figures."""
-LEAST_PANEL, LEAST_SMALL_PANEL = 2.2, 1.6
+LEAST_PANEL, LEAST_SMALL_PANEL, LEAST_DOTS = 2.2, 1.6, 0.8
 """Smallest widths (in inches) of panels side by side, if the width of a figure is set: of panels
-with names next to them, and of panels without names."""
+with names next to them, of panels without names, and of the panels of a dot plot, which share
+their names."""
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""
@@ -254,8 +255,7 @@ def dots(
     """
     height = 0.55 + (0.135 if is_narrow() else 0.165) * len(rows)
     size = TWO, height + 0.1 * sum(name.count("\n") for name in rows.name)
-    shape, least = (1, len(quantities)), LEAST_SMALL_PANEL
-    drawing, all_axes = panels(shape, size, None, least, sharey=True)
+    drawing, all_axes = panels((1, len(quantities)), size, None, LEAST_DOTS, sharey=True)
     for axes, (name, label) in zip(all_axes, quantities.items(), strict=True):
         axes.axvline(0, color=GREY, linewidth=0.5)
         axes.grid(axis="y", color=GREY, alpha=0.3, linewidth=0.5)

@@ -235,9 +235,15 @@ if row.control >= 0 }}{{ " (%s)" % p_value(row.p_random_search) if row.p_random_
 {%- if row.lean == row.lean %}
  The lean is {{ interval(row, "lean", 2) }}: the share of the way to the next posture that is \
 already made there.
+{%- if row.lean_base == row.lean_base and row.lean_joints == row.lean_joints %}
+ The lean of the base alone is {{ interval(row, "lean_base", 2) }}, and that of the joints of the \
+arm alone {{ interval(row, "lean_joints", 2) }}.
+{%- endif %}
 {%- endif %}
 {% endfor %}""",
-        note="Postures are compared in length units and rad. Ticks are compared with those of the "
+        note="Postures are compared in length units and rad; the leans of base and joints, each "
+        "along its own way to the next posture, do not add up to that of both together. "
+        "Ticks are compared with those of the "
         "corrective process with the same hands. If the first movement gets slower and the whole "
         "task faster, the first movement is sacrificed. Idle hand nearer: the share of the path to "
         "its next goal that a hand covers while it is idle. Random search is the learner without "
