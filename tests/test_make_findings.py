@@ -114,3 +114,20 @@ def test_links_of_pages_name_files_that_are_there():
             if "://" not in link and not (page.parent / link).exists():
                 lost.append(f"{page.name}: {link}")
     assert not lost
+
+
+def test_the_first_table_of_the_readme_is_what_the_tables_say():
+    """Mean gaps over random tasks, by method, without and with motor noise."""
+    text = (ROOT / "README.md").read_text("utf-8")
+    rows = re.findall(r"^   \| (.+?) \| (\d+) % \| (\d+) % \|$", text, re.MULTILINE)
+    figures = make_findings.finding_figures
+    ids = {
+        "policy gradient": "policy-gradient", "CMA-ES": "cma-es/bandit",
+        "the paper's learner": figures.LEARNER, "random search": figures.RANDOM,
+    }  # fmt: skip
+    assert [re.split("[,:]", name)[0] for name, *_ in rows] == [*ids]
+    for (_, *printed), method in zip(rows, ids.values(), strict=True):
+        for percent, world in zip(printed, ("", figures.NOISE), strict=True):
+            tasks = make_findings.table("families", "by-task", world)
+            gap = figures.over_random_tasks(tasks).loc[method, "gap"]
+            assert round(100 * gap) == int(percent)
