@@ -357,7 +357,7 @@ def finding(study: Study, section: Section) -> list[str]:
 
     rows, *others = map(named, [each for each in section.tables if each is not list_parameters])
     names = {
-        "interval": interval, "number": number, "p_value": p_value, "leading": leading, "few": few,
+        "interval": interval, "number": number, "p_value": p_value, "leading": _first_two if varies_parameters(study) else leading, "few": few,
         "infinite": math.inf,
         "uses": GROUPS, "first": next(iter(standings(study).index), ""),
         "subjects": subjects,
@@ -394,6 +394,11 @@ def _beside(row: Mapping[str, Any], is_first: bool) -> str:
     distance = dict(zip(("d", "d_low", "d_high"), [abs(row["difference"]), *ends], strict=True))
     words = f"{interval(distance, 'd', scale=100)}{' points' * is_first}"
     return f"{words} {'ahead of' if sign > 0 else 'behind'} {other}"
+
+
+def _first_two(rows: pd.DataFrame) -> list[dict[Any, Any]]:
+    """Return the first two rows of a table as dicts: all others are settings of the same method."""
+    return rows[:2].to_dict("records")
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
