@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from coartic.analysis.methods import (
     WITHOUT_REWARD,
     headline_methods,
 )
-from coartic.analysis.report.sections import SECTIONS, finding
+from coartic.analysis.report.sections import SECTIONS, failed_methods, finding
 from coartic.analysis.statistics import holm, stratified_test
 from coartic.analysis.study import Study
 from coartic.analysis.tables import shown_columns
@@ -185,7 +186,7 @@ def test_methods_are_ranked_and_compared_with_equal_trials(trials, of_command, b
     assert {*TABLES["not-ranked"](seen).index} == unlike
     alike = {name for name, made in trials.items() if made == trials["mine"]} - {"mine"}
     assert {*TABLES["differences"](seen).method} == alike
-    lines = [line for line in said(seen) if "percentage points" not in line]
+    lines = [line for line in said(seen) if " points " not in line]
     assert any("mine" in line for line in lines) == (not why)
 
 
@@ -237,6 +238,26 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert (both.difference_low[both.against == "better"] > 0).all()
     # Runs with the same seeds are not matched.
     assert (both.difference_low[both.against == "same"] < 0).all()
+
+
+def test_the_sentence_says_how_far_an_own_method_is_behind_or_ahead():
+    """Points are positive, with their intervals, and p is said to be corrected, once."""
+    ten = {cell: (rewards * 3)[:10] for cell, rewards in CMA.items()}
+    seen = study(TEN | ten | strangers(("mine", 4), runs=10))
+    rows = TABLES["differences"](seen).set_index("method").difference
+    (line,) = [line for line in said(seen) if " points " in line]
+    (cma, learner) = (number(100 * abs(rows[name]), 1) for name in ("cma-es/bandit", BOTH))
+    assert line.startswith(f"“mine” is {cma} [")
+    assert re.search(rf"{cma} \[\d[^−]*\] points behind CMA-ES \(p.<.0.001\), {learner} \[", line)
+    assert "] ahead of the learner (EC1, EC4) (p" in line
+    assert line.endswith("p is corrected over 2 comparisons, intervals are not.")
+
+
+def test_methods_with_failed_runs_are_named_first():
+    seen = study(TEN | {("ascending", "flaky"): [-300, None], ("two-armed-1", "flaky"): [-480] * 2})
+    assert failed_methods(seen) == ["1 of 4 runs failed (flaky): it is not ranked."]
+    assert "only ranked method using" in said(seen)[0]
+    assert failed_methods(study(TEN)) == []
 
 
 def test_all_methods_are_compared_with_a_method_of_choice():

@@ -331,7 +331,8 @@ def draw_saved(study: Study) -> Parts | None:
                 scale * np.array([row[f"{column}{end}"] for column in columns]) - place
                 for end in ("_low", "_high")
             )
-            axes.axhline(-place, color=style.GREY, linewidth=0.5)
+            # Not beyond the last bar, where a stump would look like a minus sign after the sum.
+            axes.hlines(-place, 0.6, at[-1] + 0.2, color=style.GREY, linewidth=0.5)
             axes.bar(at, scale * ticks, 0.4, -place, color=color, alpha=0.55, linewidth=0)
             axes.vlines(at, low, high, color=style.INK, linewidth=0.9)
             for x, value in zip(at, ticks.round(), strict=True):
@@ -590,7 +591,7 @@ def draw_runtimes(study: Study) -> Parts | None:
     return drawing, data, alt, " Means over all tasks." * (len(target_ranges(study)) > 1)
 
 
-CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
+CURVES = (*LEARNERS, RANDOM_SEARCH, "hill-climbing", "cma-es/bandit")
 """Built-in methods with learning curves. All methods from files with trials also have them."""
 
 
