@@ -357,7 +357,8 @@ def finding(study: Study, section: Section) -> list[str]:
 
     rows, *others = map(named, [each for each in section.tables if each is not list_parameters])
     names = {
-        "interval": interval, "number": number, "p_value": p_value, "leading": _first_two if varies_parameters(study) else leading, "few": few,
+        "interval": interval, "number": number, "p_value": p_value, "few": few,
+        "leading": _first_two if varies_parameters(study) else leading,
         "infinite": math.inf,
         "uses": GROUPS, "first": next(iter(standings(study).index), ""),
         "subjects": subjects,
