@@ -11,10 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from coartic.analysis.figures import dots, look_of, styled
+from coartic.analysis.figures import dots, look_of, panels, style, styled
 
 Table = Callable[[str, str], pd.DataFrame]
 """Function that returns a stored table of a suite or a study by their names."""
@@ -109,14 +110,28 @@ def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]])
 def gaps(table: Table) -> Figure:
     """Draw finding 4: gaps on the paper's tasks and in each family of random tasks."""
     ranking, families = table("comparison", "ranking"), table("families", "family-gaps")
-    panels = {"paper's tasks\ngap (%)": [estimate(ranking.loc[m], "gap", 100) for m in METHODS]}
-    for family in (*FAMILIES, "many-goals"):
-        column = f"in {family}/v1"
-        label = f"{'14 goals' if family == 'many-goals' else family}\ngap (%)"
-        panels[label] = [estimate(families.loc[m], column, 100) for m in METHODS]
-    looks = [look_of(method) for _, method in METHODS.values()]
-    names = [name for name, _ in METHODS.values()]
-    return draw(names, panels, [(look["color"], look["marker"]) for look in looks])
+    names = ["the paper's four tasks", *FAMILIES, "fourteen goals"]
+    columns = [f"in {family}/v1" for family in (*FAMILIES, "many-goals")]
+    figure, (axes,) = panels((1, 1), (style.TWO, 3.2))
+    for place, (method, (name, of_method)) in enumerate(METHODS.items()):
+        row = families.loc[method]
+        estimates = [estimate(ranking.loc[method], "gap", 100)]
+        estimates += [estimate(row, column, 100) for column in columns]
+        values, lows, highs = zip(*estimates, strict=True)
+        look: dict[str, Any] = {"color": look_of(of_method)["color"], "marker": "^osD"[place]}
+        heights = -np.arange(len(names)) + 0.15 * (1.5 - place)
+        axes.hlines(heights, lows, highs, linewidth=1.5, alpha=0.6, color=look["color"])
+        axes.plot(values, heights, label=name, linestyle="", markersize=4.5, **look)
+    axes.set_xscale("log")
+    axes.set_xticks(ticks := [1, 2, 5, 10, 20, 50, 100], [str(tick) for tick in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel("gap (%), logarithmic axis")
+    axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
+    for height in range(1, len(names)):
+        axes.axhline(0.5 - height, color=style.GREY, alpha=0.3, linewidth=0.5)
+    style.name_rows(axes, names)
+    style.legend(figure, axes.get_legend_handles_labels()[0], len(METHODS))
+    return figure
 
 
 @styled

@@ -66,7 +66,8 @@ from coartic.analysis.tables import (
 from coartic.analysis.words import capital, interval, listed, marked, number, titled_apart
 from coartic.estimates import FEWEST, Estimate
 from coartic.internal.text import counted
-from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot, number_goals
+from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot
+from coartic.robot import Array
 from coartic.tasks.task import shipped_tasks
 
 
@@ -822,10 +823,17 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     return drawing, data, alt, " Gaps above 100 % stand at the right end." * any(data.gap > 1)
 
 
+_DISC = 9.5  # diameter of the disc of a goal, in points
+_DISC_LOOK: Any = {
+    "markersize": _DISC, "markerfacecolor": style.BACKGROUND, "markeredgecolor": style.BLUE,
+    "markeredgewidth": 1.0,
+}  # fmt: skip
+
+
 @figure(
     "Tasks",
-    "Start configuration and goals of each task. Open circles are the goals, drawn to scale and "
-    "hit in the order of their numbers.",
+    "Start configuration (grey) and goals of each task, in the order of their numbers. Discs of "
+    "close goals are moved apart. A goal that is larger than its disc is a circle around it.",
 )
 def draw_tasks(study: Study) -> Parts | None:
     """Draw the start configuration and the goals of each individual task, a panel for each.
@@ -857,25 +865,23 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
     rows, columns = style.grid(len(tasks))
-    above, around = 0.75, 0.55  # inches of a panel for title and axes
+    above = 0.4  # inches of a panel for its title
     scale = min(
-        (style.TWO / columns - around) / width,
-        (style.TALLEST - 0.3 - rows * above) / rows / height,
-        0.42,
+        style.TWO / columns / width, (style.TALLEST - 0.3 - rows * above) / rows / height, 0.42
     )
-    size = ((scale * width + around) * columns, (scale * height + above) * rows + 0.3)
+    size = scale * width * columns, (scale * height + above) * rows + 0.3
     size = style.ONE if size[0] <= style.ONE else style.TWO, size[1]  # one column, or two
     if style.is_narrow():
-        size = style.ONE, size[1] * style.ONE / size[0] + 0.45 * rows
+        size = style.ONE, size[1] * style.ONE / size[0] + 0.4 * rows
     drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
     drawing.set_layout_engine("compressed")  # otherwise a title can extend beyond the edge
-    for place, (axes, task, corners) in enumerate(zip(panels, tasks, boxes, strict=True)):
-        draw_robot(axes, task, task.q0)
+    for axes, task, corners in zip(panels, tasks, boxes, strict=True):
+        draw_robot(axes, task, task.q0, colour=style.GREY)
         if len(task.hands) > 1:  # the part of an arm under the other one that can be seen
             left = task.robot.joint_positions(task.q0, "left").T
             axes.plot(*left, color=style.GREY, alpha=0.5, linewidth=3.2, zorder=1.7)
-        circle_goals(axes, task)
-        number_goals(axes, task)
+        for circle in circle_goals(axes, task):
+            circle.set_edgecolor(style.BLUE)
         remarks = [f"{' and '.join(task.reconstructed)} reconstructed"] * bool(task.reconstructed)
         remarks += [f"base locked in {' and '.join(task.locked_base)}"] * bool(task.locked_base)
         fits = int(14 * drawing.get_figwidth() / columns)  # letters
@@ -885,18 +891,40 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
         axes.set_xlim(x - width / 2, x + width / 2)
         axes.set_ylim(y - height / 2, y + height / 2)
         axes.set_aspect("equal")
-        if not style.is_narrow() or place + columns >= len(tasks):
-            axes.set_xlabel("x (length unit)")
-        axes.set_ylabel("y (length unit)")
-    room = 12 if style.is_narrow() else None  # leaves room for numbers of goals
-    style.letters(panels if len(tasks) > 1 else (), pad=room)
+        axes.set_axis_off()
+        length_unit = 72 * drawing.get_figwidth() / columns / width  # points
+        _draw_order(axes, task.goal_array, 1.15 * _DISC / length_unit)
+    style.letters(panels if len(tasks) > 1 else ())
     hands = {hand for task in tasks for hand in task.hands}
     arms = [
-        style.legend_line(f"{hand} arm", color=style.INK, linewidth=0.9, **look)
+        style.legend_line(f"{hand} arm", color=style.GREY, linewidth=0.9, **look)
         for hand, look in MARKERS.items()
         if hand in hands
     ]
-    circle: Any = {"marker": "o", "markersize": 4, "markerfacecolor": "none"}
-    goal = style.legend_line("goal", linestyle="", color=style.INK, **circle)
+    goal = style.legend_line("goal", marker="o", linestyle="", **_DISC_LOOK)
     style.legend(drawing, [*arms, goal], 3)
     return drawing
+
+
+def _draw_order(axes: Axes, goals: Array, apart: float) -> None:
+    """Draw the goals of a task as numbered discs, and an arrow from each goal to the next.
+
+    ``goals`` has shape (G, 2). Discs that would be nearer than ``apart`` (in length units) are
+    moved away from each other.
+    """
+    places = goals.copy()
+    for _ in range(100):
+        for first, second in itertools.combinations(range(len(places)), 2):
+            way = places[second] - places[first]
+            distance = float(np.hypot(*way))
+            if distance < apart:
+                way = way / distance if distance else np.array([1.0, 0.0])
+                places[first] -= way * (apart - distance) / 2
+                places[second] += way * (apart - distance) / 2
+    ends: Any = {"shrinkA": 0.6 * _DISC, "shrinkB": 0.6 * _DISC, "color": style.BLUE}
+    for start, end in itertools.pairwise(places):
+        axes.annotate("", end, start, arrowprops={"arrowstyle": "->", "linewidth": 0.8, **ends})
+    axes.plot(*places.T, "o", clip_on=False, zorder=4, **_DISC_LOOK)
+    for goal, place in enumerate(places, 1):
+        text: Any = {"ha": "center", "va": "center_baseline", "fontsize": 7, "zorder": 5}
+        axes.text(*place, str(goal), **text)
