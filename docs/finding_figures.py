@@ -29,6 +29,16 @@ METHODS = {
     RANDOM: ("random search", RANDOM),
 }
 """Name of the methods of finding 4, and the method that has their look."""
+TWO_WORLDS = {
+    "policy-gradient": "policy gradient",
+    "cma-es/bandit": "CMA-ES",
+    "dual-process (EC1-informed, EC4-informed)": "informed learner",
+    "hill-climbing spread=learned": "hill climbing, learned spread",
+    "hill-climbing": "hill climbing",
+    LEARNER: "learner",
+    RANDOM: "random search",
+}
+"""Methods that are drawn in two worlds: their names by their rows in the ranking."""
 NOTHING = (math.nan, math.nan, math.nan)
 _NUMBER = r"(−?\d+(?:\.\d+)?)"
 
@@ -104,6 +114,37 @@ def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]])
             "a less b\n(percentage points)": more,
         },
     )
+
+
+@styled
+def two_worlds(table: Table) -> Figure:
+    """Draw the gaps of methods in two worlds: without motor noise, and with noise of 0.01."""
+    rankings = [
+        table("comparison", name) for name in ("ranking", "ranking-in-motor_noise=0.01")
+    ]
+    sides = {
+        "gap, the paper's four tasks (%)": [
+            [estimate(ranking.loc[method], "gap", 100) for method in TWO_WORLDS]
+            for ranking in rankings
+        ]
+    }
+    figure, places = panels((1, len(sides)), (style.TWO, 2.9))
+    heights = -np.arange(len(TWO_WORLDS))
+    worlds = (("without noise", 0.15, BLUE), ("with motor noise 0.01", -0.15, "white"))
+    for axes, (label, estimates) in zip(places, sides.items(), strict=True):
+        for (world, shift, face), in_world in zip(worlds, estimates, strict=True):
+            values, lows, highs = zip(*in_world, strict=True)
+            axes.hlines(heights + shift, lows, highs, linewidth=1.5, alpha=0.6, color=BLUE)
+            marks = {"marker": "o", "markersize": 4.5, "color": BLUE, "markerfacecolor": face}
+            axes.plot(values, heights + shift, label=world, linestyle="", **marks)
+        axes.set_xlabel(label)
+        axes.set_xlim(left=0)
+        axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
+        for height in range(1, len(TWO_WORLDS)):
+            axes.axhline(0.5 - height, color=style.GREY, alpha=0.3, linewidth=0.5)
+        style.name_rows(axes, [*TWO_WORLDS.values()])
+    style.legend(figure, places[0].get_legend_handles_labels()[0], 2)
+    return figure
 
 
 @styled
@@ -194,6 +235,7 @@ def goals_ahead(table: Table) -> Figure:
 
 
 FIGURES: dict[str, Any] = {
+    "two-worlds": two_worlds,
     "first-movement": first_movement,
     "early-gain": early_gain,
     "gaps": gaps,
