@@ -1,16 +1,23 @@
 """The pages of the site whose numbers come from stored results."""
 
 import re
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from coartic.analysis import load
+from coartic.runs.shipped import shipped_hashes
 from coartic.tasks.optima import BEST_KNOWN
 from common.writing import fill_page
+from tests.support.made_up import row, study_of
 from tests.support.processes import ROOT, program
 
 DOCS = ROOT / "docs"
+STORED = DOCS / "stored"
+SOURCES = tomllib.loads((STORED / "SOURCES.toml").read_text("utf-8"))["tables"]
 make_findings = program(DOCS / "make_findings.py")
 
 
@@ -29,22 +36,56 @@ def test_figures_are_drawn_from_the_stored_tables_and_each_is_on_the_page():
         assert path in page
 
 
-def test_what_pages_ask_for_is_stored_from_the_reports_that_are_named(tmp_path, monkeypatch):
-    """And nothing else; suites without a report keep what they have."""
-    stored, results = tmp_path / "stored", tmp_path / "results"
+def test_what_pages_ask_for_is_stored_from_the_results_that_are_given(tmp_path, monkeypatch):
+    """And nothing else; suites without new results keep what they have."""
+    stored = tmp_path / "stored"
     monkeypatch.setattr(make_findings, "STORED", stored)
     monkeypatch.setattr(make_findings, "NEW", {})
-    for place in (stored / "old", stored / "planted", results / "planted" / "report" / "tables"):
-        place.mkdir(parents=True)
-        (place / "gaps.csv").write_text("row,gap,run_ids\na,0.12345678,x y\n")
-    (results / "planted" / "report" / "figures").mkdir()
-    (results / "planted" / "report" / "figures" / "gaps.svg").write_text("new")
-    (stored / "planted" / "unused.csv").write_text("")
-    make_findings.forget_stored(results)
-    assert make_findings.table("planted", "gaps").to_dict() == {"gap": {"a": 0.123457}}
-    assert "run_ids" in make_findings.table("old", "gaps")
-    make_findings.store_figures(["![Gaps](stored/planted/gaps.svg) ![Old](stored/old/gaps.svg)"])
-    assert {path.name for path in (stored / "planted").iterdir()} == {"gaps.csv", "gaps.svg"}
+    for suite in ("old", "planted"):
+        (stored / suite).mkdir(parents=True)
+        (stored / suite / "ranking.csv").write_text("row,gap,run_ids\na,0.12345678,x y\n")
+        (stored / suite / "unused.csv").write_text("")
+    rows = [row("random-search", -480 - run, run=run) for run in range(3)]
+    make_findings.forget_stored({"planted": study_of(rows), "another": study_of(rows)})
+    assert make_findings.table("planted", "ranking").index.tolist() == ["random-search"]
+    assert "run_ids" not in make_findings.table("planted", "ranking")
+    assert "run_ids" in make_findings.table("old", "ranking")
+    make_findings.store_figures(["![Gaps](stored/planted/ranking.svg) ![](stored/old/gaps.svg)"])
+    made = {path.name for path in (stored / "planted").iterdir()}
+    assert made == {"ranking.csv", "ranking.svg"}
+    assert {path.name for path in stored.iterdir()} == {"old", "planted"}
+
+
+def test_what_is_stored_is_what_the_shipped_runs_make(tmp_path):
+    """Each table and figure of a suite whose runs ship, with the code of today.
+
+    Tables have six digits. Ends of intervals and p-values may differ by a tie between resamples.
+    """
+    unpacked = make_findings.unpack_shipped(tmp_path)
+    todo = "make it again: PYTHONPATH=studies python docs/make_findings.py --from shipped"
+    for suite in shipped_hashes():
+        study = load(unpacked / suite)
+        tables = [
+            file for table in SOURCES if table.get("source") == suite for file in table["files"]
+        ]
+        assert {ROOT / file for file in tables} == {*(STORED / suite).glob("*.csv")}
+        for file in tables:
+            name, _, world = Path(file).stem.partition("-in-")
+            made = make_findings.make_table(study.worlds[world], name)
+            made.to_csv(tmp_path / "made.csv", float_format="%.6g")
+            made, stored = (
+                pd.read_csv(path, index_col=0) for path in (tmp_path / "made.csv", ROOT / file)
+            )
+            assert [*made] == [*stored], f"{file}: {todo}"
+            tied = made.columns.str.contains(r"_low$|_high$|\bp\b|^p_|_p$|_p_")
+            for columns, rtol in ((~tied, 1e-5), (tied, 0.02)):
+                pd.testing.assert_frame_equal(
+                    made.loc[:, columns], stored.loc[:, columns], rtol=rtol, atol=1e-9,
+                    obj=f"{file} ({todo})",
+                )  # fmt: skip
+        for figure in (STORED / suite).glob("*.svg"):
+            drawn = make_findings.draw_figure(study.worlds[""], figure.stem)
+            assert drawn == figure.read_bytes(), f"{figure}: {todo}"
 
 
 def test_stored_gaps_of_families_are_to_the_best_known_rewards_that_ship():

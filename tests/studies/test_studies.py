@@ -18,11 +18,12 @@ from coartic.benchmarks.suites import load_suite
 from coartic.tasks.families import instance_of, own_families
 from coartic.tasks.optima import KnownOptimum
 from coartic.tasks.task import address_of, task_text
-from common.writing import fill_page, write_study
+from common.writing import fill_page, stored_picture, write_study
 from tests.support.made_up import row, study_of
 from tests.support.processes import ROOT, program
 
 ALL = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
+DRAWN = [folder for folder in ALL if (folder / "figure.svg").exists()]
 STUDIES = [folder.name for folder in ALL if (folder / "suite.toml").exists()]
 """Studies of runs; the others have protocols of their own."""
 SMALL = ROOT / "tests" / "studies"
@@ -69,6 +70,13 @@ def test_page_says_what_the_tables_say(folder):
     tables = {path.stem: read(path) for path in folder.glob("*.csv")}
     page = fill_page(folder / "README.md.jinja", **tables)
     assert page == (folder / "README.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("folder", DRAWN, ids=lambda folder: folder.name)
+def test_figure_is_drawn_from_the_stored_results(folder):
+    study, results = program(folder / "study.py"), read(folder / "results.csv")
+    todo = f"make it again: PYTHONPATH=studies python studies/{folder.name}/study.py"
+    assert stored_picture(study.draw, results) == (folder / "figure.svg").read_bytes(), todo
 
 
 def test_families_of_studies_are_what_they_were():
