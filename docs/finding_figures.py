@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 from coartic.analysis.figures import dots, look_of, panels, style, styled
 
-Table = Callable[[str, str], pd.DataFrame]
-"""Function that returns a stored table of a suite or a study by their names."""
+Table = Callable[..., pd.DataFrame]
+"""Function that returns a stored table of a suite or a study by their names, in a world."""
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 BLUE = look_of("dual-process/EC4")["color"]
 LEARNER, RANDOM = "dual-process (EC1, EC4)", "random-search"
@@ -119,9 +119,7 @@ def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]])
 @styled
 def two_worlds(table: Table) -> Figure:
     """Draw the gaps of methods in two worlds: without motor noise, and with noise of 0.01."""
-    rankings = [
-        table("comparison", name) for name in ("ranking", "ranking-in-motor_noise=0.01")
-    ]
+    rankings = [table("comparison", "ranking", world) for world in ("", "motor_noise=0.01")]
     sides = {
         "gap, the paper's four tasks (%)": [
             [estimate(ranking.loc[method], "gap", 100) for method in TWO_WORLDS]
