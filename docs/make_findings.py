@@ -244,17 +244,6 @@ def in_worlds(claim: str) -> str:
     return ". ".join(part[0].upper() + part[1:] for part in parts) + "."
 
 
-def with_the_same_hands() -> pd.Series:
-    """Return the mean ticks that the learner gains more than hill climbing with centres, by family.
-
-    Only runs count in which both end with the same hand sequence (study *memory*, *The paper's rule
-    for hands*).
-    """
-    runs = pd.read_csv(STUDIES / "memory" / "hands.csv.xz").set_index(["family", "task", "run"])
-    table_runs, centres = (runs[runs.cell == cell] for cell in ("table", "centres"))
-    more = (table_runs.reward - centres.reward)[table_runs.hands == centres.hands]
-    return more.groupby("family").mean()
-
 
 def filled_pages() -> dict[str, str]:
     """Return every page that is made from a template, by its path below ``docs``."""
@@ -272,7 +261,6 @@ def filled_pages() -> dict[str, str]:
         "gain_of_best_hands": gain_of_best_hands,
         "early_less_late": early_less_late,
         "in_worlds": in_worlds,
-        "with_the_same_hands": with_the_same_hands,
         "foreign_gaps": foreign_gaps,
         "shipped_gaps": shipped_gaps,
         "published": published["general"],
