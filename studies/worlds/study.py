@@ -1,0 +1,384 @@
+"""Measure in which worlds six findings hold.
+
+    PYTHONPATH=studies python studies/worlds/protocols.py results/worlds
+    PYTHONPATH=studies python studies/worlds/study.py results/worlds
+
+The findings are in claims.toml with the answers that were expected. Against a finding in a world
+is a mean over tasks on the other side of 0 (reversed). No verdict (open) is neither.
+
+Rules, committed before the runs:
+
+- A cell is a claim in a family in a world. Its value is a mean over tasks; each task has the mean
+  of its runs. Ticks of a run are those of its solution, in noise the mean of 100 executions of its
+  answer. They are divided by the ticks of the corrective process with its best hands in this world.
+- A failed run counts as the worst run of any method on its task in this world. A task without the
+  corrective process, or without a run that counts, is dropped. For signatures, failed runs and runs
+  without the signature are dropped. A lean needs what :func:`coartic.analysis.lean` says; a pair
+  without the lean of each method of the claim is dropped. All of these are counted.
+- Each cell has two one-tailed bootstrap tests over tasks, of the claim and of its opposite, each
+  corrected over all cells of the claim (Holm), with all tasks and without the task that favours
+  the tested side most. *holds* and *reversed* need p < 0.05 both times; but where p is above 0.01
+  and the skewness of the tasks is beyond 2 on either side, the cell is open, because the test
+  rejects too often there.
+- The paper's tasks have no verdict; intervals are over runs.
+- Control: random search with other seeds takes the learner's place in the paper's world. Claims
+  about gain, first movement and lean, corrected over families, may hold in some family in at most
+  10 of 100 sets of seeds.
+"""
+
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib.lines import Line2D
+from scipy import stats
+from settings import CONTROL, CONTROL_SETS, FAMILIES, LONG, RUNS, RUNS_OF_PAIRS, WORLDS
+
+from coartic.analysis import TwoContexts, figures, load, mean, means
+from coartic.analysis.statistics import holm
+from coartic.estimates import LEVEL, Estimate, difference_of_means
+from common.judging import mean_beyond
+from common.writing import write_study
+
+HERE = Path(__file__).parent
+CLAIMS = tomllib.loads((HERE / "claims.toml").read_text("utf-8"))
+LEARNER, RANDOM, GRADIENT, CMA = "learner", "random-search", "policy-gradient", "cma-es/bandit"
+BETTER = {
+    "learner-gains": (RANDOM, LEARNER),
+    "cma-es-ahead": (LEARNER, CMA),
+    "policy-gradient-ahead": (LEARNER, GRADIENT),
+}
+"""Claims about ticks: the method that is claimed to need more, and the one that needs fewer."""
+SHARED = ("ascending", "descending")
+PARTS = ("all", "base", "joints")
+SKEWED, CERTAIN = 2.0, 0.01
+"""Skewness beyond which a p above the second number decides nothing."""
+
+
+def base_name(task):
+    """Return the task of which a task with another radius is made: its name without the radius."""
+    name = task.partition("-radius-")[0]
+    family, _, number = name.rpartition("-")
+    is_instance = family in FAMILIES and not number.isdecimal()
+    return f"{family}/v1/{number}" if is_instance else name
+
+
+def of_world(world, study):
+    """Return the runs of a world with their ticks and first movements, and the leans of its pairs.
+
+    Runs: ``world``, ``group`` (family, or task of the paper), ``task``, ``method``, ``run``,
+    ``seed``, ``status``, ``ticks`` (missing if the run failed), ``alone`` (ticks of the corrective
+    process with its best hands), ``first`` (ticks by which the first movement is longer than in the
+    corrective process with the same hands), ``hands``.
+    """
+    runs = study.runs
+    method = runs.method.where(~runs.method.str.startswith("dual-process"), LEARNER)
+    task = runs.task.map(base_name)
+    table = pd.DataFrame(
+        {
+            "world": world, "group": task.str.partition("/")[0], "task": task, "method": method,
+            "run": runs.run, "seed": runs.seed, "status": runs.status, "ticks": -runs.value,
+            "alone": -runs.task.map(study.corrective_best), "hands": runs.hands,
+        }
+    )  # fmt: skip
+    is_pair = runs.task.str.endswith(("-goal", "-back")).to_numpy()
+    table["first"] = study.signature("first").to_numpy(np.float64)
+    table = table.set_index(runs.run_id.to_numpy()).rename_axis("run_id")
+    return table[~is_pair], leans_of(world, study)
+
+
+def leans_of(world, study):
+    """Return the lean of each method at the goal that two tasks share, by pair and part."""
+    names, rows = {base_name(name): name for name in study.tasks}, []
+    numbers = [name.removesuffix("-goal") for name in names if name.endswith("-goal")]
+    pairs = {number: (f"{number}-goal", f"{number}-back") for number in numbers}
+    if {*SHARED} <= {*names}:
+        pairs = {SHARED[0]: tuple(names[name] for name in SHARED), **pairs}
+    for pair, tasks in pairs.items():
+        for method in ("dual-process/EC1", RANDOM):
+            if any((task, method) not in study.cells for task in tasks):
+                continue
+            both = [study.executed(task, method) for task in tasks]
+            asked = sum(len(study.cells[task, method]) for task in tasks)
+            for part in PARTS:
+                found = lean_of(*both, part)
+                rows.append(
+                    {
+                        "world": world, "pair": pair, "part": part,
+                        "method": LEARNER if method != RANDOM else RANDOM,
+                        **found.columns("lean"), "asked": asked,
+                        "failed": asked - sum(len(each.runs) for each in both),
+                    }
+                )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def lean_of(first, second, part):
+    """Return the lean at goal 1 (per cent) of runs on two tasks; NaN where it does not apply."""
+    if not (first.runs and second.runs):
+        return Estimate(np.nan)
+    contexts = TwoContexts(first, second, 1, "right", part=part)
+    if not contexts.in_both:
+        return Estimate(np.nan)
+    lean = contexts.lean.more
+    return Estimate(100 * lean.value, 100 * lean.low, 100 * lean.high, n=lean.n)
+
+
+def with_failures(runs):
+    """Return runs in which a failed run has the ticks of the worst run on its task and world."""
+    worst = runs.groupby(["world", "task"]).ticks.transform("max")
+    return runs.assign(failed=runs.ticks.isna(), ticks=runs.ticks.fillna(worst))
+
+
+def shares(runs, claim):
+    """Return the value of each run for a claim about runs, % of the corrective process's ticks."""
+    sign = np.where(runs.method == (BETTER[claim][0] if claim in BETTER else LEARNER), 1, -1)
+    value = runs.ticks if claim in BETTER else runs["first"]
+    return sign * 100 * value / runs.alone
+
+
+def values_of(runs, claim):
+    """Return a claim's value for each task (``value``), with the counts of runs and failures.
+
+    Index: world, group, task. A value is NaN if the task is dropped.
+    """
+    methods = BETTER.get(claim, (LEARNER, RANDOM))
+    used = with_failures(runs)
+    used = used[used.method.isin(methods)]
+    used = used.assign(share=shares(used, claim))
+    keys = ["world", "group", "task"]
+    by_method = used.pivot_table("share", keys, "method", dropna=False)
+    lost = used.failed if claim in BETTER else used.share.isna()
+    counts = used.assign(lost=lost).groupby(keys, sort=False).agg(
+        runs=("failed", "size"), failed=("failed", "sum"), lost=("lost", "sum")
+    )  # fmt: skip
+    return counts.assign(value=by_method[[*methods]].sum(axis=1, min_count=2).reindex(counts.index))
+
+
+def values_of_pairs(leans, claim):
+    """Return a claim's value for each pair, as :func:`values_of` does for tasks."""
+    part = "joints" if claim == "joints-lean" else "all"
+    used = leans[leans.part == part]
+    table = used.pivot_table("lean", ["world", "pair"], "method", dropna=False)
+    value = table[LEARNER] - (table[RANDOM] if claim == "learner-leans" else 0.0)
+    which = used if claim == "learner-leans" else used[used.method == LEARNER]
+    counts = which.groupby(["world", "pair"]).agg(runs=("asked", "sum"), failed=("failed", "sum"))
+    found = counts.assign(lost=counts.failed, value=value.reindex(counts.index)).reset_index()
+    group = np.where(found.pair == SHARED[0], SHARED[0], "one-armed")
+    return found.assign(group=group).rename(columns={"pair": "task"}).set_index(
+        ["world", "group", "task"]
+    )  # fmt: skip
+
+
+def verdicts(cells):
+    """Judge the cells of a claim: a mapping of a cell to its values, one for each task.
+
+    Returns a table with a row for each cell: ``p`` and ``opposite_p`` after correction, each with
+    ``_without`` the task that favours this side most, ``skewness``, the verdict with all tasks
+    (``all_tasks``), that ``without`` this task, and the ``verdict`` that needs both.
+    """
+    count, columns = len(cells), {}
+    for side, name in (("greater", "p"), ("less", "opposite_p")):
+        found = [mean_beyond("{}", values, 0.0, side) for values in cells.values()]
+        for part, suffix in (("tests", ""), ("without", "_without")):
+            tests = [getattr(each, part) for each in found]
+            columns[name + suffix] = holm([test[0].p if test else np.nan for test in tests], count)
+    table = pd.DataFrame(columns, index=[*cells])
+    values = [np.asarray(each, float)[np.isfinite(each)] for each in cells.values()]
+    table["skewness"] = [stats.skew(each) if np.ptp(each) else 0.0 for each in values]
+    means = np.array([each.mean() for each in values])
+    for name, suffix in (("all_tasks", ""), ("without", "_without")):
+        holds = (means > 0) & (table["p" + suffix] < LEVEL)
+        turns = (means < 0) & (table["opposite_p" + suffix] < LEVEL)
+        table[name] = np.select([holds, turns], ["holds", "reversed"], "open")
+    p = np.where(means > 0, table.p, table.opposite_p)
+    unsure = (table.skewness.abs() > SKEWED) & (p > CERTAIN)
+    table["verdict"] = table.all_tasks.where((table.all_tasks == table.without) & ~unsure, "open")
+    return table
+
+
+EXPECTED = {"h": "holds", "r": "reversed", "o": "open"}
+
+
+def tabulate(runs, leans):
+    """Return the matrix: a row for each claim, world and family, or task of the paper."""
+    rows = []
+    for claim in CLAIMS:
+        found = (values_of_pairs(leans, claim) if claim.endswith(("leans", "lean"))
+                 else values_of(runs[runs.world != LONG.name], claim))  # fmt: skip
+        cells, counted = {}, {}
+        for (world, group), of_cell in found.groupby(["world", "group"], sort=False):
+            values = of_cell.value.dropna()
+            row = {"claim": claim, "world": world, "group": group, "tasks": len(values),
+                   "dropped": len(of_cell) - len(values)}  # fmt: skip
+            row |= {name: int(of_cell[name].sum()) for name in ("runs", "failed", "lost")}
+            if group in FAMILIES and len(values) >= 3:
+                cells[world, group], counted[world, group] = values.to_numpy(float), row
+            elif group not in FAMILIES:
+                rows.append(row | of_paper(claim, world, group, runs, leans).columns("value"))
+        judged = verdicts(cells)
+        for key, row in counted.items():
+            answer = CLAIMS[claim]["expected"][key[0]][FAMILIES.index(key[1])]
+            values = cells[key]
+            row |= mean(values).columns("value") | {"median": float(np.median(values))}
+            rows.append(row | judged.loc[[key]].iloc[0].to_dict() | {"expected": EXPECTED[answer]})
+    table = pd.DataFrame(rows)
+    order = {name: number for number, name in enumerate(WORLDS)}
+    table["at"] = table.world.map(order)
+    table["nth"] = table.claim.map([*CLAIMS].index)
+    table = table.sort_values(["nth", "at"], kind="stable").drop(columns=["at", "nth"])
+    return table.set_index((table.claim + " " + table.world + " " + table.group).rename("row"))
+
+
+def of_paper(claim, world, task, runs, leans):
+    """Return a claim's value on a task of the paper, with its interval over runs.
+
+    The difference of two leans has the interval of Zou and Donner (2008), which is made of the
+    intervals of both.
+    """
+    if claim.endswith(("leans", "lean")):
+        part = "joints" if claim == "joints-lean" else "all"
+        mine = leans[(leans.world == world) & (leans.pair == task) & (leans.part == part)]
+        mine = mine.set_index("method")
+        one = mine.loc[LEARNER]
+        if claim == "joints-lean":
+            return Estimate(one.lean, one.lean_low, one.lean_high)
+        other = mine.loc[RANDOM]
+        value = one.lean - other.lean
+        down = np.hypot(one.lean - one.lean_low, other.lean_high - other.lean)
+        up = np.hypot(one.lean_high - one.lean, other.lean - other.lean_low)
+        return Estimate(value, value - down, value + up)
+    used = with_failures(runs[(runs.world == world) & (runs.task == task)])
+    used = used.assign(share=shares(used, claim)).dropna(subset="share")
+    first, second = BETTER.get(claim, (LEARNER, RANDOM))
+    return difference_of_means(
+        used.share[used.method == first], -used.share[used.method == second]
+    )  # fmt: skip
+
+
+def control_values(study, runs, leans):
+    """Return the values of each set of control runs: those of random search in the learner's place.
+
+    Columns: ``set``, ``claim``, ``group``, ``task``, ``value``. Set 0 are the runs with which the
+    study compares the learner.
+    """
+    controls, _ = of_world("paper", study)
+    controls = controls.assign(set=controls.run // RUNS["families"], method=LEARNER)
+    rivals = runs[(runs.world == "paper") & (runs.method == RANDOM) & runs.group.isin(FAMILIES)]
+    parts = []
+    for number, of_set in controls[controls.set > 0].groupby("set"):
+        both = pd.concat([of_set.drop(columns="set"), rivals])
+        for claim in ("learner-gains", "first-movement-slower"):
+            found = values_of(both, claim).reset_index()
+            parts.append(found.assign(set=number, claim=claim))
+    theirs = leans[(leans.world == "paper") & (leans.part == "all") & (leans.method == RANDOM)]
+    theirs = theirs.set_index("pair").lean
+    rows = []
+    for pair in [name for name in theirs.index if name != SHARED[0]]:
+        both = [study.executed(f"{pair}-{kind}", RANDOM) for kind in ("goal", "back")]
+        for number in range(1, CONTROL_SETS + 1):
+            of_set = [some(each, number, study) for each in both]
+            value = lean_of(*of_set, "all").value - theirs[pair]
+            rows.append({"set": number, "claim": "learner-leans", "group": "one-armed",
+                         "task": pair, "value": value})  # fmt: skip
+    table = pd.concat([*parts, pd.DataFrame(rows)])
+    return table[["set", "claim", "group", "task", "value"]].reset_index(drop=True)
+
+
+def some(solutions, number, study):
+    """Return the solutions of a set of control runs on a task of a pair."""
+    runs = study.runs.set_index("run_id").run
+    of_set = [runs[name] // RUNS_OF_PAIRS == number for name in solutions.run_ids]
+    keep = [run for run, wanted in zip(solutions.runs, of_set, strict=True) if wanted]
+    return type(solutions)(solutions.task, solutions.label, tuple(keep), model=solutions.model)
+
+
+def judge_control(values):
+    """Return for each claim in how many sets of seeds it holds, or is reversed, in some family."""
+    rows = []
+    for (claim, number), of_set in values.groupby(["claim", "set"], sort=False):
+        cells = {group: each.value.dropna().to_numpy(float)
+                 for group, each in of_set.groupby("group", sort=False)}  # fmt: skip
+        found = verdicts(cells).verdict
+        rows.append({"claim": claim, "set": number, "holds": (found == "holds").any(),
+                     "reversed": (found == "reversed").any()})  # fmt: skip
+    table = pd.DataFrame(rows)
+    counts = table.groupby("claim", sort=False)[["holds", "reversed"]].sum().astype(int)
+    return counts.assign(sets=table.groupby("claim", sort=False).size(), bound=0.1)
+
+
+LABELS = {
+    "learner-gains": "learner gains more than random search (%)",
+    "cma-es-ahead": "CMA-ES ahead of the learner (%)",
+    "policy-gradient-ahead": "policy gradient ahead of the learner (%)",
+    "first-movement-slower": "first movement slower than in random search (%)",
+    "learner-leans": "learner leans more than random search (points of lean)",
+    "joints-lean": "learner's joints lean (points of lean)",
+}
+"""Titles of panels."""
+
+
+def legend_line(label, **look):
+    """Return an entry of a legend: a mark with its label."""
+    return Line2D([], [], label=label, linestyle="", marker="o", **look)
+
+
+@figures.styled
+def draw(table):
+    """Draw the matrix: estimate and interval of each cell with a verdict; open cells stay blank."""
+    worlds = [name for name in WORLDS if (table.world == name).any()]
+    figure, panels = figures.panels((len(CLAIMS), 1), (figures.TWO, 7.6), sharex=True)
+    for axes, claim in zip(panels, CLAIMS, strict=True):
+        cells = table[(table.claim == claim) & table.verdict.isin(["holds", "reversed"])]
+        axes.axhline(0, color=figures.GREY, linewidth=0.6)
+        for number, family in enumerate(FAMILIES):
+            of_family = cells[cells.group == family]
+            shift = 0.24 * (number - 1) if claim not in ("learner-leans", "joints-lean") else 0.0
+            places = of_family.assign(place=of_family.world.map(worlds.index) + shift)
+            for verdict, rows in places.groupby("verdict"):
+                face = figures.PALETTE[number] if verdict == "holds" else "white"
+                figures.means(axes, rows, x="place", y="value", color=figures.PALETTE[number],
+                              linestyle="", marker="o", markerfacecolor=face)  # fmt: skip
+        for place in range(1, len(worlds)):
+            axes.axvline(place - 0.5, color=figures.GREY, linewidth=0.2)
+        axes.set(xlim=(-0.5, len(worlds) - 0.5))
+        axes.set_title(LABELS[claim], loc="left")
+        if cells.empty:
+            axes.set(ylim=(-1, 1), yticks=[0])
+    titles = [WORLDS[name].title.replace(" ", "\n", 1) for name in worlds]
+    panels[-1].set_xticks(range(len(worlds)), titles)
+    handles = [
+        legend_line(family, color=figures.PALETTE[number]) for number, family in enumerate(FAMILIES)
+    ]
+    handles.append(legend_line("reversed", color=figures.GREY, markerfacecolor="white"))
+    figures.legend(figure, handles, 4)
+    return figure
+
+
+def describe_long(runs):
+    """Return the mean values of claims at radius 0.02 after 100,000 trials, with one run a task."""
+    rows = [values_of(runs[runs.world == LONG.name], claim).reset_index().assign(claim=claim)
+            for claim in CLAIMS if claim in BETTER or claim == "first-movement-slower"]  # fmt: skip
+    table = means(pd.concat(rows), ["claim", "group"], ["value"]).rename(columns={"rows": "tasks"})
+    return table.set_index((table.claim + " " + table.group).rename("row"))
+
+
+def measure(folder):
+    """Return the tables of a results folder by name; each becomes a CSV file."""
+    found = [of_world(name, load(folder / name)) for name in (*WORLDS, LONG.name)
+             if (folder / name).is_dir()]  # fmt: skip
+    runs, leans = (pd.concat(parts) for parts in zip(*found, strict=True))
+    tables = {"results": tabulate(runs, leans), "runs": runs,
+              "leans": leans.set_index(["world", "pair", "part", "method"])}  # fmt: skip
+    if (runs.world == LONG.name).any():
+        tables["long"] = describe_long(runs)
+    if (folder / CONTROL).is_dir():
+        values = control_values(load(folder / CONTROL), runs, leans)
+        tables |= {"control": judge_control(values), "control_values": values.set_index("set")}
+    return tables
+
+
+if __name__ == "__main__":
+    write_study(HERE, measure(Path(sys.argv[1])) if sys.argv[1:] else {}, draw)
