@@ -29,6 +29,7 @@ from coartic.runs.shipped import PACKED, SHIPPED, SHIPPED_FOLDER, shipped_hashes
 from coartic.runs.store import RUNS_FILE
 from common.judging import Verdict
 from common.writing import fill_page, stored_picture
+from worlds.settings import FAMILIES, WORLDS
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
@@ -217,32 +218,29 @@ def shipped_gaps(method: str) -> dict[str, float]:
     return gaps | mean(100 * drawn.gap).columns("random")
 
 
-
 def in_worlds(claim: str) -> str:
     """Return in words in how many worlds a claim of study ``worlds`` holds, and where it does not.
 
     A claim about lean has the family *one-armed* alone.
     """
-    judged = table("worlds", "results")
-    judged = judged[(judged.claim == claim) & judged.group.isin(FAMILIES_OF_WORLDS)]
-    verdict = judged.pivot_table("verdict", "world", "group", aggfunc="first")
-    verdict = verdict.reindex(index=[name for name in WORLDS if name in verdict.index])
-    families = [name for name in FAMILIES_OF_WORLDS if name in verdict]
-    held = int((verdict == "holds").all(axis=1).sum())
-    tested = f"all {len(families)} families" if len(families) > 1 else f"*{families[0]}*"
-    parts = [f"it holds in {tested} in {held} of {len(verdict)} worlds"]
-    for word in ("open", "reversed"):
-        places = [
-            f"{WORLDS[world]} ({', '.join(f for f in families if row[f] == word)})"
-            if len(families) > 1
-            else WORLDS[world]
-            for world, row in verdict.iterrows()
-            if (row == word).any()
-        ]
+    judged = table("worlds", "results").dropna(subset="verdict")
+    judged = judged[judged.claim == claim]
+    verdicts = judged.pivot(index="world", columns="group", values="verdict").fillna("not judged")
+    families = [family for family in FAMILIES if family in verdicts]
+    worlds = [name for name in WORLDS if name in verdicts.index]
+    held = int((verdicts == "holds").all(axis=1).sum())
+    tested = "all three families" if len(families) > 1 else f"*{families[0]}*"
+    sentences = [f"In {tested} it holds in {held} of {len(worlds)} worlds."]
+    for verdict in ("open", "reversed", "not judged"):
+        places = []
+        for name in worlds:
+            where = [family for family in families if verdicts[family][name] == verdict]
+            if where:
+                of_families = f" ({', '.join(where)})" if len(families) > 1 else ""
+                places.append(WORLDS[name].title + of_families)
         if places:
-            parts.append(f"{word} in {'; '.join(places)}")
-    return ". ".join(part[0].upper() + part[1:] for part in parts) + "."
-
+            sentences.append(f"{verdict.capitalize()}: {'; '.join(places)}.")
+    return " ".join(sentences)
 
 
 def filled_pages() -> dict[str, str]:
