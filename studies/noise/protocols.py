@@ -15,8 +15,11 @@ of rows. Existing files and stored runs are not made again, so an interrupted co
 repeated. All takes about 20 minutes of CPU time.
 """
 
+import json
 import lzma
+import sqlite3
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +31,7 @@ from coartic.analysis import load
 from coartic.benchmarks.runner import run_suite
 from coartic.motion.initial_hands import best_hands
 from coartic.runs.plan import judge_seed
+from coartic.runs.record import movement_from
 
 HERE = Path(__file__).parent
 REPEATS = 100
@@ -46,6 +50,14 @@ def shipped_families(folder):
         database.parent.mkdir(parents=True, exist_ok=True)
         database.write_bytes(lzma.decompress((SHIPPED / "families.sqlite.xz").read_bytes()))
     return load(database.parent)
+
+
+def solutions_of(folder, run_ids):
+    """Return the movements of runs of a results folder by run id."""
+    query = "SELECT json_extract(movements, '$.solution') FROM results WHERE run_id = ?"
+    with closing(sqlite3.connect(folder / "runs.sqlite")) as database:
+        texts = {run_id: database.execute(query, (run_id,)).fetchone()[0] for run_id in run_ids}
+    return {key: tuple(map(movement_from, json.loads(text))) for key, text in texts.items()}
 
 
 def executions(task, solutions, numbers, noise, repeats, **more):
@@ -98,16 +110,16 @@ def by_task(study, folder, labels, rows_of):
     ``rows_of(task, solutions, numbers)`` makes the rows. ``solutions`` and ``numbers`` have the
     solutions and the numbers of the solved runs whose label is in ``labels``, by run id.
     """
-    runs, movements = study.runs[study.runs.label.isin(labels)], study.movements()
+    runs = study.runs[study.runs.label.isin(labels) & (study.runs.status == "ok")]
     folder.mkdir(parents=True, exist_ok=True)
     for name, task in study.tasks.items():
         file = folder / f"{name.replace('/', '.')}.csv"
         if file.exists():
             continue
-        of_task = runs[(runs.task == name) & (runs.status == "ok")].set_index("run_id")
+        of_task = runs[runs.task == name].set_index("run_id")
         if of_task.empty:
             continue
-        solutions = {run_id: movements[run_id] for run_id in of_task.index}
+        solutions = solutions_of(study.folder, of_task.index)
         columns = [column for column in [*COLUMNS, "mean_ticks"] if column in of_task]
         rows = rows_of(task, solutions, of_task.run).join(of_task[columns], on="run_id")
         unfinished = file.with_suffix(".part")
@@ -194,13 +206,18 @@ def run_memory(folder, instances="i160..i179", repeats=REPEATS):
     )  # fmt: skip
 
 
-def main(folder="results/noise"):
-    """Make all runs and executions, one part after the other."""
+def main(folder="results/noise", *parts):
+    """Make the named parts, or all of them, one after the other."""
     folder = Path(folder)
-    study = shipped_families(folder)
-    execute_practised(study.worlds[""], folder / "practised")
-    execute_answers(study.worlds[WORLD], folder / "answers")
-    run_memory(folder / "memory")
+    parts = parts or ("practised", "answers", "memory")
+    if {"practised", "answers"} & {*parts}:
+        worlds = shipped_families(folder).worlds
+    if "practised" in parts:
+        execute_practised(worlds[""], folder / "practised")
+    if "answers" in parts:
+        execute_answers(worlds[WORLD], folder / "answers")
+    if "memory" in parts:
+        run_memory(folder / "memory")
 
 
 if __name__ == "__main__":

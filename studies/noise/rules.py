@@ -56,15 +56,15 @@ def judge(differences, resamples=RESAMPLES):
     """
     table = tests_of(differences, resamples)
     rows = {}
-    for name, values in differences.items():
+    for (name, values), test in zip(differences.items(), table.itertuples(), strict=True):
         by_family = {
             family: [*of_family.to_numpy()[:, None]]
             for family, of_family in values.groupby("family", sort=False)
         }
         estimates = [other_tasks({family: each}) for family, each in by_family.items()]
-        test = table.loc[name]
-        word = "ahead" if test["mean"] < 0 else "behind"
-        if any(each.low > 0 if test["mean"] < 0 else each.high < 0 for each in estimates):
+        is_ahead = test.mean < 0
+        word = "ahead" if is_ahead else "behind"
+        if any(each.low > 0 if is_ahead else each.high < 0 for each in estimates):
             word = DIFFERS
         rows[name] = other_tasks(by_family).columns("difference")
         rows[name] |= {"p": test.p, "p_without": test.p_without}

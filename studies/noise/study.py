@@ -85,16 +85,17 @@ def draw(results):
     places = range(len(order.CASES))
     for name in rows.sort_values("practised").index:
         gaps = rows.loc[name]
-        look = figures.look_of(methods[name])
+        look = figures.look_of(methods[name].partition(" ")[0])
         axes.errorbar(
             places, [gaps[case] for case in order.CASES],
             yerr=[[gaps[case] - gaps[f"{case}_low"] for case in order.CASES],
                   [gaps[f"{case}_high"] - gaps[case] for case in order.CASES]],
             color=look["color"], marker=look["marker"], markersize=4, linewidth=1, elinewidth=0.6,
+            linestyle="--" if " " in methods[name] else "-",
         )  # fmt: skip
     ends = _spread(rows.practised.sort_values(), 0.055)
     for name, height in ends.items():
-        color = figures.look_of(methods[name])["color"]
+        color = figures.look_of(methods[name].partition(" ")[0])["color"]
         axes.annotate(name, (places[-1], height), (8, 0), textcoords="offset points",
                       va="center", color=color)  # fmt: skip
     axes.set(yscale="log", ylabel="gap (%), log scale; lower is better", xlim=(-0.3, 4.4))
