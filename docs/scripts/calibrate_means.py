@@ -162,11 +162,9 @@ def samples_of_hands():
 def gaps_of_noise(noise):
     """Return the gaps that ship with study noise, by family and task, with a column a method."""
     rows = pd.read_csv(ROOT / "studies/noise/runs.csv.xz", low_memory=False)
-    rows = rows[(rows.question == "order") & rows.setting.isna() & ~rows.signal_dependent]
-    rows = rows[rows.task.str.contains("/") & rows.method.isin(METHODS)]
-    one_arm = rows.task.str.startswith("one-armed/")
-    other = rows.method.str.contains("EC4") & one_arm | rows.method.str.contains("EC1") & ~one_arm
-    rows = rows[~other].assign(gap=100 * (rows.ticks + rows.best_known) / -rows.best_known)
+    rows = rows[(rows.question == "practised") & (rows.target == "T") & rows.setting.isna()]
+    rows = rows[rows.method.isin(METHODS)]
+    rows = rows.assign(gap=100 * (rows.ticks + rows.best_known) / -rows.best_known)
     rows["name"], rows["family"] = rows.method.map(METHODS), rows.task.str.partition("/")[0]
     rows = rows[rows.motor_noise == noise]
     return rows.pivot_table("gap", ["family", "task"], "name", sort=False)

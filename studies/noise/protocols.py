@@ -21,6 +21,7 @@ import sqlite3
 import sys
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -36,6 +37,7 @@ from coartic.runs.record import movement_from
 HERE = Path(__file__).parent
 REPEATS = 100
 """Executions of a solution."""
+HEAVY_TAIL = "cma-es/bandit"
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 SHIPPED = HERE.parents[1] / "benchmarks" / "shipped"
 STAGES = (1, 2, 4, 10, 30, 100, 1_000)
@@ -104,8 +106,14 @@ def off_centre(task, solution):
     return float(np.median(aims)) / task.radius if aims else np.nan
 
 
+def random_tasks(study):
+    """Return the study's folder and runs, and its tasks of :data:`FAMILIES`."""
+    tasks = {key: task for key, task in study.tasks.items() if key.partition("/")[0] in FAMILIES}
+    return SimpleNamespace(folder=study.folder, runs=study.runs, tasks=tasks)
+
+
 def by_task(study, folder, labels, rows_of):
-    """Write a file of rows for each random task that has no file yet.
+    """Write a file of rows for each task that has no file yet.
 
     ``rows_of(task, solutions, numbers)`` makes the rows. ``solutions`` and ``numbers`` have the
     solutions and the numbers of the solved runs whose label is in ``labels``, by run id.
@@ -145,18 +153,23 @@ def execute_practised(study, folder, repeats=REPEATS):
             for kind, of_kind in (("T", solutions), ("P", hits)) for noise in (0.0, NOISE)
         ]).assign(off=lambda rows: rows.run_id.map(off))  # fmt: skip
 
-    tasks = {name for name in study.tasks if name.partition("/")[0] in FAMILIES}
-    runs = study.runs[study.runs.task.isin(tasks)]
-    by_task(study, folder, {*runs.label} & {*LABELS}, rows_of)
+    by_task(random_tasks(study), folder, LABELS, rows_of)
 
 
-def execute_answers(study, folder, repeats=REPEATS):
-    """Execute the next actions of runs that practised in noise, as the suite does."""
+def execute_answers(study, folder, repeats=REPEATS, more=4 * REPEATS):
+    """Execute the next actions of runs that practised in noise, as the suite does.
 
-    def rows_of(task, solutions, numbers):
-        return executions(task, solutions, numbers, NOISE, repeats)
+    Those of CMA-ES, whose ticks have a heavy tail, are executed ``more`` times.
+    """
+    tasks = random_tasks(study)
+    for part, labels, number in (
+        ("answers", {*LABELS} - {HEAVY_TAIL}, repeats), ("answers-of-cma-es", {HEAVY_TAIL}, more),
+    ):  # fmt: skip
 
-    by_task(study, folder, LABELS, rows_of)
+        def rows_of(task, solutions, numbers, number=number):
+            return executions(task, solutions, numbers, NOISE, number)
+
+        by_task(tasks, folder / part, labels, rows_of)
 
 
 def run_blocks(name, description, folder, text):
@@ -215,7 +228,7 @@ def main(folder="results/noise", *parts):
     if "practised" in parts:
         execute_practised(worlds[""], folder / "practised")
     if "answers" in parts:
-        execute_answers(worlds[WORLD], folder / "answers")
+        execute_answers(worlds[WORLD], folder)
     if "memory" in parts:
         run_memory(folder / "memory")
 

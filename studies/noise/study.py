@@ -13,6 +13,7 @@ from pathlib import Path
 import order
 import pandas as pd
 import why
+from rules import RESAMPLES
 
 import memory
 from coartic.analysis import figures, load
@@ -33,9 +34,8 @@ def executions_of(folder):
     memory are those that ship if the folder does not have it.
     """
     tables = []
-    for part, question in (
-        ("practised", "practised"), ("answers", "answers"), ("memory-executed", "memory"),
-    ):  # fmt: skip
+    parts = {"practised": "practised", "answers": "answers", "answers-of-cma-es": "answers"}
+    for part, question in (parts | {"memory-executed": "memory"}).items():
         if files := sorted((folder / part).glob("*.csv")):
             rows = pd.concat(map(pd.read_csv, files)).reindex(columns=_KEPT)
             tables.append(rows.assign(question=question))
@@ -60,15 +60,15 @@ def measure(folder):
     return {"runs": rows, "hands": hands, **tables_of(rows, hands)}
 
 
-def tables_of(rows, hands):
+def tables_of(rows, hands, resamples=RESAMPLES):
     """Return the tables by name, from the executions and the hands of the learner's runs."""
     rows = rows.reset_index()
     gaps = order.read(rows)
     values = memory.read_memory(rows[rows.question == "memory"], hands)
-    of_memory, verdicts = memory.tabulate_memory(values)
+    of_memory, verdicts = memory.tabulate_memory(values, resamples)
     return {
         "results": order.tabulate(gaps).set_index("group"),
-        "verdicts": order.tabulate_verdicts(gaps),
+        "verdicts": order.tabulate_verdicts(gaps, resamples),
         "families": order.tabulate_families(gaps).set_index("case"),
         "why": why.tabulate_why(gaps, rows),
         "memory": of_memory.set_index("group"),
@@ -93,7 +93,7 @@ def draw(results):
             color=look["color"], marker=look["marker"], markersize=4, linewidth=1, elinewidth=0.6,
             linestyle="--" if " " in methods[name] else "-",
         )  # fmt: skip
-    ends = _spread(rows.practised.sort_values(), 0.055)
+    ends = _spread(rows.practised.sort_values(), 0.045)
     for name, height in ends.items():
         color = figures.look_of(methods[name].partition(" ")[0])["color"]
         axes.annotate(name, (places[-1], height), (8, 0), textcoords="offset points",
@@ -101,7 +101,8 @@ def draw(results):
     axes.set(yscale="log", ylabel="gap (%), log scale; lower is better", xlim=(-0.3, 4.4))
     axes.set_xticks(places, ["found and made\nwithout noise", "the same in noise,\nas it aims",
                              "in noise,\nat its hits", "practised and\nmade in noise"])  # fmt: skip
-    axes.set_yticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
+    axes.set_ylim(4, 40)
+    axes.set_yticks([5, 10, 20, 40], ["5", "10", "20", "40"])
     axes.set_yticks([], minor=True)
     return figure
 
