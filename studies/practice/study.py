@@ -163,8 +163,19 @@ def tabulate(runs):
         gap, log = (wide[column][cell].dropna() for column in ("gap", "log_ticks"))
         table = summarise(gap, "gap").drop(columns="skewness")
         table["log_ticks"] = summarise(log, "log_ticks").log_ticks
+        table["runs"] = [
+            _runs_in(gap, *key) for key in zip(table.motor_noise, table.group, strict=True)
+        ]
         tables.append(table.assign(cell=cell))
     return _with_rows(pd.concat(tables), ["motor_noise", "group", "cell"])
+
+
+def _runs_in(values, noise, group):
+    """Return the number of runs of a world and a group, from values with a row for each run."""
+    here = values.xs(noise, level="motor_noise").reset_index()
+    is_random = here.task.str.contains("/")
+    chosen = {RANDOM: is_random, PAPER: ~is_random}
+    return int(chosen.get(group, here.group == group).sum())
 
 
 def tabulate_effects(runs):
