@@ -119,12 +119,17 @@ def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]])
 @styled
 def two_worlds(table: Table) -> Figure:
     """Draw the gaps of methods in two worlds: without motor noise, and with noise of 0.01."""
+    random = table("noise", "results").loc["all"].set_index("name")
     rankings = [table("comparison", "ranking", world) for world in ("", "motor_noise=0.01")]
     sides = {
         "gap, the paper's four tasks (%)": [
             [estimate(ranking.loc[method], "gap", 100) for method in TWO_WORLDS]
             for ranking in rankings
-        ]
+        ],
+        "gap, 200 random tasks (%)": [
+            [estimate(random.loc[name], case) for name in TWO_WORLDS.values()]
+            for case in ("exact", "practised")
+        ],
     }
     figure, places = panels((1, len(sides)), (style.TWO, 2.9))
     heights = -np.arange(len(TWO_WORLDS))
@@ -140,7 +145,8 @@ def two_worlds(table: Table) -> Figure:
         axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
         for height in range(1, len(TWO_WORLDS)):
             axes.axhline(0.5 - height, color=style.GREY, alpha=0.3, linewidth=0.5)
-        style.name_rows(axes, [*TWO_WORLDS.values()])
+        names = [*TWO_WORLDS.values()] if axes is places[0] else [""] * len(TWO_WORLDS)
+        style.name_rows(axes, names)
     style.legend(figure, places[0].get_legend_handles_labels()[0], 2)
     return figure
 
