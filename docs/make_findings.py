@@ -218,29 +218,39 @@ def shipped_gaps(method: str) -> dict[str, float]:
     return gaps | mean(100 * drawn.gap).columns("random")
 
 
-def in_worlds(claim: str) -> str:
-    """Return in words in how many worlds a claim of study ``worlds`` holds, and where it does not.
+MAX_LISTED = 6
+"""Largest number of cells of study ``worlds`` that a sentence lists."""
 
-    A claim about lean has the family *one-armed* alone.
+
+def in_worlds(claim: str) -> str:
+    """Return in words in which worlds and families a claim of study ``worlds`` holds.
+
+    A claim about lean has the family *one-armed* alone. Cells with a verdict are listed if they
+    are at most six, and otherwise counted.
     """
     judged = table("worlds", "results").dropna(subset="verdict")
     judged = judged[judged.claim == claim]
-    verdicts = judged.pivot(index="world", columns="group", values="verdict").fillna("not judged")
-    families = [family for family in FAMILIES if family in verdicts]
-    worlds = [name for name in WORLDS if name in verdicts.index]
-    held = int((verdicts == "holds").all(axis=1).sum())
-    tested = "all three families" if len(families) > 1 else f"*{families[0]}*"
-    sentences = [f"In {tested} it holds in {held} of {len(worlds)} worlds."]
-    for verdict in ("open", "reversed", "not judged"):
-        places = []
-        for name in worlds:
-            where = [family for family in families if verdicts[family][name] == verdict]
-            if where:
-                of_families = f" ({', '.join(where)})" if len(families) > 1 else ""
-                places.append(WORLDS[name].title + of_families)
-        if places:
-            sentences.append(f"{verdict.capitalize()}: {'; '.join(places)}.")
-    return " ".join(sentences)
+    has_families = judged.group.nunique() > 1
+    parts = []
+    for verdict, words in (("holds", "it holds"), ("reversed", "reversed"), ("open", "open")):
+        cells = judged[judged.verdict == verdict]
+        if cells.empty and verdict != "holds":
+            continue
+        where = {
+            world.title: [family for family in FAMILIES if family in {*cells.group[in_world]}]
+            for name, world in WORLDS.items()
+            if (in_world := cells.world == name).any()
+        }
+        names = [
+            f"{title} ({', '.join(families)})" if has_families else title
+            for title, families in where.items()
+        ]
+        counted = f" in {len(cells)}"
+        if verdict == "holds":
+            counted += f" of {len(judged)} {'cells' if has_families else 'worlds'}"
+        listed = f": {', '.join(names)}" if 0 < len(cells) <= MAX_LISTED else ""
+        parts.append(words + counted + listed)
+    return f"{'; '.join(parts)}."
 
 
 def filled_pages() -> dict[str, str]:
