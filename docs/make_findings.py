@@ -230,7 +230,7 @@ def in_worlds(claim: str) -> str:
     """
     judged = table("worlds", "results").dropna(subset="verdict")
     judged = judged[judged.claim == claim]
-    has_families = judged.group.nunique() > 1
+    has_families = set(judged.group) != {"one-armed"}
     parts = []
     for verdict, words in (("holds", "it holds"), ("reversed", "reversed"), ("open", "open")):
         cells = judged[judged.verdict == verdict]
