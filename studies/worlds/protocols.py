@@ -15,6 +15,7 @@ from pathlib import Path
 
 from settings import (
     CONTROL,
+    CONTROL_OF_PAIRS,
     CONTROL_SETS,
     FAMILIES,
     INSTANCES,
@@ -124,26 +125,24 @@ def run_world(world, folder, instances, stages):
     print(world.name, run_suite(file, folder / world.name, executor=Local(2)), flush=True)
 
 
-def run_control(folder, instances):
+def run_control(name, folder, instances):
     """Run random search in the paper's world with further seeds, in place of the learner."""
     world = WORLDS["paper"]
-    tasks, pairs = places_of(world, folder / "tasks" / CONTROL, instances)
-    text = head("Control", world)
-    for places, runs in (
-        ([place for name, place in tasks.items() if name not in PAPER], RUNS["families"]),
-        (pairs.values(), RUNS_OF_PAIRS),
-    ):
-        text += block(places, ["random-search"], runs * (1 + CONTROL_SETS))
-    file = folder / f"{CONTROL}.toml"
-    file.write_text(text, encoding="utf-8")
-    print(CONTROL, run_suite(file, folder / CONTROL, executor=Local(2)), flush=True)
+    tasks, pairs = places_of(world, folder / "tasks" / name, instances)
+    places, runs = pairs.values(), RUNS_OF_PAIRS * (1 + CONTROL_SETS)
+    if name == CONTROL:
+        places = [place for task, place in tasks.items() if task not in PAPER]
+        runs = RUNS["families"] + CONTROL_SETS
+    file = folder / f"{name}.toml"
+    file.write_text(head("Control", world) + block(places, ["random-search"], runs), "utf-8")
+    print(name, run_suite(file, folder / name, executor=Local(2)), flush=True)
 
 
 def main(folder="results/worlds", instances=INSTANCES, *names):
     """Run stage after stage, each in all worlds, and the control last."""
     folder = Path(folder).resolve()
     stages = [*names] if {*names} & {*STAGES} else [*STAGES]
-    wanted = {*names} - {*STAGES} or {*WORLDS, LONG.name, CONTROL}
+    wanted = {*names} - {*STAGES} or {*WORLDS, LONG.name, CONTROL, CONTROL_OF_PAIRS}
     for number, stage in enumerate(STAGES):
         if stage not in stages:
             continue
@@ -152,8 +151,9 @@ def main(folder="results/worlds", instances=INSTANCES, *names):
                 run_world(world, folder, instances, STAGES[: number + 1])
         if stage == "families" and LONG.name in wanted:
             run_world(LONG, folder, instances, ["one-run"])
-        if stage == "families" and CONTROL in wanted:
-            run_control(folder, instances)
+        for name in (CONTROL, CONTROL_OF_PAIRS):
+            if stage == "families" and name in wanted:
+                run_control(name, folder, instances)
 
 
 if __name__ == "__main__":

@@ -33,8 +33,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib.lines import Line2D
+from protocols import LEARNERS
 from scipy import stats
-from settings import CONTROL, CONTROL_SETS, FAMILIES, LONG, RUNS, RUNS_OF_PAIRS, WORLDS
+from settings import (
+    CONTROL,
+    CONTROL_OF_PAIRS,
+    CONTROL_SETS,
+    FAMILIES,
+    LONG,
+    RUNS,
+    RUNS_OF_PAIRS,
+    WORLDS,
+)
 
 from coartic.analysis import TwoContexts, figures, load, mean, means
 from coartic.analysis.statistics import holm
@@ -84,9 +94,24 @@ def of_world(world, study):
         }
     )  # fmt: skip
     is_pair = runs.task.str.endswith(("-goal", "-back")).to_numpy()
-    table["first"] = study.signature("first").to_numpy(np.float64)
+    compared = [
+        study.signature("first", *cell)
+        for cell in study.cells
+        if cell[1] in (*LEARNERS, RANDOM) and not cell[0].endswith(("-goal", "-back"))
+    ]
+    table["first"] = pd.concat(compared).reindex(runs.index).to_numpy(np.float64)
     table = table.set_index(runs.run_id.to_numpy()).rename_axis("run_id")
     return table[~is_pair], leans_of(world, study)
+
+
+def read(folder):
+    """Return the study of a folder without best known rewards.
+
+    The study has no gaps, and in noise each best known reward takes a thousand executions.
+    """
+    study = load(folder)
+    vars(study)["optima"] = {}
+    return study
 
 
 def leans_of(world, study):
@@ -258,14 +283,13 @@ def of_paper(claim, world, task, runs, leans):
     )  # fmt: skip
 
 
-def control_values(study, runs, leans):
+def control_values(study, runs):
     """Return the values of each set of control runs: those of random search in the learner's place.
 
-    Columns: ``set``, ``claim``, ``group``, ``task``, ``value``. Set 0 are the runs with which the
-    study compares the learner.
+    Columns: ``set``, ``claim``, ``group``, ``task``, ``value``.
     """
     controls, _ = of_world("paper", study)
-    controls = controls.assign(set=controls.run // RUNS["families"], method=LEARNER)
+    controls = controls.assign(set=controls.run - RUNS["families"] + 1, method=LEARNER)
     rivals = runs[(runs.world == "paper") & (runs.method == RANDOM) & runs.group.isin(FAMILIES)]
     parts = []
     for number, of_set in controls[controls.set > 0].groupby("set"):
@@ -273,9 +297,13 @@ def control_values(study, runs, leans):
         for claim in ("learner-gains", "first-movement-slower"):
             found = values_of(both, claim).reset_index()
             parts.append(found.assign(set=number, claim=claim))
+    return pd.concat(parts)[["set", "claim", "group", "task", "value"]]
+
+
+def control_values_of_pairs(study, leans):
+    """Return the same for the claim that the learner leans more, by pair."""
     theirs = leans[(leans.world == "paper") & (leans.part == "all") & (leans.method == RANDOM)]
-    theirs = theirs.set_index("pair").lean
-    rows = []
+    theirs, rows = theirs.set_index("pair").lean, []
     for pair in [name for name in theirs.index if name != SHARED[0]]:
         both = [study.executed(f"{pair}-{kind}", RANDOM) for kind in ("goal", "back")]
         for number in range(1, CONTROL_SETS + 1):
@@ -283,8 +311,7 @@ def control_values(study, runs, leans):
             value = lean_of(*of_set, "all").value - theirs[pair]
             rows.append({"set": number, "claim": "learner-leans", "group": "one-armed",
                          "task": pair, "value": value})  # fmt: skip
-    table = pd.concat([*parts, pd.DataFrame(rows)])
-    return table[["set", "claim", "group", "task", "value"]].reset_index(drop=True)
+    return pd.DataFrame(rows)
 
 
 def some(solutions, number, study):
@@ -367,16 +394,21 @@ def describe_long(runs):
 
 def measure(folder):
     """Return the tables of a results folder by name; each becomes a CSV file."""
-    found = [of_world(name, load(folder / name)) for name in (*WORLDS, LONG.name)
+    found = [of_world(name, read(folder / name)) for name in (*WORLDS, LONG.name)
              if (folder / name).is_dir()]  # fmt: skip
     runs, leans = (pd.concat(parts) for parts in zip(*found, strict=True))
     tables = {"results": tabulate(runs, leans), "runs": runs,
               "leans": leans.set_index(["world", "pair", "part", "method"])}  # fmt: skip
     if (runs.world == LONG.name).any():
         tables["long"] = describe_long(runs)
+    values = []
     if (folder / CONTROL).is_dir():
-        values = control_values(load(folder / CONTROL), runs, leans)
-        tables |= {"control": judge_control(values), "control_values": values.set_index("set")}
+        values.append(control_values(read(folder / CONTROL), runs))
+    if (folder / CONTROL_OF_PAIRS).is_dir():
+        values.append(control_values_of_pairs(read(folder / CONTROL_OF_PAIRS), leans))
+    if values:
+        tables["control_values"] = pd.concat(values).set_index("set")
+        tables["control"] = judge_control(pd.concat(values))
     return tables
 
 
