@@ -29,6 +29,7 @@ from coartic.runs.shipped import PACKED, SHIPPED, SHIPPED_FOLDER, shipped_hashes
 from coartic.runs.store import RUNS_FILE
 from common.judging import Verdict
 from common.writing import fill_page, stored_picture
+from worlds.settings import FAMILIES, WORLDS
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
@@ -217,12 +218,39 @@ def shipped_gaps(method: str) -> dict[str, float]:
     return gaps | mean(100 * drawn.gap).columns("random")
 
 
-def parts_of_posture_difference() -> dict[str, float]:
-    """Return by how much the learner's mean postures at goal 1 of ascending and descending differ:
-    ``base`` (length units) and ``joints`` (rad), with the number of ``runs`` of each task."""
-    learner = row("comparison", "contexts", "ascending descending dual-process/EC1 goal 1 right")
-    parts = {part: learner[f"distance_{part}"] for part in ("base", "joints")}
-    return parts | {"runs": learner["runs"] // 2}
+MAX_LISTED = 6
+"""Largest number of cells of study ``worlds`` that a sentence lists."""
+
+
+def in_worlds(claim: str) -> str:
+    """Return in words in which worlds and families a claim of study ``worlds`` holds.
+
+    A claim about lean has the family *one-armed* alone. Cells with a verdict are listed if they
+    are at most six, and otherwise counted.
+    """
+    judged = table("worlds", "results").dropna(subset="verdict")
+    judged = judged[judged.claim == claim]
+    has_families = set(judged.group) != {"one-armed"}
+    parts = []
+    for verdict, words in (("holds", "it holds"), ("reversed", "reversed"), ("open", "open")):
+        cells = judged[judged.verdict == verdict]
+        if cells.empty and verdict != "holds":
+            continue
+        where = {
+            world.title: [family for family in FAMILIES if family in {*cells.group[in_world]}]
+            for name, world in WORLDS.items()
+            if (in_world := cells.world == name).any()
+        }
+        names = [
+            f"{title} ({', '.join(families)})" if has_families else title
+            for title, families in where.items()
+        ]
+        counted = f" in {len(cells)}"
+        if verdict == "holds":
+            counted += f" of {len(judged)} {'cells' if has_families else 'worlds'}"
+        listed = f": {', '.join(names)}" if 0 < len(cells) <= MAX_LISTED else ""
+        parts.append(words + counted + listed)
+    return f"{'; '.join(parts)}."
 
 
 def filled_pages() -> dict[str, str]:
@@ -240,7 +268,7 @@ def filled_pages() -> dict[str, str]:
         "p_of_shares": p_of_shares,
         "gain_of_best_hands": gain_of_best_hands,
         "early_less_late": early_less_late,
-        "parts_of_posture_difference": parts_of_posture_difference,
+        "in_worlds": in_worlds,
         "foreign_gaps": foreign_gaps,
         "shipped_gaps": shipped_gaps,
         "published": published["general"],

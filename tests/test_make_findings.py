@@ -96,6 +96,27 @@ def test_stored_gaps_of_families_are_to_the_best_known_rewards_that_ship():
     np.testing.assert_allclose(stored.gap, (stored.reward - best) / best, rtol=1e-4, atol=1e-5)
 
 
+def test_where_a_claim_does_not_hold_in_other_worlds_is_said_in_words(monkeypatch):
+    """By family, but for claims about one family; tasks of the paper have no verdict."""
+    rows = [
+        ("ahead", world, family, "holds")
+        for world in ("paper", "maximum", "base-4")
+        for family in ("one-armed", "two-armed", "aligned")
+    ]
+    rows += [("ahead", "paper", "ascending", None), ("leans", "paper", "one-armed", "open")]
+    judged = pd.DataFrame(rows, columns=["claim", "world", "group", "verdict"])
+    judged.loc[4:6, "verdict"] = ["open", "open", "reversed"]
+    monkeypatch.setattr(make_findings, "table", lambda *_: judged)
+    assert make_findings.in_worlds("ahead") == (
+        "it holds in 6 of 9 cells: the paper's (one-armed, two-armed, aligned), maximum norm "
+        "(one-armed), base weight 4 (two-armed, aligned); reversed in 1: base weight 4 "
+        "(one-armed); open in 2: maximum norm (two-armed, aligned)."
+    )
+    assert make_findings.in_worlds("leans") == (
+        "it holds in 0 of 1 worlds; open in 1: the paper's."
+    )
+
+
 def test_a_sentence_that_no_longer_holds_is_refused(tmp_path):
     template = tmp_path / "page.md.jinja"
     template.write_text('{{ expect(gap < 1, "CMA-ES is nearer") }}It is nearer.')
