@@ -10,7 +10,7 @@ FULL   ?=
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 SUITES := comparison $(if $(FULL),ablations)
-STORED := comparison ablations families
+SHIPPED := comparison families
 STUDIES ?= $(filter-out common replication,$(notdir $(wildcard studies/[a-z]*)))
 # Studies, and the pages made from them, import the package studies/common.
 STUDY  := PYTHONPATH=studies $(BIN)/python
@@ -67,13 +67,13 @@ shipped: $(READY)
 	$(BIN)/python docs/scripts/pack_shipped.py $(if $(CHANGED),--changed) \
 	  $(OUT)/shipped/comparison $(OUT)/shipped/families
 
-# The suites behind docs/findings.md, their reports, and the pages made from them.
+# The suites behind docs/findings.md, and the pages made from them. Shipped runs are not made again.
 findings: $(READY)
-	@for suite in $(STORED); do \
-	  $(BIN)/coartic run $$suite --out $(OUT)/$$suite && \
-	  $(BIN)/coartic report $(OUT)/$$suite --for-paper --width 3.5 || exit; \
+	@for suite in $(SHIPPED); do \
+	  $(BIN)/coartic run $$suite --include shipped --out $(OUT)/$$suite || exit; \
 	done
-	$(STUDY) studies/replication/study.py $(STORED:%=$(OUT)/%)
+	$(BIN)/coartic run ablations --out $(OUT)/ablations
+	$(STUDY) studies/replication/study.py $(SHIPPED:%=$(OUT)/%) $(OUT)/ablations
 	$(STUDY) docs/make_findings.py --from $(OUT)
 
 # Every study, or those of make studies STUDIES="horizon dose": its suite, with its own families,

@@ -11,13 +11,15 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from coartic.analysis.figures import dots, look_of, styled
+from coartic.analysis import mean
+from coartic.analysis.figures import dots, look_of, panels, style, styled
 
-Table = Callable[[str, str], pd.DataFrame]
-"""Function that returns a stored table of a suite or a study by their names."""
+Table = Callable[..., pd.DataFrame]
+"""Function that returns a stored table of a suite or a study by their names, and by its world."""
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 BLUE = look_of("dual-process/EC4")["color"]
 LEARNER, RANDOM = "dual-process (EC1, EC4)", "random-search"
@@ -28,6 +30,23 @@ METHODS = {
     RANDOM: ("random search", RANDOM),
 }
 """Name of the methods of finding 4, and the method that has their look."""
+INFORMED = "dual-process (EC1-informed, EC4-informed)"
+NOISE = "motor_noise=0.01"
+"""The world of the second ranking, in the names of stored tables."""
+FORMULA, REWARDS = style.GREEN, style.BLUE
+"""Colours of what a method knows: the reward as a formula, or the reward of each trial."""
+RANKED = {
+    "trajectory-optimisation/path-length": ("shortest-path plan", FORMULA),
+    "posture-qp/goals-ahead": ("posture QP, goals ahead", FORMULA),
+    "policy-gradient": ("policy gradient", REWARDS),
+    "cma-es/bandit": ("CMA-ES", REWARDS),
+    INFORMED: ("informed learner", REWARDS),
+    "hill-climbing spread=learned": ("hill climbing, learned spread", REWARDS),
+    "hill-climbing": ("hill climbing", REWARDS),
+    LEARNER: ("the paper's learner", REWARDS),
+    RANDOM: ("random search", REWARDS),
+}
+"""Name and colour of the methods that are shown in two worlds."""
 NOTHING = (math.nan, math.nan, math.nan)
 _NUMBER = r"(−?\d+(?:\.\d+)?)"
 
@@ -109,14 +128,67 @@ def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]])
 def gaps(table: Table) -> Figure:
     """Draw finding 4: gaps on the paper's tasks and in each family of random tasks."""
     ranking, families = table("comparison", "ranking"), table("families", "family-gaps")
-    panels = {"paper's tasks\ngap (%)": [estimate(ranking.loc[m], "gap", 100) for m in METHODS]}
-    for family in (*FAMILIES, "many-goals"):
-        column = f"in {family}/v1"
-        label = f"{'14 goals' if family == 'many-goals' else family}\ngap (%)"
-        panels[label] = [estimate(families.loc[m], column, 100) for m in METHODS]
-    looks = [look_of(method) for _, method in METHODS.values()]
-    names = [name for name, _ in METHODS.values()]
-    return draw(names, panels, [(look["color"], look["marker"]) for look in looks])
+    names = ["the paper's four tasks", *FAMILIES, "fourteen goals"]
+    columns = [f"in {family}/v1" for family in (*FAMILIES, "many-goals")]
+    figure, (axes,) = panels((1, 1), (style.TWO, 3.2))
+    for place, (method, (name, of_method)) in enumerate(METHODS.items()):
+        row = families.loc[method]
+        estimates = [estimate(ranking.loc[method], "gap", 100)]
+        estimates += [estimate(row, column, 100) for column in columns]
+        values, lows, highs = zip(*estimates, strict=True)
+        look: dict[str, Any] = {"color": look_of(of_method)["color"], "marker": "^osD"[place]}
+        heights = -np.arange(len(names)) + 0.15 * (1.5 - place)
+        axes.hlines(heights, lows, highs, linewidth=1.5, alpha=0.6, color=look["color"])
+        axes.plot(values, heights, label=name, linestyle="", markersize=4.5, **look)
+    axes.set_xscale("log")
+    axes.set_xticks(ticks := [1, 2, 5, 10, 20, 50, 100], [str(tick) for tick in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel("gap (%), logarithmic axis")
+    axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
+    for height in range(1, len(names)):
+        axes.axhline(0.5 - height, color=style.GREY, alpha=0.3, linewidth=0.5)
+    style.name_rows(axes, names)
+    style.legend(figure, axes.get_legend_handles_labels()[0], len(METHODS))
+    return figure
+
+
+def over_random_tasks(tasks: pd.DataFrame) -> pd.DataFrame:
+    """Return the mean gap of each method over the random tasks with up to eight goals."""
+    drawn = tasks[~tasks.index.str.startswith("many-goals/")]
+    labels = drawn.method.replace(
+        {r"^dual-process/EC[14]$": LEARNER, r"^dual-process/.*-informed$": INFORMED}, regex=True
+    )
+    means = {label: mean(gaps).columns("gap") for label, gaps in drawn.gap.groupby(labels)}
+    return pd.DataFrame.from_dict(means, orient="index")
+
+
+@styled
+def two_worlds(table: Table) -> Figure:
+    """Draw the gap of each method without noise and with it, each practised and judged there."""
+    worlds = {
+        "the paper's four tasks": [table("comparison", "ranking", world) for world in ("", NOISE)],
+        "200 random tasks": [
+            over_random_tasks(table("families", "by-task", world)) for world in ("", NOISE)
+        ],
+    }
+    figure, both = panels((1, 2), (style.TWO, 3.4))
+    labels = {"without noise": {}, "with motor noise 0.01": {"markerfacecolor": "white"}}
+    for axes, (title, tables) in zip(both, worlds.items(), strict=True):
+        for (label, more), gaps_of, shift in zip(
+            labels.items(), tables, (0.14, -0.14), strict=True
+        ):
+            for place, (method, (_, color)) in enumerate(RANKED.items()):
+                if method not in gaps_of.index:
+                    continue
+                value, low, high = estimate(gaps_of.loc[method], "gap", 100)
+                axes.hlines(shift - place, low, high, color=color, linewidth=1.2)
+                axes.plot(value, shift - place, marker="o", color=color, markersize=4.5, **more)
+            axes.plot([], [], marker="o", linestyle="", color=style.GREY, label=label, **more)
+        axes.set(title=title, xlabel="gap (%)", xlim=(0, None))
+        axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
+        style.name_rows(axes, [name if axes is both[0] else "" for name, _ in RANKED.values()])
+    style.legend(figure, both[0].get_legend_handles_labels()[0], 2)
+    return figure
 
 
 @styled
@@ -179,6 +251,7 @@ def goals_ahead(table: Table) -> Figure:
 
 
 FIGURES: dict[str, Any] = {
+    "two-worlds": two_worlds,
     "first-movement": first_movement,
     "early-gain": early_gain,
     "gaps": gaps,

@@ -1,56 +1,74 @@
 """Write the pages whose numbers come from stored results: ``python docs/make_findings.py``.
 
-``docs/stored`` has tables and figures of reports, with a folder for each suite. ``studies`` has
-those of studies. The templates ``*.md.jinja`` in this folder are filled in from them. ``make
-findings`` runs the suites and their reports, copies the tables with ``--from results``, and fills
-in the pages.
+``docs/stored`` has tables and figures of suites, with a folder for each suite. ``studies`` has
+those of studies. The templates ``*.md.jinja`` in this folder are filled in from them. With ``--from
+results`` the tables and figures that the pages ask for are first made again from the results
+folders below ``results``, and with ``--from shipped`` from the shipped results.
 """
 
 from __future__ import annotations
 
 import argparse
+import lzma
 import re
 import shutil
+import tempfile
 import tomllib
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any, get_args
-from unittest.mock import patch
 
 import finding_figures
 import pandas as pd
 from scipy import stats
 
-from coartic.analysis import Study, by_task, load, mean
-from coartic.analysis.figures import picture, style
+from coartic.analysis import FIGURES, TABLES, Study, by_task, load, mean
 from coartic.analysis.statistics import task_mean
+from coartic.runs.shipped import PACKED, SHIPPED, SHIPPED_FOLDER, shipped_hashes
+from coartic.runs.store import RUNS_FILE
 from common.judging import Verdict
-from common.writing import fill_page
+from common.writing import fill_page, stored_picture
+from worlds.settings import FAMILIES, WORLDS
 
 DOCS = Path(__file__).parent
 STUDIES = DOCS.parent / "studies"
 STORED = DOCS / "stored"
-NEW = dict[str, Path]()
-"""Results folders that the command line names, by suite: what the pages ask for is stored anew."""
+NEW = dict[str, Study]()
+"""Results that the command line names, by suite: what the pages ask for is made again of them."""
+WIDTH = 3.5
+"""Width of the figures of suites, in inches."""
+
+
+def unpack_shipped(folder: Path) -> Path:
+    """Unpack the shipped results into a folder for each suite below ``folder``, and return it."""
+    for suite in shipped_hashes():
+        (folder / suite).mkdir()
+        packed = SHIPPED_FOLDER / f"{suite}{PACKED}"
+        (folder / suite / RUNS_FILE).write_bytes(lzma.decompress(packed.read_bytes()))
+    return folder
+
+
+def make_table(study: Study, name: str) -> pd.DataFrame:
+    """Return a table of a study of one world, as it is stored: without ids of runs.
+
+    Table ``by-task`` is no table of the report: pages compute means over tasks from it.
+    """
+    if name == "by-task":
+        return by_task(study.runs).set_index("task")
+    return TABLES[name](study).drop(columns="run_ids")
 
 
 @cache
 def table(suite: str, name: str, world: str = "") -> pd.DataFrame:
     """Return a stored table of a suite or a study in one world, with its rows by name.
 
-    If the suite is in :data:`NEW`, the table is first copied from its report, without run ids.
+    If the suite is in :data:`NEW`, the table is first made again.
     """
     folder = STUDIES / suite if (STUDIES / suite).is_dir() else STORED / suite
     path = folder / f"{f'{name}-in-{world}' if world else name}.csv"
     if suite in NEW:
-        if name == "by-task":  # no table of the report: pages compute means over tasks from it
-            frame = by_task(load(NEW[suite]).worlds[""].runs).set_index("task")
-        else:
-            frame = pd.read_csv(NEW[suite] / "report" / "tables" / f"{name}.csv", index_col="row")
-            if "world" in frame:
-                frame = frame[frame.pop("world").fillna("") == world]
-        frame = frame.drop(columns="run_ids", errors="ignore")
+        frame = make_table(NEW[suite].worlds[world], name)
         frame.to_csv(path, float_format="%.6g", lineterminator="\n")
     return pd.read_csv(path, index_col=0)
 
@@ -200,12 +218,39 @@ def shipped_gaps(method: str) -> dict[str, float]:
     return gaps | mean(100 * drawn.gap).columns("random")
 
 
-def parts_of_posture_difference() -> dict[str, float]:
-    """Return by how much the learner's mean postures at goal 1 of ascending and descending differ:
-    ``base`` (length units) and ``joints`` (rad), with the number of ``runs`` of each task."""
-    learner = row("comparison", "contexts", "ascending descending dual-process/EC1 goal 1 right")
-    parts = {part: learner[f"distance_{part}"] for part in ("base", "joints")}
-    return parts | {"runs": learner["runs"] // 2}
+MAX_LISTED = 6
+"""Largest number of cells of study ``worlds`` that a sentence lists."""
+
+
+def in_worlds(claim: str) -> str:
+    """Return in words in which worlds and families a claim of study ``worlds`` holds.
+
+    A claim about lean has the family *one-armed* alone. Cells with a verdict are listed if they
+    are at most six, and otherwise counted.
+    """
+    judged = table("worlds", "results").dropna(subset="verdict")
+    judged = judged[judged.claim == claim]
+    has_families = set(judged.group) != {"one-armed"}
+    parts = []
+    for verdict, words in (("holds", "it holds"), ("reversed", "reversed"), ("open", "open")):
+        cells = judged[judged.verdict == verdict]
+        if cells.empty and verdict != "holds":
+            continue
+        where = {
+            world.title: [family for family in FAMILIES if family in {*cells.group[in_world]}]
+            for name, world in WORLDS.items()
+            if (in_world := cells.world == name).any()
+        }
+        names = [
+            f"{title} ({', '.join(families)})" if has_families else title
+            for title, families in where.items()
+        ]
+        counted = f" in {len(cells)}"
+        if verdict == "holds":
+            counted += f" of {len(judged)} {'cells' if has_families else 'worlds'}"
+        listed = f": {', '.join(names)}" if 0 < len(cells) <= MAX_LISTED else ""
+        parts.append(words + counted + listed)
+    return f"{'; '.join(parts)}."
 
 
 def filled_pages() -> dict[str, str]:
@@ -223,7 +268,7 @@ def filled_pages() -> dict[str, str]:
         "p_of_shares": p_of_shares,
         "gain_of_best_hands": gain_of_best_hands,
         "early_less_late": early_less_late,
-        "parts_of_posture_difference": parts_of_posture_difference,
+        "in_worlds": in_worlds,
         "foreign_gaps": foreign_gaps,
         "shipped_gaps": shipped_gaps,
         "published": published["general"],
@@ -237,54 +282,59 @@ def filled_pages() -> dict[str, str]:
 
 
 def figures() -> dict[str, bytes]:
-    """Return every figure of the findings as SVG, by its path below ``docs``.
-
-    They have the font that Matplotlib brings along, so that they are the same on every machine.
-    """
-    with patch.dict(style.RC, {"font.sans-serif": ["DejaVu Sans"]}):
-        drawings = {
-            name: draw(table, *[early_less_late] * (name == "early-gain"))
-            for name, draw in finding_figures.FIGURES.items()
-        }
-        return {
-            f"stored/findings/{name}.svg": picture(made, ".svg") for name, made in drawings.items()
-        }
+    """Return every figure of the findings as SVG, by its path below ``docs``."""
+    return {
+        f"stored/findings/{name}.svg": stored_picture(
+            draw, table, *[early_less_late] * (name == "early-gain")
+        )
+        for name, draw in finding_figures.FIGURES.items()
+    }
 
 
-def forget_stored(results: Path) -> None:
-    """Remove the tables and figures of suites that have a report below ``results``.
+def draw_figure(study: Study, name: str) -> bytes:
+    """Return a figure of a study of one world as SVG, as it is stored."""
+    return stored_picture(lambda: FIGURES[name](study, width=WIDTH).figure)
+
+
+def forget_stored(results: dict[str, Study]) -> None:
+    """Remove the stored tables and figures of suites whose results are given.
 
     Pages then store those that they ask for (:data:`NEW`). The runs of suite ``foreign`` are
     stored at once.
     """
     for suite, name in (("foreign", "runs"), ("tuning", "tuning")):
-        if (results / suite).is_dir():
-            rows = foreign_rows(load(results / suite)).dropna(axis="columns", how="all")
+        if suite in results:
+            rows = foreign_rows(results[suite]).dropna(axis="columns", how="all")
             file = STORED / "foreign" / f"{name}.csv"
             rows.to_csv(file, float_format="%.6g", lineterminator="\n")
-    for kept in STORED.iterdir():
-        if (results / kept.name / "report").is_dir():
-            NEW[kept.name] = results / kept.name
-            shutil.rmtree(kept)
-            kept.mkdir()
+    for suite in {kept.name for kept in STORED.iterdir()} & {*results} - {"foreign", "tuning"}:
+        NEW[suite] = results[suite]
+        shutil.rmtree(STORED / suite)
+        (STORED / suite).mkdir()
 
 
 def store_figures(pages: Iterable[str]) -> None:
-    """Copy the figures that pages (texts) show from the reports of :data:`NEW`."""
-    for suite, name in re.findall(r"\bstored/([\w-]+)/([\w-]+\.svg)\)", "\n".join(pages)):
+    """Draw the figures of the suites in :data:`NEW` that pages (texts) show."""
+    for suite, name in {*re.findall(r"\bstored/([\w-]+)/([\w-]+)\.svg\)", "\n".join(pages))}:
         if suite in NEW:
-            shutil.copy(NEW[suite] / "report" / "figures" / name, STORED / suite)
+            drawn = draw_figure(NEW[suite].worlds[""], name)
+            (STORED / suite / f"{name}.svg").write_bytes(drawn)
 
 
 def main() -> None:
     """Store new results if the command line names them, then write the pages."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--from", dest="results", type=Path, help="Folder of the suites' results.")
+    parser.add_argument(
+        "--from", dest="results", type=Path, help="Folder of the suites' results, or 'shipped'."
+    )
     results = parser.parse_args().results
-    if results is not None:
-        forget_stored(results)
-    pages = filled_pages()
-    store_figures([*pages.values(), (DOCS.parent / "README.md").read_text("utf-8")])
+    with tempfile.TemporaryDirectory() as unpacked:
+        if results is not None:
+            below = unpack_shipped(Path(unpacked)) if str(results) == SHIPPED else results
+            found = sorted(below.glob(f"*/{RUNS_FILE}"))
+            forget_stored({path.parent.name: load(path.parent) for path in found})
+        pages = filled_pages()
+        store_figures([*pages.values(), (DOCS.parent / "README.md").read_text("utf-8")])
     for name, text in pages.items():
         (DOCS / name).write_text(text, encoding="utf-8")
     (STORED / "findings").mkdir(exist_ok=True)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from coartic import CoarticError, load_task
 from coartic.analysis import FIGURES
+from coartic.analysis.figures.drawings import picture_of_tasks
 from coartic.analysis.figures.plot import FORMATS, Plot, for_page, picture
 from coartic.analysis.methods import KNOWN_METHODS, title_of
 from coartic.analysis.optima import BestKnown
@@ -44,6 +45,28 @@ def test_robots_and_goals_are_drawn_where_they_are():
     for line, hand in zip(axes.lines, ("left", "right"), strict=True):
         due = task.robot.joint_positions(task.q0 + 1.0, hand)
         np.testing.assert_array_equal(line.get_xydata(), due)
+
+
+def test_goals_of_a_picture_of_tasks_are_numbered_discs_that_do_not_overlap():
+    """A disc is moved only if another one is close to it: goals 1 and 3 of two-armed task 1."""
+    tasks = [load_task("descending"), load_task("two-armed-1")]
+    panels = picture_of_tasks(tasks).axes
+    for task, axes in zip(tasks, panels, strict=True):
+        places = {
+            int(text.get_text()): text.get_position() for text in axes.texts if text.get_text()
+        }
+        assert [*places] == [*range(1, 1 + len(task.goals))]
+        discs = np.array([*places.values()])
+        moved = {k for k, goal in enumerate(task.goals, 1) if not np.allclose(places[k], goal)}
+        assert moved == (set() if task.name == "descending" else {1, 3})
+        (line,) = (
+            line for line in axes.lines if line.get_marker() == "o" and line.get_zorder() == 4
+        )
+        np.testing.assert_array_equal(line.get_xydata(), discs)
+        to_points = 72 / axes.figure.dpi
+        pixels = axes.transData.transform(discs)
+        gaps = np.linalg.norm(pixels[:, None] - pixels, axis=2)[np.triu_indices(len(discs), 1)]
+        assert to_points * gaps.min() > line.get_markersize()
 
 
 def contrast(color):

@@ -1,16 +1,24 @@
 """The pages of the site whose numbers come from stored results."""
 
 import re
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from coartic.analysis import load
+from coartic.runs.shipped import shipped_hashes
 from coartic.tasks.optima import BEST_KNOWN
 from common.writing import fill_page
+from tests.support.made_up import row, study_of
+from tests.support.pictures import draw_the_same
 from tests.support.processes import ROOT, program
 
 DOCS = ROOT / "docs"
+STORED = DOCS / "stored"
+SOURCES = tomllib.loads((STORED / "SOURCES.toml").read_text("utf-8"))["tables"]
 make_findings = program(DOCS / "make_findings.py")
 
 
@@ -25,26 +33,60 @@ def test_figures_are_drawn_from_the_stored_tables_and_each_is_on_the_page():
     page = (DOCS / "findings.md").read_text(encoding="utf-8")
     for path, drawing in make_findings.figures().items():
         todo = f"{path}: make it anew by PYTHONPATH=studies python docs/make_findings.py"
-        assert drawing == (DOCS / path).read_bytes(), todo
+        assert draw_the_same(drawing, (DOCS / path).read_bytes()), todo
         assert path in page
 
 
-def test_what_pages_ask_for_is_stored_from_the_reports_that_are_named(tmp_path, monkeypatch):
-    """And nothing else; suites without a report keep what they have."""
-    stored, results = tmp_path / "stored", tmp_path / "results"
+def test_what_pages_ask_for_is_stored_from_the_results_that_are_given(tmp_path, monkeypatch):
+    """And nothing else; suites without new results keep what they have."""
+    stored = tmp_path / "stored"
     monkeypatch.setattr(make_findings, "STORED", stored)
     monkeypatch.setattr(make_findings, "NEW", {})
-    for place in (stored / "old", stored / "planted", results / "planted" / "report" / "tables"):
-        place.mkdir(parents=True)
-        (place / "gaps.csv").write_text("row,gap,run_ids\na,0.12345678,x y\n")
-    (results / "planted" / "report" / "figures").mkdir()
-    (results / "planted" / "report" / "figures" / "gaps.svg").write_text("new")
-    (stored / "planted" / "unused.csv").write_text("")
-    make_findings.forget_stored(results)
-    assert make_findings.table("planted", "gaps").to_dict() == {"gap": {"a": 0.123457}}
-    assert "run_ids" in make_findings.table("old", "gaps")
-    make_findings.store_figures(["![Gaps](stored/planted/gaps.svg) ![Old](stored/old/gaps.svg)"])
-    assert {path.name for path in (stored / "planted").iterdir()} == {"gaps.csv", "gaps.svg"}
+    for suite in ("old", "planted"):
+        (stored / suite).mkdir(parents=True)
+        (stored / suite / "ranking.csv").write_text("row,gap,run_ids\na,0.12345678,x y\n")
+        (stored / suite / "unused.csv").write_text("")
+    rows = [row("random-search", -480 - run, run=run) for run in range(3)]
+    make_findings.forget_stored({"planted": study_of(rows), "another": study_of(rows)})
+    assert make_findings.table("planted", "ranking").index.tolist() == ["random-search"]
+    assert "run_ids" not in make_findings.table("planted", "ranking")
+    assert "run_ids" in make_findings.table("old", "ranking")
+    make_findings.store_figures(["![Gaps](stored/planted/ranking.svg) ![](stored/old/gaps.svg)"])
+    made = {path.name for path in (stored / "planted").iterdir()}
+    assert made == {"ranking.csv", "ranking.svg"}
+    assert {path.name for path in stored.iterdir()} == {"old", "planted"}
+
+
+def test_what_is_stored_is_what_the_shipped_runs_make(tmp_path):
+    """Each table and figure of a suite whose runs ship, with the code of today.
+
+    Tables have six digits. Ends of intervals and p-values may differ by a tie between resamples.
+    """
+    unpacked = make_findings.unpack_shipped(tmp_path)
+    todo = "make it again: PYTHONPATH=studies python docs/make_findings.py --from shipped"
+    for suite in shipped_hashes():
+        study = load(unpacked / suite)
+        tables = [
+            file for table in SOURCES if table.get("source") == suite for file in table["files"]
+        ]
+        assert {ROOT / file for file in tables} == {*(STORED / suite).glob("*.csv")}
+        for file in tables:
+            name, _, world = Path(file).stem.partition("-in-")
+            made = make_findings.make_table(study.worlds[world], name)
+            made.to_csv(tmp_path / "made.csv", float_format="%.6g")
+            made, stored = (
+                pd.read_csv(path, index_col=0) for path in (tmp_path / "made.csv", ROOT / file)
+            )
+            assert [*made] == [*stored], f"{file}: {todo}"
+            tied = made.columns.str.contains(r"_low$|_high$|\bp\b|^p_|_p$|_p_")
+            for columns, rtol in ((~tied, 1e-5), (tied, 0.02)):
+                pd.testing.assert_frame_equal(
+                    made.loc[:, columns], stored.loc[:, columns], rtol=rtol, atol=1e-9,
+                    obj=f"{file} ({todo})",
+                )  # fmt: skip
+        for figure in (STORED / suite).glob("*.svg"):
+            drawn = make_findings.draw_figure(study.worlds[""], figure.stem)
+            assert draw_the_same(drawn, figure.read_bytes()), f"{figure}: {todo}"
 
 
 def test_stored_gaps_of_families_are_to_the_best_known_rewards_that_ship():
@@ -52,6 +94,27 @@ def test_stored_gaps_of_families_are_to_the_best_known_rewards_that_ship():
     stored = pd.read_csv(DOCS / "stored" / "families" / "by-task.csv")
     best = stored.task.map(pd.read_csv(BEST_KNOWN, index_col="instance").reward)
     np.testing.assert_allclose(stored.gap, (stored.reward - best) / best, rtol=1e-4, atol=1e-5)
+
+
+def test_where_a_claim_does_not_hold_in_other_worlds_is_said_in_words(monkeypatch):
+    """By family, but for claims about one family; tasks of the paper have no verdict."""
+    rows = [
+        ("ahead", world, family, "holds")
+        for world in ("paper", "maximum", "base-4")
+        for family in ("one-armed", "two-armed", "aligned")
+    ]
+    rows += [("ahead", "paper", "ascending", None), ("leans", "paper", "one-armed", "open")]
+    judged = pd.DataFrame(rows, columns=["claim", "world", "group", "verdict"])
+    judged.loc[4:6, "verdict"] = ["open", "open", "reversed"]
+    monkeypatch.setattr(make_findings, "table", lambda *_: judged)
+    assert make_findings.in_worlds("ahead") == (
+        "it holds in 6 of 9 cells: the paper's (one-armed, two-armed, aligned), maximum norm "
+        "(one-armed), base weight 4 (two-armed, aligned); reversed in 1: base weight 4 "
+        "(one-armed); open in 2: maximum norm (two-armed, aligned)."
+    )
+    assert make_findings.in_worlds("leans") == (
+        "it holds in 0 of 1 worlds; open in 1: the paper's."
+    )
 
 
 def test_a_sentence_that_no_longer_holds_is_refused(tmp_path):
@@ -72,3 +135,20 @@ def test_links_of_pages_name_files_that_are_there():
             if "://" not in link and not (page.parent / link).exists():
                 lost.append(f"{page.name}: {link}")
     assert not lost
+
+
+def test_the_first_table_of_the_readme_is_what_the_tables_say():
+    """Mean gaps over random tasks, by method, without and with motor noise."""
+    text = (ROOT / "README.md").read_text("utf-8")
+    rows = re.findall(r"^   \| (.+?) \| (\d+) % \| (\d+) % \|$", text, re.MULTILINE)
+    figures = make_findings.finding_figures
+    ids = {
+        "policy gradient": "policy-gradient", "CMA-ES": "cma-es/bandit",
+        "the paper's learner": figures.LEARNER, "random search": figures.RANDOM,
+    }  # fmt: skip
+    assert [re.split("[,:]", name)[0] for name, *_ in rows] == [*ids]
+    for (_, *printed), method in zip(rows, ids.values(), strict=True):
+        for percent, world in zip(printed, ("", figures.NOISE), strict=True):
+            tasks = make_findings.table("families", "by-task", world)
+            gap = figures.over_random_tasks(tasks).loc[method, "gap"]
+            assert round(100 * gap) == int(percent)

@@ -69,8 +69,8 @@ def best_shipped(task: Task, model: MotionModel = PAPER) -> KnownOptimum | None:
 
     The task is recognised by :func:`task_hash`, whatever its name. Return None if the files do not
     have the task in this world. They have the paper's world, and the paper's world with motor noise
-    0.01. Of a shipped family they have only the first 40 instances of the test split; with motor
-    noise only those of families one-armed and two-armed.
+    0.01. Of a shipped family they have only the first 40 instances of the test split, and with
+    motor noise only those of families with up to eight goals.
     """
     if not same_world(model.without_noise(), PAPER, task.radius):
         return None

@@ -3,7 +3,8 @@
 A claim says that a mean over tasks, or each of several means, lies beyond a bound
 (:func:`mean_beyond`, joined by :func:`all_of`). :func:`judge` corrects the tests of all claims of a
 study together (Holm). A claim that holds stays undecided if its tests are not significant without
-the task that favours it most.
+the task that favours it most. If values over tasks are very skewed, p must be below 1 %
+(:func:`level_of`).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from scipy import stats
 
 from coartic import CoarticError
 from coartic.analysis import interval, mean
@@ -27,9 +29,40 @@ from coartic.estimates import FEWEST, FEWEST_TASKS, LEVEL, Estimate
 
 RESAMPLES_OF_CLAIMS = 99_999
 """Resamples of a test over tasks, whose p-value is corrected over many claims."""
+STRICT_LEVEL = 0.01
+"""Level of a test whose values over tasks are very skewed."""
+MAX_SKEWNESS = 2.0
+"""Largest absolute skewness of values over tasks at which the level of their test is 5 %."""
 SIGNS = {"greater": 1.0, "less": -1.0}
 Verdict = Literal["supported", "not supported", "undecided", "depends on the goals"]
 Side = Literal["greater", "less"]
+
+
+def level_of(values: ArrayLike) -> float:
+    """Return the level at which a test of the mean of values over tasks counts as significant.
+
+    A bootstrap test of a mean rejects a true hypothesis too often if values are very skewed
+    (``docs/statistics.md``).
+
+    Parameters
+    ----------
+    values : array_like, shape (tasks,)
+        One value for each task.
+
+    Returns
+    -------
+    float
+        0.01 if the absolute skewness of the values exceeds 2, otherwise 0.05. It is compared with
+        p after correction.
+
+    Examples
+    --------
+    >>> level_of([0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0]), level_of([0.0] * 9 + [5.0])
+    (0.05, 0.01)
+    """
+    sample = np.asarray(values, dtype=np.float64)
+    skewed = np.ptp(sample) > 0 and abs(stats.skew(sample)) > MAX_SKEWNESS
+    return STRICT_LEVEL if skewed else LEVEL
 
 
 @dataclass(frozen=True)
@@ -44,9 +77,11 @@ class Finding:
     """Tests of the claim, which must all hold. A positive estimate is as claimed."""
     against: tuple[Estimate, ...] = ()
     """Tests of the opposite of the claim. A claim that does not hold is refuted if one of them has
-    p below 5 % after correction."""
+    p below the ``level`` after correction."""
     without: tuple[Estimate, ...] = ()
     """Tests of the claim over tasks, each without the task that favours the claim most."""
+    level: float = LEVEL
+    """Level of the tests: the smallest :func:`level_of` of the values that they test."""
 
     @property
     def opposite_p(self) -> float:
@@ -57,11 +92,11 @@ class Finding:
     def verdict(self, p: float, opposite_p: float) -> Verdict:
         """Return the verdict for p-values of the claim and of its opposite.
 
-        - *supported*: the claim holds, and ``p`` is below 5 % or NaN. (It is NaN if the claim was
-          counted exactly.)
-        - *not supported*: the claim does not hold, and ``opposite_p`` is below 5 %. The verdict is
-          also *not supported* if the claim has no test, or if a test of five or more values has no
-          p and no positive estimate, because all values are equal.
+        - *supported*: the claim holds, and ``p`` is below the ``level`` or NaN. (It is NaN if the
+          claim was counted exactly.)
+        - *not supported*: the claim does not hold, and ``opposite_p`` is below the ``level``. The
+          verdict is also *not supported* if the claim has no test, or if a test of five or more
+          values has no p and no positive estimate, because all values are equal.
         - *undecided*: any other claim. A claim that holds is also undecided if one of its tests has
           fewer than five values and no p.
         """
@@ -70,11 +105,11 @@ class Finding:
             return "undecided"
         if self.holds:
             # NaN: counted exactly, or no spread in any sample.
-            return "undecided" if p >= LEVEL else "supported"
+            return "undecided" if p >= self.level else "supported"
         certain = not self.tests or any(
             test.value <= 0 and math.isnan(test.p) and min(test.n) >= FEWEST for test in self.tests
         )
-        return "not supported" if certain or opposite_p < LEVEL else "undecided"
+        return "not supported" if certain or opposite_p < self.level else "undecided"
 
 
 def _largest_p(tests: Iterable[Estimate]) -> float:
@@ -151,7 +186,7 @@ def mean_beyond(
     opposite = max(_tests_over_tasks(-sign * found, -sign * bound), key=lambda test: test.p)
     words = interval(mean(found).columns("mean"), "mean", 2)
     evidence = f"{sentence.replace('{}', words)} ({len(found)} tasks)"
-    return Finding(test.value > 0, evidence, (test,), (opposite,), (without,))
+    return Finding(test.value > 0, evidence, (test,), (opposite,), (without,), level_of(found))
 
 
 def all_of(*findings: Finding) -> Finding:
@@ -190,6 +225,7 @@ def all_of(*findings: Finding) -> Finding:
         tuple(test for finding in findings for test in finding.tests),
         tuple(test for finding in findings for test in finding.against),
         tuple(test for finding in findings for test in finding.without),
+        min(finding.level for finding in findings),
     )
 
 
@@ -234,7 +270,7 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
         evidence = (
             finding.evidence if finding.holds is not None else f"Not judged: {finding.evidence}"
         )
-        if adjusted[0] < LEVEL <= adjusted[1]:
+        if adjusted[0] < finding.level <= adjusted[1]:
             evidence += f"; without the task that speaks most for it {p_value(adjusted[1])}"
         rows[name] = {
             "statement": statement,

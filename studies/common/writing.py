@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import jinja2
 import pandas as pd
@@ -12,7 +13,7 @@ import pandas as pd
 from coartic import CoarticError
 from coartic.analysis import SIGNATURES, Study, interval, number
 from coartic.analysis.control import LEAST_SHARE, control_of, explores_idle_arm, selects
-from coartic.analysis.figures import picture
+from coartic.analysis.figures import picture, style
 from coartic.analysis.study import solved
 from coartic.analysis.words import listed, p_value
 
@@ -91,9 +92,30 @@ def write_study(
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in folder.glob("*.csv")}
     if "results" not in stored:
         raise CoarticError(f"{folder} has no results.csv, and there is no table 'results'")
-    (folder / "figure.svg").write_bytes(picture(draw(stored["results"]), ".svg"))
+    (folder / "figure.svg").write_bytes(stored_picture(draw, stored["results"]))
     page = fill_page(folder / PAGE, **stored)
     (folder / "README.md").write_text(page, encoding="utf-8")
+
+
+def stored_picture(draw: Callable[..., Any], *arguments: Any, **options: Any) -> bytes:
+    """Return a figure as SVG in the font that Matplotlib brings along.
+
+    Stored figures have this font, so that they are the same on every machine.
+
+    Parameters
+    ----------
+    draw : callable
+        Function that returns the figure (Matplotlib).
+    *arguments, **options
+        Arguments of ``draw``.
+
+    Returns
+    -------
+    bytes
+        Content of the SVG file.
+    """
+    with patch.dict(style.RC, {"font.sans-serif": ["DejaVu Sans"]}):
+        return picture(draw(*arguments, **options), ".svg")
 
 
 def fill_page(template: str | Path, **values: Any) -> str:

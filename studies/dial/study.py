@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from settings import AFTER, DIAL, FAMILIES, INFORMED, PAPER, PLANNER, TRIALS
+from settings import AFTER, DRIFTS, FAMILIES, INFORMED, PAPER, PLANNER, TRIALS
 from shifts import by_task, in_each, judge_shifts, measure_shifts, tabulate_shifts
 
 from coartic.analysis import figures, means
@@ -94,46 +94,36 @@ def judge_claims(runs):
     return judge_means(HERE / "claims.toml", values)
 
 
-OTHERS = {
-    PLANNER: "1, σ 0.01", "CMA-ES": "CMA-ES", "posture planning": "posture plan",
-    "shortest path": "shortest path",
+DIRECTIONS = {
+    "next goal (σ = 0.01)": ("0.01", "next-goal"), "next goal": ("0.05", "next-goal"),
+    "present posture": ("0.05", "stay"), "start": ("0.05", "start"),
 }  # fmt: skip
-"""Settings and methods to the right of the dial in the figure, with their names."""
-PLANNERS = tuple(OTHERS)[2:]
+"""What exploration leans towards, with the noise and the direction of the settings of each line."""
+OTHERS = "CMA-ES", "posture planning", "shortest path"
+"""Methods that the figure shows as horizontal lines."""
 
 
 @figures.styled
 def draw(table):
-    """Draw trials to a quarter and to half of the gain, and the gain after 100 trials, by drift."""
-    figure, panels = figures.panels((1, 3), (figures.TWO, 2.6))
-    names = {setting: setting.split()[0] for setting in DIAL} | OTHERS
-    places = {setting: place for place, setting in enumerate(names)}
-    rows = table[table.group.isin(FAMILIES) & table.setting.isin(places)]
-    rows = rows.assign(x=rows.setting.map(places)).sort_values("x")
-    for number, family in enumerate(FAMILIES):
-        of_family = rows[rows.group == family]
-        look = {"color": figures.PALETTE[number % len(figures.PALETTE)], "label": family}
-        for dial in (True, False):  # the line ends where the dial ends
-            part = of_family[of_family.setting.isin(OTHERS) != dial]
-            for axes, share in zip(panels, ("quarter", "half"), strict=False):
-                trials = part[f"{share}_0.5"].clip(upper=2 * TRIALS)
-                of_trials = part.setting.isin(PLANNERS)  # planners make no trials
-                axes.plot(part.x[~of_trials], trials[~of_trials], "o", markersize=3,
-                          linestyle="-" if dial else "", **look)  # fmt: skip
-            line = look if dial else look | {"linestyle": "", "label": None}
-            figures.means(panels[2], part, x="x", y="gain_100", **line)
-    for axes, share in zip(panels, ("a quarter", "half"), strict=False):
-        axes.set_yscale("log")
-        axes.set_yticks([1, 10, 100, 1_000, 10_000], ["1", "10", "100", "1000", "10 000"])
-        axes.minorticks_off()
-        axes.set_ylabel(f"trials to {share} of gain")
-        axes.axhline(TRIALS, color=figures.GREY, linewidth=0.6, linestyle=":")
-    panels[2].set_ylabel("gain after 100 trials (%)")
-    for axes in panels:
-        axes.set_xticks(range(len(names)), names.values(), rotation=90)
-        axes.set_xlabel("drift κ, and other methods")
-    figures.letters(panels)
-    figures.legend(figure, panels[2].get_legend_handles_labels()[0], 5)
+    """Draw the mean gain after 100 trials on random tasks by drift, and that of other methods."""
+    figure, (axes,) = figures.panels((1, 1), (figures.TWO, 3.4))
+    rows = table[table.group == "random"].set_index("setting")
+    kappas = [0, *DRIFTS]
+    for number, (label, (noise, direction)) in enumerate(DIRECTIONS.items()):
+        line = rows.loc[[f"0 {noise}", *(f"{kappa:g} {noise} {direction}" for kappa in DRIFTS)]]
+        look = {"color": figures.PALETTE[(0, 0, 2, 3)[number]], "marker": "osv^"[number]}
+        figures.means(axes, line.assign(x=range(len(kappas))), x="x", y="gain_100",
+                      linestyle="--" if noise == "0.01" else "-", **look)  # fmt: skip
+        axes.text(len(kappas) - 0.92, line.gain_100.iloc[-1], label, va="center")
+    for method in OTHERS:
+        gain, ends = rows.gain_100[method], (-0.2, len(kappas) - 0.95)
+        axes.hlines(gain, *ends, color=figures.GREY, linewidth=0.8, linestyle=":")
+        axes.text(-0.17, gain + 1.5, method, va="bottom", color=figures.GREY)
+    axes.text(len(kappas) - 0.92, 60, "exploration leans\ntowards the", va="center", style="italic")
+    axes.set_xticks(range(len(kappas)), [f"{kappa:g}" for kappa in kappas])
+    axes.set_xlim(-0.2, len(kappas) + 0.3)
+    axes.set_xlabel("drift κ")
+    axes.set_ylabel("gain after 100 trials (%)")
     return figure
 
 

@@ -188,30 +188,31 @@ def judge_claims(study, plans, repeats):
 
 @figures.styled
 def draw(table):
-    """Draw gaps, gains of goals ahead, and their sums, by number of goals ahead.
+    """Draw the sum of the gains of goals ahead, by their number, for up to four goals ahead.
 
-    The learner's gap is dotted, and that of CMA-ES dash-dotted. Tasks with seven goals have open
-    markers.
+    From three goals ahead, a dashed line rises by :data:`GAIN` for the fourth.
     """
-    figure, panels = figures.panels((1, 3), (figures.TWO, 2.8))
-    for color, arms, many, half in zip(figures.PALETTE, ARMS, MANY, HALF, strict=False):
-        rows, seven = table[table.family == many], table[table.family == half]
-        line = {"x": "h", "scale": 100, "bars": 0.9, "color": color}
-        for axes, column in zip(panels, ("gap", "gain", "together"), strict=True):
-            figures.means(axes, rows, y=column, label=arms, **line)
-        line |= {"label": f"{arms}, seven", "markerfacecolor": "white"}
-        figures.means(panels[2], seven, y="together", **line)
-        for method, dash in (("dual-process", "dotted"), ("cma-es/bandit", "dashdot")):
-            for gap in rows.gap[rows.method.str.startswith(method)]:
-                panels[0].axhline(100 * gap, color=color, linestyle=dash, linewidth=1)
-    panels[1].axhline(GAIN, color="black", linewidth=0.7, linestyle="dashed")
-    labels = "gap (%)", "gain of a goal ahead (%)", "gain together (%)"
-    for axes, label in zip(panels, labels, strict=True):
-        axes.set(xlabel="goals ahead", ylabel=label, xticks=range(0, 9, 2))
-    panels[1].set_yscale("symlog", linthresh=1)
-    panels[1].set_yticks([-1, 0, 1, 3, 10, 30], ["−1", "0", "1", "3", "10", "30"])
-    figures.legend(figure, panels[2].get_legend_handles_labels()[0], 4)
-    figures.letters(panels)
+    figure, (axes,) = figures.panels((1, 1), (figures.TWO, 3.2))
+    lines = zip([*MANY, *HALF], 2 * ARMS, ["fourteen", "fourteen", "seven", "seven"], strict=True)
+    for number, (family, arms, goals) in enumerate(lines):
+        rows = table[(table.family == family) & (table.h <= 4)].fillna({"together": 0})
+        rows = rows.fillna({"together_low": 0, "together_high": 0})
+        many, color = family in MANY, figures.PALETTE[number % 2]
+        look = {"color": color, "marker": "os"[number % 2], "linestyle": "-" if many else "--"}
+        figures.means(axes, rows, x="h", y="together", scale=100, **look,
+                      markerfacecolor=color if many else "white")  # fmt: skip
+        last = rows.iloc[-1]
+        above = (family == HALF[0]) - (family == HALF[1])
+        axes.text(
+            last.h + 0.08, 100 * last.together + 5 * above, f"{goals} goals, {arms}", va="center"
+        )
+        if many:
+            third = 100 * rows.together.iloc[-2]
+            axes.plot([3, 4], [third, third + GAIN], color="black", linewidth=1, linestyle=":")
+    axes.set_xticks(range(5))
+    axes.set_xlim(-0.1, 4.9)
+    axes.set_xlabel("goals ahead")
+    axes.set_ylabel("gain of all goals ahead (% of a movement)")
     return figure
 
 

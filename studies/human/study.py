@@ -21,6 +21,7 @@ from scipy import stats
 
 from coartic import trajectory
 from coartic.analysis import figures, load
+from coartic.analysis.figures.style import name_rows
 from coartic.analysis.statistics import holm
 from coartic.estimates import Estimate
 from common.writing import write_study
@@ -47,10 +48,8 @@ EFFECTS_WITH_POWER = {
     "bends-away learner bow slope": "value",
 }
 """Effects for which power is computed (:func:`tabulate_power`), with the column that is tested."""
-MARKS = {
-    "agrees": ("+", figures.PALETTE[0]), "disagrees": ("−", figures.PALETTE[3]),
-    "undecided": ("?", figures.GREY), "silent": ("·", figures.GREY), "no cases": ("", figures.GREY),
-}  # fmt: skip
+COLORS = {"agrees": figures.PALETTE[0], "undecided": "#d0d0d0", "disagrees": figures.PALETTE[3]}
+MARKS = {"agrees": "+", "disagrees": "−", "undecided": "?", "silent": "·", "no cases": "·"}
 
 
 def tidy(study):
@@ -350,28 +349,54 @@ def tabulate(verdicts):
     return table.rename_axis("row")
 
 
+def separating(table):
+    """Return the rows of table ``results`` that separate models.
+
+    In these rows a verdict is decided that does not follow from how its model is built, and not all
+    models have this verdict.
+    """
+    models = table.drop(columns="finding")
+    decided = models.isin(["agrees", "disagrees"]).any(axis=1)
+    differ = models.ne(models.iloc[:, 0], axis=0).any(axis=1)
+    return models[decided & differ]
+
+
 @figures.styled
 def draw(table):
-    """Draw a grid with a mark for each verdict.
+    """Draw for each model how many findings have which verdict, and the rows that separate models.
 
-    Marks of verdicts that follow from how the model is built have a circle.
+    Bars of findings with which a model disagrees go to the left. Marks of verdicts that follow from
+    how the model is built are in brackets.
     """
-    figure, (axes,) = figures.panels((1, 1), (figures.TWO, 4.6))
+    figure, (bars, marks) = figures.panels((1, 2), (figures.TWO, 3.4), sharey=True)
     models = table.drop(columns="finding").rename(columns=lambda name: name.removeprefix("of "))
-    for (y, x), verdict in np.ndenumerate(models):
-        mark, color = MARKS[verdict.removesuffix(" *")]
-        axes.text(x, y, mark, color=color, ha="center", va="center", fontsize=10)
-        if verdict.endswith("*"):
-            axes.plot(x, y, "o", markersize=11, markerfacecolor="none", markeredgecolor=color,
-                      markeredgewidth=0.6)  # fmt: skip
-    axes.set_yticks(range(len(models)), models.index.str.replace("-", " "))
-    axes.set_ylim(len(models) - 0.4, -0.6)
-    axes.set_xticks(range(models.shape[1]), models, rotation=50, ha="left", rotation_mode="anchor")
-    axes.xaxis.tick_top()
-    axes.tick_params(length=0)
-    axes.set_xlim(-0.6, models.shape[1] - 0.4)
-    axes.grid(visible=True, linewidth=0.3)
-    axes.spines[:].set_visible(False)
+    plain = models.apply(lambda verdicts: verdicts.str.removesuffix(" *"))
+    counts = {verdict: (plain == verdict).sum() for verdict in COLORS}
+    starts = {"undecided": counts["agrees"], "disagrees": -counts["disagrees"]}
+    for verdict, color in COLORS.items():
+        bar = bars.barh(-np.arange(len(counts[verdict])), counts[verdict], height=0.7, color=color,
+                        left=starts.get(verdict, 0), label=verdict)  # fmt: skip
+        labels = [count or "" for count in counts[verdict]]
+        ink = "black" if verdict == "undecided" else "white"
+        bars.bar_label(bar, labels, label_type="center", color=ink)
+    bars.axvline(0, color="black", linewidth=0.6)
+    bars.set_xticks([])
+    bars.set_xlabel("number of findings")
+    rows = separating(table)
+    for (x, y), verdict in np.ndenumerate(rows):
+        kind = verdict.removesuffix(" *")
+        color = figures.GREY if kind == "undecided" else COLORS.get(kind, figures.GREY)
+        mark = f"({MARKS[kind]})" if kind != verdict else MARKS[kind]
+        marks.text(x, -y, mark, color=color, ha="center", va="center", fontsize=11)
+    marks.set_xlim(-0.6, len(rows) - 0.4)
+    marks.set_xticks(range(len(rows)), rows.index.str.replace("-", "\n"))
+    for axes in (bars, marks):
+        axes.xaxis.set_label_position("top")
+        axes.xaxis.tick_top()
+        axes.spines[:].set_visible(False)
+        axes.tick_params(length=0)
+    name_rows(bars, [*models])
+    figures.legend(figure, bars.get_legend_handles_labels()[0], 3)
     return figure
 
 

@@ -1,6 +1,6 @@
 """Test the learner's rule for hands: a table by state against a centre for each hand sequence.
 
-    python studies/memory/hands.py results/memory-hands
+    PYTHONPATH=studies python studies/memory/hands.py results/memory-hands
 
 runs suite hands.toml, and then random search with the final hands of each run of the learner. It
 writes hands.csv.xz, with a row for each run, and hands.csv, with a row for each family. Stored runs
@@ -18,8 +18,8 @@ from coartic.analysis import load
 from coartic.analysis.statistics import bootstrap_test, holm, task_mean
 from coartic.baselines.random_search import RandomSearch
 from coartic.benchmarks.runner import run_suite
-from coartic.estimates import LEVEL
 from coartic.method import Session
+from common.judging import level_of
 
 HERE = Path(__file__).parent
 TRIALS, RESAMPLES = 10_000, 99_999
@@ -80,14 +80,19 @@ def tabulate(runs):
     """Tabulate the mean gains (in ticks) of each cell, with a row for each family.
 
     ``more`` is by how much the table gains more than the centres, with tests. ``over_shipped`` and
-    ``over_given`` compare the table with the other two cells.
+    ``over_given`` compare the table with the other two cells. ``same`` is the mean of ``more`` over
+    the runs in which table and centres end with the same hands, and ``same_runs`` their number.
     """
     runs = runs.assign(gain=runs.reward - runs.corrective_best)
     gains = runs.pivot_table("gain", ["family", "task"], "cell")
-    rows, tests = {}, []
+    rows, tests, levels = {}, [], []
+    by_run = runs.set_index(["family", "task", "run", "cell"]).unstack("cell")  # noqa: PD010
+    same = by_run.hands.table == by_run.hands.centres
+    more_of_same = (by_run.gain.table - by_run.gain.centres)[same]
     for family, of_family in gains.groupby("family", sort=False):
         more = of_family.table - of_family.centres
         tests.append(two_tests(more.to_numpy()))
+        levels.append(level_of(more))
         row = {"tasks": len(of_family), **of_family.mean().to_dict(), "median_more": more.median()}
         for name, values in {
             "more": more,
@@ -95,10 +100,11 @@ def tabulate(runs):
             "over_given": of_family.table - of_family.given,
         }.items():
             row |= task_mean([values]).columns(name)
-        rows[family] = row
+        of_same = more_of_same[family]
+        rows[family] = row | {"same": of_same.mean(), "same_runs": len(of_same)}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("family")
     table["p"], table["p_without"] = map(holm, zip(*tests, strict=True))
-    sure = table[["p", "p_without"]].max(axis=1) < LEVEL
+    sure = table[["p", "p_without"]].max(axis=1) < levels
     table["verdict"] = np.where(sure, np.where(table.more > 0, "pays", "costs"), "open")
     return table
 

@@ -1,106 +1,126 @@
-"""Measure whether the order of methods survives motor noise, and how methods learn in noise.
+"""Measure whether the order of methods that learn survives motor noise.
 
-    python studies/noise/protocols.py results/noise
+    PYTHONPATH=studies python studies/noise/protocols.py results/noise
     PYTHONPATH=studies python studies/noise/study.py results/noise
 
-The expected answer to the first question was that CMA-ES keeps a lead over the paper's learner, but
-a smaller one. Against it would be a lead that is as large as without noise, larger, reversed, or
-not significant. README.md has all hypotheses and rules.
+Without a folder, tables and page are made from runs.csv.xz and hands.csv. README.md has the
+hypotheses and rules.
 """
 
 import sys
 from pathlib import Path
 
-import learning
 import order
 import pandas as pd
 import why
+from rules import RESAMPLES
 
+import memory
 from coartic.analysis import figures, load
 from common.writing import write_study
 
-GROUPS = {"paper": "the paper's tasks", "families": "200 random tasks"}
+HERE = Path(__file__).parent
 _KEPT = [
-    *("run_id", "task", "method", "setting", "run", "best_known", "motor_noise"),
-    *("signal_dependent", "target", "action", "ticks", "failures"),
+    *("run_id", "task", "method", "setting", "run", "best_known", "motor_noise", "target"),
+    *("ticks", "error", "failures", "off"),
 ]
 """Columns of the stored executions."""
 
 
 def executions_of(folder):
-    """Return all executions of the study, with a row for each run, level of noise and target.
+    """Return the executions of a folder, with a row for each run, level of noise and target.
 
-    Column ``question`` has the question to which the row belongs.
+    Column ``question`` is the part of the study to which the row belongs. Rows of the part on
+    memory are those that ship if the folder does not have it.
     """
-    parts = {"order": "order", "why": "why"}
-    parts |= {"memory-executed": "memory", "learning-executed": "learning"}
-    parts |= {"handler-executed": "learning"}
     tables = []
-    for part, question in parts.items():
-        rows = pd.concat([pd.read_csv(path) for path in sorted((folder / part).glob("*.csv"))])
-        if question == "order":
-            rows = rows[rows.method.isin(order.NAMES) & rows.setting.isna()]
-        tables.append(rows.reindex(columns=_KEPT).assign(question=question))
+    parts = {"practised": "practised", "answers": "answers", "answers-of-cma-es": "answers"}
+    for part, question in (parts | {"memory-executed": "memory"}).items():
+        if files := sorted((folder / part).glob("*.csv")):
+            rows = pd.concat(map(pd.read_csv, files)).reindex(columns=_KEPT)
+            tables.append(rows.assign(question=question))
+    if not (folder / "memory-executed").exists():
+        shipped = pd.read_csv(HERE / "runs.csv.xz", low_memory=False)
+        shipped = shipped[shipped.question == "memory"]
+        tables.append(shipped.reindex(columns=[*_KEPT, "question"]))
     rows = pd.concat(tables).set_index("run_id")
-    return with_references(rows.assign(ticks=rows.ticks.round(2)))
-
-
-def with_references(rows):
-    """Return executions with the reference of their gaps as ``best_known``.
-
-    On random tasks of question 4, the reference is the best reward without noise of any run of the
-    study.
-    """
-    learning = (rows.question == "learning") & rows.task.str.contains("/")
-    exact = rows[learning & (rows.motor_noise == 0) & (rows.failures == 0)]
-    best = -exact.groupby("task").ticks.min()
-    known = rows.best_known.where(~learning, rows.task.map(best))
-    return rows.assign(best_known=known)
+    return rows.assign(ticks=rows.ticks.round(2), error=rows.error.round(3), off=rows.off.round(3))
 
 
 def measure(folder):
-    """Return the tables of the study by name."""
+    """Return the tables of the study by name, from the executions of a folder."""
     folder = Path(folder)
-    rows = order.read(folder / "order")
-    runs = load(folder / "memory").runs
-    learner = runs[runs.method.str.startswith("dual-process/")]
-    values = learning.read_memory(folder / "memory-executed", learner)
-    memory, verdicts = learning.tabulate_memory(values)
-    learned = learning.read_learning(folder)
-    pairs = learning.tabulate_learning_pairs(learned)
+    rows = executions_of(folder)
+    if (folder / "memory").exists():
+        runs = load(folder / "memory").runs
+        learner = runs[runs.method.str.startswith("dual-process/")]
+        hands = learner.groupby("task").hands.value_counts().reset_index().set_index("task")
+    else:
+        hands = pd.read_csv(HERE / "hands.csv", index_col=0)
+    return {"runs": rows, "hands": hands, **tables_of(rows, hands)}
+
+
+def tables_of(rows, hands, resamples=RESAMPLES):
+    """Return the tables by name, from the executions and the hands of the learner's runs."""
+    rows = rows.reset_index()
+    gaps = order.read(rows)
+    values = memory.read_memory(rows[rows.question == "memory"], hands)
+    of_memory, verdicts = memory.tabulate_memory(values, resamples)
     return {
-        "runs": executions_of(folder),
-        "hands": learner.groupby("task").hands.value_counts().reset_index().set_index("task"),
-        "results": order.tabulate_gaps(rows).set_index("group"),
-        "families": order.tabulate_families(rows).set_index("family"),
-        "pairs": order.tabulate_pairs(rows),
-        "why": why.tabulate_why(why.read(folder / "why")),
-        "memory": memory.set_index("group"),
+        "results": order.tabulate(gaps).set_index("group"),
+        "verdicts": order.tabulate_verdicts(gaps, resamples),
+        "families": order.tabulate_families(gaps).set_index("case"),
+        "why": why.tabulate_why(gaps, rows),
+        "memory": of_memory.set_index("group"),
         "memory_verdicts": verdicts,
-        "learning": learning.tabulate_learning(learned).set_index("group"),
-        "practice": learning.tabulate_practice(learned).set_index("group"),
-        "learning_pairs": pairs,
     }
 
 
 @figures.styled
 def draw(results):
-    """Draw the gap by motor noise, with a panel for each group of tasks."""
-    figure, panels = figures.panels((1, 2), (figures.TWO, 3.2))
-    results = results.reset_index()
-    for axes, (group, title) in zip(panels, GROUPS.items(), strict=True):
-        of_group = results[(results.group == group) & ~results.signal_dependent]
-        for name, method in {name: method for method, name in order.NAMES.items()}.items():
-            look = figures.look_of(method) | {"label": name}
-            figures.means(axes, of_group[of_group.name == name], x="motor_noise", y="gap", **look)
-        axes.set(title=title, xlabel="motor noise s (rad, length units)", yscale="log")
-        axes.set_xticks([0, 0.005, 0.01, 0.02])
-        axes.set_yticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
-        axes.set_yticks([], minor=True)
-    panels[0].set_ylabel("gap (%), log scale; lower is better")
-    figures.legend(figure, panels[0].get_legend_handles_labels()[0], 4)
+    """Draw the gap of each method in the four cases, with a label at the end of each line."""
+    figure, (axes,) = figures.panels((1, 1), (figures.TWO, 3.2))
+    rows = results.reset_index().query("group == 'all'").set_index("name")
+    methods = {name: label for label, name in order.LABELS.items()}
+    places = range(len(order.CASES))
+    for name in rows.sort_values("practised").index:
+        gaps = rows.loc[name]
+        look = figures.look_of(methods[name].partition(" ")[0])
+        axes.errorbar(
+            places, [gaps[case] for case in order.CASES],
+            yerr=[[gaps[case] - gaps[f"{case}_low"] for case in order.CASES],
+                  [gaps[f"{case}_high"] - gaps[case] for case in order.CASES]],
+            color=look["color"], marker=look["marker"], markersize=4, linewidth=1, elinewidth=0.6,
+            linestyle="--" if " " in methods[name] else "-",
+        )  # fmt: skip
+    ends = _spread(rows.practised.sort_values(), 0.045)
+    for name, height in ends.items():
+        color = figures.look_of(methods[name].partition(" ")[0])["color"]
+        label = axes.annotate(
+            name, (places[-1], height), (8, 0), textcoords="offset points", va="center",
+            color=color,
+        )  # fmt: skip
+        label.set_in_layout(False)
+    axes.set(yscale="log", ylabel="gap (%), log scale; lower is better", xlim=(-0.3, 4.4))
+    axes.set_xticks(places, ["found and made\nwithout noise", "the same in noise,\nas it aims",
+                             "in noise,\nat its hits", "practised and\nmade in noise"])  # fmt: skip
+    axes.set_ylim(4, 50)
+    axes.set_yticks([5, 10, 20, 40], ["5", "10", "20", "40"])
+    axes.set_yticks([], minor=True)
     return figure
 
 
+def _spread(values, least):
+    """Return values in rising order, moved up until they are a step of the log10 scale apart."""
+    moved, before = {}, 0.0
+    for name, value in values.items():
+        moved[name] = before = max(value, before * 10**least)
+    return moved
+
+
 if __name__ == "__main__":
-    write_study(Path(__file__).parent, measure(sys.argv[1]) if sys.argv[1:] else {}, draw)
+    if sys.argv[1:]:
+        write_study(HERE, measure(sys.argv[1]), draw)
+    else:
+        rows = pd.read_csv(HERE / "runs.csv.xz", low_memory=False).set_index("run_id")
+        write_study(HERE, tables_of(rows, pd.read_csv(HERE / "hands.csv", index_col=0)), draw)

@@ -1,18 +1,13 @@
-"""Measure and draw solutions goal by goal, as in Figures 5 to 7 of the paper."""
+"""Measure solutions goal by goal, and draw them as Figure 5 of the paper does."""
 
-import numpy as np
 import pandas as pd
-from matplotlib.patches import Circle
 from published import published_cell
 from reader import LEARNER, Reader
 
 from coartic import load_task
 from coartic.analysis import figures
 from coartic.analysis.study import MOST_EXECUTED, solved, typical_run
-
-TALLEST = 8.8
-"""Largest height (in inches) of a figure that leaves room for a caption on the page."""
-MARKERS = {"L": {"marker": "s", "markerfacecolor": "white"}, "R": {"marker": "o"}}
+from coartic.pictures.drawing import box, circle_goals, draw_robot, number_goals
 
 
 def measure_solutions(study):
@@ -46,54 +41,28 @@ def measure_solutions(study):
 
 @figures.styled
 def draw_solutions(solutions):
-    """Draw the posture that hits each goal, and the previous posture.
+    """Draw the postures at each goal of the corrective process and of the learner, on two tasks.
 
-    There is a row of panels for each run.
+    The tasks are the first two of the table. There is a row of panels for each task, and a panel
+    for each goal. The learner has the last condition of the task.
     """
-    runs = solutions.groupby(["task", "condition"], sort=False)
-    most = solutions.goal.max()
-    size = figures.TWO, min(TALLEST, 0.82 * runs.ngroups)
-    figure, axes = figures.panels((runs.ngroups, most), size)
-    for place, ((name, condition), run) in enumerate(runs):
-        task, row = load_task(name), axes[place * most : (place + 1) * most]
+    tasks = solutions.task.unique()[:2]
+    goals = solutions.goal[solutions.task.isin(tasks)].max()
+    figure, axes = figures.panels((len(tasks), goals), (figures.TWO, 2.1 * len(tasks)))
+    for place, name in enumerate(tasks):
+        task, of_task = load_task(name), solutions[solutions.task == name]
+        ends = [of_task[of_task.condition == each] for each in of_task.condition.iloc[[0, -1]]]
         joints = list(task.robot.joint_names)
-        every = solutions.loc[solutions.task == name, joints].to_numpy()
-        points = np.vstack([
-            task.goal_array,
-            *(task.robot.joint_positions(q, hand) for q in (task.q0, *every)
-              for hand in task.hands),
-        ])  # fmt: skip
-        (left, low), (right, high) = points.min(axis=0) - 0.4, points.max(axis=0) + 0.4
-        for panel in row:
+        low, high = box(task, pd.concat(ends)[joints].to_numpy())
+        for goal, panel in enumerate(axes[place * goals : (place + 1) * goals]):
             panel.set_axis_off()
-            panel.set(aspect="equal", xlim=(left, right), ylim=(low, high))
-        words = f"{task.label}\n{condition}, {''.join(run.hand)}\n−{-run.reward.sum()}"
-        row[0].text(-0.05, 0.5, words, transform=row[0].transAxes, ha="right", va="center")
-        before = task.q0
-        for panel, (q, hand, reward) in zip(
-            row, zip(run[joints].to_numpy(), run.hand, run.reward, strict=True), strict=False
-        ):
-            draw_posture(panel, task, before, figures.GREY)
-            draw_posture(panel, task, q, "black", hand)
-            panel.text(0.4, -0.02, f"−{-reward}", transform=panel.transAxes, ha="center", va="top")
-            before = q
+            if goal >= len(task.goals):
+                continue
+            panel.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+            for run, colour in zip(ends, ("#a0a0a0", "black"), strict=True):
+                draw_robot(panel, task, run[joints].to_numpy()[goal], weight=1.5, colour=colour)
+            circle_goals(panel, task)
+            number_goals(panel, task)
+            before, after = (-run.reward.iloc[goal] for run in ends)
+            panel.set_title(f"{task.label}, goal {goal + 1}\n{before} → {after} ticks")
     return figure
-
-
-def draw_posture(axes, task, q, colour, marked=""):
-    """Draw base, arms and goals in a configuration.
-
-    Joints of the arm of the ``marked`` hand (``L`` or ``R``) have markers.
-    """
-    axes.fill(*task.robot.base_outline(q).T, facecolor="none", edgecolor=colour, linewidth=0.5)
-    for hand in task.hands:
-        letter = hand[0].upper()
-        marks = MARKERS[letter] if letter == marked else {}
-        axes.plot(*task.robot.joint_positions(q, hand).T, color=colour, linewidth=0.7,
-                  markersize=2, markeredgewidth=0.5, **marks)  # fmt: skip
-    for number, (x, y) in enumerate(task.goals, 1):
-        axes.add_patch(Circle((x, y), task.radius, fill=False, linewidth=0.4))
-        below = any(0 < up - y < 0.6 and abs(right - x) < 0.3 for right, up in task.goals)
-        side, va = (-1, "top") if below else (1, "bottom")
-        axes.annotate(str(number), (x, y + side * task.radius), (0, side), ha="center", va=va,
-                      textcoords="offset points", fontsize=5)  # fmt: skip

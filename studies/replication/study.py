@@ -23,8 +23,8 @@ from markdown_it import MarkdownIt
 from rewards import compare_rewards, draw_rewards
 from solutions import draw_solutions, measure_solutions
 
-from coartic.analysis import figures, load
-from common.writing import fill_page
+from coartic.analysis import load
+from common.writing import fill_page, stored_picture
 
 HERE = Path(__file__).parent
 STYLE = HERE.parents[1] / "analysis" / "report" / "page.css"
@@ -65,7 +65,7 @@ def write(out):
     """
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in out.glob("*.csv")}
     for name, draw in (("rewards", draw_rewards), ("solutions", draw_solutions)):
-        (out / f"{name}.svg").write_bytes(figures.picture(draw(stored[name]), ".svg"))
+        (out / f"{name}.svg").write_bytes(stored_picture(draw, stored[name]))
     if out == HERE:
         text = fill_page(HERE / "README.md.jinja", **stored)
         (out / "README.md").write_text(text, encoding="utf-8")

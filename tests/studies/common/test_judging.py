@@ -70,6 +70,24 @@ def test_each_bound_of_a_verdict_on_both_sides():
     assert below_two == [False, True]
 
 
+def test_a_mean_of_very_skewed_values_needs_one_per_cent():
+    """Skewness of one value that differs from n - 1 others: (n - 2) / sqrt(n - 1)."""
+    level, strict = np.nextafter(0.05, 0), np.nextafter(0.01, 0)
+    for values, bound in (([4.0] * 5 + [1.0], level), ([4.0] * 7 + [1.0], strict)):  # 1.8, 2.3
+        for sign in (1, -1):
+            side = "greater" if sign > 0 else "less"
+            seen = mean_beyond("{}", sign * np.array(values), 0.0, side)
+            unseen = mean_beyond(
+                "{}", sign * np.array(values), 0.0, "less" if sign > 0 else "greater"
+            )
+            both = all_of(mean_beyond("{}", [1.0, 2.0, 3.0]), seen)
+            for p in (bound, np.nextafter(bound, 1)):
+                is_below = p < np.nextafter(bound, 1)
+                assert seen.verdict(p, NAN) == ("supported" if is_below else "undecided")
+                assert both.verdict(p, NAN) == ("supported" if is_below else "undecided")
+                assert unseen.verdict(NAN, p) == ("not supported" if is_below else "undecided")
+
+
 def test_words_and_bounds_of_claims_are_of_a_file(tmp_path):
     """Of two means in two groups of tasks each has to lie beyond its bound; groups one by one."""
     words = tmp_path / "claims.toml"

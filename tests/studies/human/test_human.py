@@ -74,3 +74,19 @@ def test_the_suite_runs_each_model_and_each_control(tmp_path):
         )
     }
     assert found == {*HUMAN.MODELS, *HUMAN.FURTHER}
+
+
+def test_findings_that_separate_models():
+    """A verdict of a test is needed, and another verdict beside it."""
+    table = pd.DataFrame(
+        [
+            ("", "agrees", "undecided"),
+            ("", "disagrees", "disagrees"),
+            ("", "undecided", "disagrees *"),
+            ("", "silent", "undecided"),
+            ("", "agrees", "disagrees *"),
+        ],
+        columns=["finding", "of a", "of b"],
+        index=["first", "alike", "built in", "open", "second"],
+    )
+    assert [*HUMAN.separating(table).index] == ["first", "second"]
