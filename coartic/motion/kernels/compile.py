@@ -14,7 +14,6 @@ import ctypes
 import fcntl
 import hashlib
 import logging
-import multiprocessing
 import os
 import re
 import shutil
@@ -23,6 +22,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, cached_property, partial, update_wrapper
+from multiprocessing import parent_process
 from pathlib import Path
 from threading import Lock
 from types import SimpleNamespace
@@ -349,7 +349,7 @@ def _remove_old(root: Path, current: Path) -> None:
 @cache
 def _command_id() -> int:
     """Return the id of the process that started this one as a worker, or else of this one."""
-    parent = multiprocessing.parent_process()
+    parent = parent_process()
     return (parent.pid if parent else None) or os.getpid()
 
 
