@@ -20,6 +20,8 @@ from coartic.runs.plan import world_title
 
 THE_PAPER = "shah2013"
 STATISTICS = "efron1993", "davison1997", "holm1979", "chung2013", "schuirmann1987", "cohen1988"
+THEORIES = "harris1998", "todorov2002"
+"""Works on theories of motor control that the pages compare with the methods."""
 
 
 @cache
@@ -86,6 +88,8 @@ def bibliography(
                 reasons.setdefault(key, []).append(name)
     for key in STATISTICS if analysis else ():
         reasons.setdefault(key, []).append("the analysis")
+    for key in THEORIES if analysis else ():
+        reasons.setdefault(key, []).append("theories that methods are compared with")
     entries = [f"{_comment(', '.join(whose))}\n{works[key]}" for key, whose in reasons.items()]
     slug = slugs(others)
     for name in others:

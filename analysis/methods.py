@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from coartic.internal.text import one_line
 from coartic.learner.conditions import CONDITIONS, EVERY_CONDITION, INFORMED, METHOD_PREFIX
 from coartic.method import Information, Method, built_in_methods
-from coartic.runs.plan import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,6 +70,8 @@ KNOWN_METHODS: Mapping[str, type[Method]] = built_in_methods()
 """Classes of the built-in methods by id, in the order of lists and figures."""
 SEARCHES = tuple(name for name in KNOWN_METHODS if name.startswith("optimum/"))
 """Ids of the searches for the optimum, which are references and not compared with methods."""
+_WITHOUT_ARTICLE = ("CMA-ES", "random search", "hill climbing", "posture planning")
+"""Algorithms whose names have no article in a sentence."""
 _WORDS = {
     "other_arm": "other arm ",
     "noise_sd": "σ ",
@@ -104,11 +105,48 @@ def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False
         name = one_line(method)
     else:
         name = one_line((method.facts.short or method.name) if short else method.title)
-    if not setting:
-        return name
+    return f"{name} ({setting_in_words(setting)})" if setting else name
+
+
+def subject_of(method: Mapping[str, Any]) -> str:
+    """Return the name of a method as the subject of a sentence.
+
+    A method from a file has a free title, which gets quotation marks. Other names get an article,
+    except names of activities, such as random search, and CMA-ES. A name that contains a comma,
+    such as ``CMA-ES, hands goal by goal``, ends in one.
+
+    Parameters
+    ----------
+    method : mapping
+        Row of :attr:`.Study.methods`: its ``title``, ``algorithm``, and whether it is ``built_in``.
+    """
+    title = str(method["title"])
+    if not method["built_in"]:
+        plain_title = title.removesuffix(MARK)
+        return f"“{plain_title}”{title[len(plain_title) :]}"
+    article = "" if method["algorithm"] in _WITHOUT_ARTICLE else "the "
+    comma = "," if "," in title.partition("(")[0] else ""
+    return f"{article}{title}{comma}"
+
+
+def setting_in_words(setting: str) -> str:
+    """Return a setting, such as ``sigma=0.1, stop=1``, as titles have it: ``σ 0.1, stop 1``."""
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
     words = (_WORDS.get(key, key + equals) + value for key, equals, value in pairs)
-    return f"{name} ({', '.join(words).replace('_', ' ')})"
+    return ", ".join(words).replace("_", " ")
+
+
+def values_in_words(values: Mapping[str, Any]) -> str:
+    """Return values of varied parameters in words, such as ``noise_sd 0.05, epsilon 0.2``.
+
+    Parameters have the names under which a suite sets them.
+    """
+    return ", ".join(f"{name} {one_line(str(value))}" for name, value in values.items())
+
+
+def default_name(method: str) -> str:
+    """Return what the default of a method's parameter (its id) is: *the paper's* or *default*."""
+    return "the paper's" if method in LEARNERS else "default"
 
 
 BY_TRIAL, BY_FORMULA, WITHOUT_REWARD = GROUPS = (
@@ -155,16 +193,16 @@ def methods_of(
     import pandas as pd  # other parts of this module are used without pandas
 
     rows, by_label = dict[str, dict[str, Any]](), dict([*runs.groupby("label", sort=False)])
-    varied = parameters_varied(runs)
+    varied = parameters_varied(runs, declared)
     titles = Counter(map(title_of, declared.values()))
     shorts = Counter(title_of(info, short=True) for info in declared.values())
     for label, of_method in by_label.items():
         base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
-        named = setting
+        named = f" ({setting_in_words(setting)})" * bool(setting)
         if label in varied.index:
-            default_note = ", the paper's" if base in LEARNERS else ", default"
-            named = in_words(dict(zip(varied.columns, varied.loc[label], strict=True)))
-            named += default_note * (not setting)
+            default_note = f", {default_name(base)}" * (not setting)
+            values = dict(zip(varied.columns, varied.loc[label], strict=True))
+            named = f" ({values_in_words(values)}{default_note})"
         info = declared[base]
         known = KNOWN_METHODS.get(base) if info.is_ours else None
         facts = known.facts if known else info.facts
@@ -176,8 +214,8 @@ def methods_of(
             "base": base,
             "condition": CONDITION_OF.get(base, ""),
             "setting": setting,
-            "title": title_of(called, named) + MARK * (base in marked),
-            "short": title_of(briefly, named, short=True) + MARK * (base in marked),
+            "title": title_of(called) + named + MARK * (base in marked),
+            "short": title_of(briefly, short=True) + named + MARK * (base in marked),
             "algorithm": one_line(facts.algorithm or (known.title if known else label)),
             "is_learner": base in LEARNERS,
             "is_search": base in SEARCHES,
@@ -201,7 +239,7 @@ def methods_of(
     return pd.DataFrame([rows[label] for label in ordered], ordered).rename_axis("method")
 
 
-def parameters_varied(runs: pd.DataFrame) -> pd.DataFrame:
+def parameters_varied(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
     """Return the values of the parameters that a study varies.
 
     A study varies parameters if, apart from searches for the optimum, all runs are of one method,
@@ -209,8 +247,9 @@ def parameters_varied(runs: pd.DataFrame) -> pd.DataFrame:
 
     Parameters
     ----------
-    runs : DataFrame
-        As in :func:`methods_of`.
+    runs, declared
+        As in :func:`methods_of`. Stored runs leave most parameters out that have their default,
+        which is then the declared one.
 
     Returns
     -------
@@ -225,8 +264,9 @@ def parameters_varied(runs: pd.DataFrame) -> pd.DataFrame:
     tasks = runs.groupby("label").task.nunique()
     if len({*runs.method}) != 1 or (tasks < runs.task.nunique()).any():
         return pd.DataFrame()
-    texts = runs.drop_duplicates("label").set_index("label").parameters
-    values = pd.DataFrame([*map(json.loads, texts)], texts.index.astype(str), dtype=object)
+    texts, (method,) = runs.drop_duplicates("label").set_index("label").parameters, {*runs.method}
+    complete = [declared[method].defaults | json.loads(text) for text in texts]
+    values = pd.DataFrame(complete, texts.index.astype(str), dtype=object)
     counts = values.map(repr).nunique().sort_values(ascending=False, kind="stable")
     varied = [*counts.index[counts > 1]]
     numbers = [name for name in varied if are_numbers(values[name])]

@@ -15,6 +15,7 @@ from coartic.analysis.frames import ranking
 from coartic.analysis.methods import BY_TRIAL
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import listed, number
+from coartic.estimates import FEWEST
 from coartic.internal.text import counted
 from coartic.runs.record import NOISE_RULE
 
@@ -181,6 +182,17 @@ def standings(study: Study) -> pd.DataFrame:
     return rows.sort_values(
         ["why", "gap"], key=lambda column: column != "" if column.name == "why" else column
     )
+
+
+def has_few_runs(study: Study, methods: Iterable[str], tasks: Iterable[str]) -> bool:
+    """Return True if a stochastic one of these methods has too few runs on a task for a test.
+
+    ``methods`` are labels, or labels of rows of the ranking.
+    """
+    stochastic = study.methods.stochastic.astype(bool)
+    drawn = [runs_on(study, method, tasks) for method in methods]
+    counts = [runs[runs.label.map(stochastic)].groupby("task").size() for runs in drawn]
+    return min((int(of.min()) for of in counts if len(of)), default=FEWEST) < FEWEST
 
 
 @lru_cache(maxsize=1_024)

@@ -215,59 +215,6 @@ def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> fl
     return _p_of(strata, "two-sided", RESAMPLES)
 
 
-def interaction_test(cells: Sequence[Sequence[Sequence[Array]]]) -> float:
-    """Return the p-value of the interaction of two factors in means over tasks.
-
-    The statistic is that of E. Brunner, H. Dette & A. Munk (1997, Journal of the American
-    Statistical Association 92): the sum of squares of the cells' means after the effects of both
-    factors are subtracted, divided by the sum of the variances of these means. Its distribution
-    without interaction is found by resampling the runs of each cell and task around their mean.
-    p = (1 + resamples at least as extreme) / (1 + resamples).
-
-    Parameters
-    ----------
-    cells : nested sequences
-        ``cells[i][j]`` has the runs of each task, shape ``(n,)``, for value i of the first factor
-        and value j of the second. All cells have the same tasks.
-
-    Returns
-    -------
-    float
-        p. It is NaN if a cell has fewer than five runs of a task, or if runs do not vary within any
-        cell and task.
-
-    Examples
-    --------
-    >>> runs = np.arange(5.0)
-    >>> interaction_test([[[runs], [runs + 9.0]], [[runs + 9.0], [runs]]])
-    0.0005
-    """
-    samples = [runs for row in cells for of_tasks in row for runs in of_tasks]
-    if min(map(len, samples)) < FEWEST or not any(map(np.ptp, samples)):
-        return math.nan
-    shape, rng = (len(cells), len(cells[0]), len(cells[0][0])), np.random.default_rng(SEED)
-
-    def statistic(means: Array, variances: Array) -> Array:
-        means = means.reshape(-1, *shape).mean(axis=3)  # over tasks
-        rows, columns = means.mean(axis=2, keepdims=True), means.mean(axis=1, keepdims=True)
-        left = means - rows - columns + means.mean(axis=(1, 2), keepdims=True)
-        return np.asarray((left**2).sum(axis=(1, 2)) / variances.sum(axis=1))
-
-    def moments(drawn: Sequence[Array]) -> tuple[Array, Array]:
-        means = np.stack([runs.mean(axis=-1) for runs in drawn], axis=-1)
-        variances = np.stack([runs.var(axis=-1) / runs.shape[-1] for runs in drawn], axis=-1)
-        return means, variances
-
-    null = [
-        centred(runs)[rng.integers(len(runs), size=(FEWER_RESAMPLES, len(runs)))]
-        for runs in samples
-    ]
-    observed = statistic(*moments([runs[None] for runs in samples]))
-    with np.errstate(divide="ignore", invalid="ignore"):  # resamples of equal runs
-        extreme = _extreme(np.nan_to_num(statistic(*moments(null))), float(observed[0]), "greater")
-    return (1 + extreme) / (1 + FEWER_RESAMPLES)
-
-
 def _p_of(
     strata: Sequence[tuple[Array | float, Array | float]],
     alternative: Alternative,

@@ -276,7 +276,7 @@ class Study:
         It has a row for each label and a column for each parameter. It is empty if the study does
         not vary parameters.
         """
-        return parameters_varied(self.runs)
+        return parameters_varied(self.runs, self.declared)
 
     @cached_property
     def tasks(self) -> dict[str, Task]:

@@ -15,8 +15,9 @@ import html
 import itertools
 import math
 import re
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -38,6 +39,8 @@ from coartic.analysis.methods import (
     EC1,
     EC4,
     WITHOUT_REWARD,
+    are_numbers,
+    default_name,
 )
 from coartic.analysis.optima import gap_share
 from coartic.analysis.running_times import (
@@ -625,7 +628,8 @@ def list_not_ranked(study: Study) -> Rows:
 
 @table(
     "Gap of each method less the gap of the one that it is compared with, on the tasks that the "
-    "latter solved (positive: the method in the first column is worse)",
+    "latter solved (positive: the method in the first column is worse; p is corrected over the "
+    "comparisons with it, intervals are not)",
     """
     method       | method                   |   | tex
     against      | compared with            |   | tex
@@ -674,7 +678,8 @@ def list_differences(study: Study) -> Rows:
             budgets = {*runs.budget.dropna()}
             is_fair = budgets == asked or not (budgets and asked) or ranking_budget(study) is None
             if len(runs) and runs.value.notna().all() and is_fair and name != against:
-                found.append((_difference_of_gaps(study, name, against, tasks), name))
+                gaps = [_gaps_by_task(study, of, tasks) for of in (name, against)]
+                found.append((_difference_of_gaps(*gaps), name))
         adjusted = holm([difference.p for difference, _ in found]) if found else []
         in_order = sorted(zip(found, adjusted, strict=True), key=lambda item: item[0][0].value)
         for (difference, name), p in in_order:
@@ -685,37 +690,178 @@ def list_differences(study: Study) -> Rows:
             yield f"{against} {name}", entries | run_ids(runs, runs_on(study, against, tasks))
 
 
-def _difference_of_gaps(study: Study, first: str, second: str, tasks: Sequence[str]) -> Estimate:
-    """Return the mean gap of a method over tasks less that of another method.
+_Gaps = Sequence[Array | float]
+"""Gaps on each task: of the runs of a method, shape ``(runs,)``, or an exact gap."""
 
-    Gaps of deterministic methods count as exact. The interval is for other runs on these tasks. If
-    both gaps are exact, there is no interval and no p-value.
 
-    Parameters
-    ----------
-    study : Study
-    first, second : str
-        Labels of the methods.
-    tasks : sequence of str
-        Names of tasks on which both have runs.
+def _gaps_by_task(study: Study, method: str, tasks: Sequence[str]) -> _Gaps:
+    """Return the gaps of a method (its label) on tasks on which it has runs, in their order.
+
+    Gaps of deterministic methods are exact.
     """
-    exact, weights, drawn = 0.0, list[float](), list[Array]()
-    pairs: dict[Any, list[Array | float]] = {task: [] for task in tasks}
-    for sign, method in ((1, first), (-1, second)):
-        for task, of_task in runs_on(study, method, tasks).groupby("task").gap:
-            weight, gaps = sign / len(tasks), of_task.to_numpy(np.float64)
-            if study.methods.stochastic[method]:
-                weights.append(weight)
-                drawn.append(gaps)
-                pairs[task].append(gaps)
-            else:
-                exact += weight * gaps.mean()
-                pairs[task].append(float(gaps.mean()))
+    by_task = runs_on(study, method, tasks).groupby("task").gap
+    gaps = [by_task.get_group(task).to_numpy(np.float64) for task in tasks]
+    return gaps if study.methods.stochastic[method] else [float(of.mean()) for of in gaps]
+
+
+def _mean_of_gaps(gaps: _Gaps) -> Estimate:
+    """Return the mean over tasks of the mean gap on each, with its interval for other runs.
+
+    There is no interval if all gaps are exact.
+    """
+    return _sum_of_gaps([(1 / len(gaps), of) for of in gaps])
+
+
+def _difference_of_gaps(first: _Gaps, second: _Gaps) -> Estimate:
+    """Return the mean of the first gaps over tasks less that of the second gaps.
+
+    The interval is for other runs on these tasks. If all gaps are exact, there is no interval and
+    no p-value.
+    """
+    parts = [(sign / len(of), gaps) for sign, of in ((1, first), (-1, second)) for gaps in of]
+    p = stratified_test([*zip(first, second, strict=True)])
+    return replace(_sum_of_gaps(parts), p=p)
+
+
+def _sum_of_gaps(parts: Sequence[tuple[float, Array | float]]) -> Estimate:
+    """Return the weighted sum of means of gaps, with its interval for other runs."""
+    exact = sum(weight * gaps for weight, gaps in parts if isinstance(gaps, float))
+    drawn = [(weight, gaps) for weight, gaps in parts if not isinstance(gaps, float)]
     if not drawn:
         return Estimate(exact)
-    sampled = mean_of_means(drawn, weights, FEWER_RESAMPLES)
-    ends = sampled.value + exact, sampled.low + exact, sampled.high + exact
-    return Estimate(*ends, p=stratified_test([(one, other) for one, other in pairs.values()]))
+    weights, samples = zip(*drawn, strict=True)
+    sampled = mean_of_means(samples, weights, FEWER_RESAMPLES)
+    return Estimate(sampled.value + exact, sampled.low + exact, sampled.high + exact)
+
+
+class ValueOfParameter(NamedTuple):
+    """A value of a parameter that a study varies, with its settings."""
+
+    value: Any
+    labels: list[str]
+    """Labels of the settings that have this value. The labels of all values of a parameter are in
+    the same order of the values of the other parameters."""
+    at_best: str
+    """Label of the one whose other values are those of the best setting; empty if there is
+    none."""
+
+
+@lru_cache(maxsize=4)
+def values_of_parameters(study: Study) -> dict[str, list[ValueOfParameter]]:
+    """Return the values that are compared of each parameter that a study varies, by parameter.
+
+    Values are compared at equal values of the other parameters: settings count only if all values
+    of the parameter that are ranked at all are ranked with these other values. The list of a
+    parameter is empty if there are no such settings, or only one value is ranked. The dict is
+    empty if the study does not vary parameters, or fewer than two settings are ranked.
+    """
+    ranked = standings(study).query("why == ''").index
+    varied = study.varied[study.varied.index.isin(ranked)]
+    if len(varied) < 2:
+        return {}
+    found = dict[str, list[ValueOfParameter]]()
+    for parameter in map(str, varied.columns):
+        by_others, values = defaultdict[str, dict[str, str]](dict), dict[str, Any]()
+        for label, setting in zip(map(str, varied.index), varied.to_dict("records"), strict=True):
+            value = setting.pop(parameter)
+            values[repr(value)] = value
+            by_others[repr(setting)][repr(value)] = label
+        complete = [labels for labels in by_others.values() if len(labels) == len(values)]
+        at_best = next((labels for labels in complete if ranked[0] in labels.values()), {})
+        in_order = [*values]
+        if are_numbers(values.values()):
+            in_order.sort(key=values.__getitem__)
+        found[parameter] = [
+            ValueOfParameter(
+                values[text], [labels[text] for labels in complete], at_best.get(text, "")
+            )
+            for text in in_order
+            if complete and len(values) > 1
+        ]
+    return found
+
+
+def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
+    """Return the gap of each run, a mean over settings, by task and number of the run.
+
+    Runs with the same number have the same seed, so they are the unit of resampling. Numbers that
+    not all settings have are left out.
+    """
+    runs = compared_runs(study)
+    runs = runs[runs.label.isin(labels)]
+    by_run = runs.groupby(["task", "run"], sort=False).gap.agg(["mean", "size"])
+    return by_run["mean"][by_run["size"] == len(labels)]
+
+
+@table(
+    "Gap by value of each varied parameter, means over the values of the other parameters",
+    """
+    parameter    | parameter                                        |   | tex
+    value        | value                                            |   | tex
+    gap[]        | gap (%)                                          | 1 | tex
+    at_best      | gap at the best setting of the others (%)        | 1 | tex
+    difference[] | difference from the best value (%)               | 1 | tex
+    p_holm       | p (corrected)                                    | p | tex
+    default      | default
+    equal
+    settings     | settings
+    runs         | runs
+    """,
+)
+def list_parameters(study: Study) -> Rows:
+    """Yield the gap of each value of the parameters that the study varies.
+
+    The gap is a mean over the settings of a value (:func:`values_of_parameters`) and over tasks,
+    with its interval for other runs on the same tasks. ``at_best`` is the gap of the setting whose
+    other values are those of the best setting. ``difference`` and ``p_holm`` compare with the
+    value of the smallest gap, as in :func:`list_differences`; p is corrected over the values of the
+    parameter. ``default`` says what the default value is called. ``equal`` is True if at all values
+    each run of a setting has the same reward.
+    """
+    tasks, ranks, methods = ranked_tasks(study), standings(study), study.methods
+    for parameter, values in values_of_parameters(study).items():
+        samples = list[_Gaps]()
+        for value in values:
+            gaps = gaps_of_settings(study, value.labels)
+            by_task = [gaps[task].to_numpy(np.float64) for task in tasks if task in gaps]
+            is_random = any(methods.stochastic[value.labels])
+            samples.append(by_task if is_random else [float(of.mean()) for of in by_task])
+        if not values or len(samples[0]) < len(tasks):  # no run that all settings have
+            continue
+        estimates = [*map(_mean_of_gaps, samples)]
+        best = int(np.argmin([estimate.value for estimate in estimates]))
+        differences = [_difference_of_gaps(sample, samples[best]) for sample in samples]
+        p = holm([each.p for place, each in enumerate(differences) if place != best])
+        p.insert(best, math.nan)
+        base = str(methods.base[values[0].labels[0]])
+        default = study.declared[base].defaults.get(parameter)
+        same = _are_equal(study, [value.labels for value in values])
+        rows = zip(values, estimates, differences, p, strict=True)
+        for place, (value, estimate, difference, adjusted) in enumerate(rows):
+            runs = compared_runs(study)
+            runs = runs[runs.label.isin(value.labels)]
+            difference = Estimate(math.nan) if place == best else difference
+            entries: Row = {"parameter": parameter, "value": one_line(str(value.value))}
+            entries |= {**estimate.columns("gap"), **difference.columns("difference")}
+            entries["at_best"] = ranks.gap[value.at_best] if value.at_best else math.nan
+            entries |= {"p_holm": adjusted, "equal": same}
+            is_default = repr(value.value) == repr(default)
+            entries["default"] = default_name(base) * is_default
+            entries |= {"settings": len(value.labels), "runs": len(runs)}
+            yield f"{parameter} {value.value}", entries | run_ids(runs)
+
+
+def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
+    """Return True if each run has the same reward in all settings at the same place.
+
+    ``settings`` has the labels of each value of a parameter, in the same order of the other values.
+    """
+    by_run = compared_runs(study).set_index(["task", "run"])
+    for labels in zip(*settings, strict=True):
+        first, *others = (by_run.value[by_run.label == label].sort_index() for label in labels)
+        if not all(first.equals(other) for other in others):
+            return False
+    return True
 
 
 @table(

@@ -79,8 +79,9 @@ class Request(FileData):
     (Task); by default all tasks of the suite. On an instance, or a task of your own, that the suite
     lacks, all ``methods`` (by default those of the suite) are run that apply to it."""
     methods: tuple[str, ...] = ()
-    """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite.
-    Methods that the suite lacks are run on all tasks of the suite to which they apply."""
+    """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite,
+    which ``"*"`` names, too. Methods that the suite lacks are run on all tasks of the suite to
+    which they apply."""
     method_files: tuple[Path, ...] = ()
     """Files with your own methods. If neither ``methods`` nor the suite names a method of a file,
     all methods of the file run in addition to the other methods. A wildcard names all methods that
@@ -155,14 +156,17 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
     jobs = [*_suite_jobs(suite, request, registered, own, task_named, job)]
-    asked = {name: methods_named(name, registered) for name in request.methods}
+    of_suite = dict.fromkeys(planned.cell.method.name for planned in jobs)
+    asked = {
+        name: [*of_suite] if name == WILDCARD else methods_named(name, registered)
+        for name in request.methods
+    }
     asked |= {name: [name] for name in _unnamed_methods(suite, request, registered)}
     ids = dict.fromkeys(itertools.chain(*asked.values()))
     if not request.methods:
-        ids = dict.fromkeys(planned.cell.method.name for planned in jobs) | ids
+        ids = of_suite | ids
     methods = [registered[name] for name in ids]
     tasks = tasks_by_name([*(planned.cell.task for planned in jobs), *own.values()])
-    of_suite = {planned.cell.method.name for planned in jobs}
     cells = {(planned.cell.task.name, planned.cell.label) for planned in jobs}
     jobs += [
         job(task, method, world=world)
@@ -211,7 +215,10 @@ def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> li
     """
     files = {
         registered[method].where
-        for names in (request.methods, *(block.methods for block in suite.blocks))
+        for names in (
+            [name for name in request.methods if name != WILDCARD],
+            *(block.methods for block in suite.blocks),
+        )
         for name in names
         for method in methods_named(name, registered)
     }

@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import replace
 from itertools import zip_longest
 from pathlib import Path
+from shlex import quote
 
 from coartic.benchmarks.pool import Local
 from coartic.benchmarks.registry import Registry
@@ -28,9 +29,10 @@ def find_run(prefix: str, folder: Path) -> Row:
     Raises CoarticError if the prefix is empty, if no run or more than one run matches, or if the
     folder cannot be read.
     """
+    where = quote(str(folder))
     if not prefix or not set(prefix) <= set("0123456789abcdef-."):
         raise CoarticError(
-            f"{prefix!r} is not the beginning of a run id, such as 3f2a9c; `coartic list {folder}` "
+            f"{prefix!r} is not the beginning of a run id, such as 3f2a9c; `coartic list {where}` "
             "lists the ids"
         )
     with open_store(folder) as store:
@@ -38,7 +40,7 @@ def find_run(prefix: str, folder: Path) -> Row:
         if not ids:
             raise CoarticError(
                 f"{folder} has no run with an id that begins with {prefix!r}; "
-                f"`coartic list {folder}` lists the ids"
+                f"`coartic list {where}` lists the ids"
             )
         if len(ids) > 1:
             listed = ", ".join(ids[:4]) + (", ..." if len(ids) > 4 else "")

@@ -15,10 +15,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from coartic.analysis import mean
 from coartic.analysis.figures import dots, look_of, panels, style, styled
 
 Table = Callable[..., pd.DataFrame]
-"""Function that returns a stored table of a suite or a study by their names, in a world."""
+"""Function that returns a stored table of a suite or a study by their names, and by its world."""
 FAMILIES = ("one-armed", "two-armed", "aligned", "redundancy", "long")
 BLUE = look_of("dual-process/EC4")["color"]
 LEARNER, RANDOM = "dual-process (EC1, EC4)", "random-search"
@@ -29,16 +30,23 @@ METHODS = {
     RANDOM: ("random search", RANDOM),
 }
 """Name of the methods of finding 4, and the method that has their look."""
-TWO_WORLDS = {
-    "policy-gradient": "policy gradient",
-    "cma-es/bandit": "CMA-ES",
-    "dual-process (EC1-informed, EC4-informed)": "informed learner",
-    "hill-climbing spread=learned": "hill climbing, learned spread",
-    "hill-climbing": "hill climbing",
-    LEARNER: "learner",
-    RANDOM: "random search",
+INFORMED = "dual-process (EC1-informed, EC4-informed)"
+NOISE = "motor_noise=0.01"
+"""The world of the second ranking, in the names of stored tables."""
+FORMULA, REWARDS = style.GREEN, style.BLUE
+"""Colours of what a method knows: the reward as a formula, or the reward of each trial."""
+RANKED = {
+    "trajectory-optimisation/path-length": ("shortest-path plan", FORMULA),
+    "posture-qp/goals-ahead": ("posture QP, goals ahead", FORMULA),
+    "policy-gradient": ("policy gradient", REWARDS),
+    "cma-es/bandit": ("CMA-ES", REWARDS),
+    INFORMED: ("informed learner", REWARDS),
+    "hill-climbing spread=learned": ("hill climbing, learned spread", REWARDS),
+    "hill-climbing": ("hill climbing", REWARDS),
+    LEARNER: ("the paper's learner", REWARDS),
+    RANDOM: ("random search", REWARDS),
 }
-"""Methods that are drawn in two worlds: their names by their rows in the ranking."""
+"""Name and colour of the methods that are shown in two worlds."""
 NOTHING = (math.nan, math.nan, math.nan)
 _NUMBER = r"(−?\d+(?:\.\d+)?)"
 
@@ -117,41 +125,6 @@ def early_gain(table: Table, early_less_late: Callable[[str], dict[str, float]])
 
 
 @styled
-def two_worlds(table: Table) -> Figure:
-    """Draw the gaps of methods in two worlds: without motor noise, and with noise of 0.01."""
-    random = table("noise", "results").loc["all"].set_index("name")
-    rankings = [table("comparison", "ranking", world) for world in ("", "motor_noise=0.01")]
-    sides = {
-        "gap, the paper's four tasks (%)": [
-            [estimate(ranking.loc[method], "gap", 100) for method in TWO_WORLDS]
-            for ranking in rankings
-        ],
-        "gap, 200 random tasks (%)": [
-            [estimate(random.loc[name], case) for name in TWO_WORLDS.values()]
-            for case in ("exact", "practised")
-        ],
-    }
-    figure, places = panels((1, len(sides)), (style.TWO, 2.9))
-    heights = -np.arange(len(TWO_WORLDS))
-    worlds = (("without noise", 0.15, BLUE), ("with motor noise 0.01", -0.15, "white"))
-    for axes, (label, estimates) in zip(places, sides.items(), strict=True):
-        for (world, shift, face), in_world in zip(worlds, estimates, strict=True):
-            values, lows, highs = zip(*in_world, strict=True)
-            axes.hlines(heights + shift, lows, highs, linewidth=1.5, alpha=0.6, color=BLUE)
-            marks = {"marker": "o", "markersize": 4.5, "color": BLUE, "markerfacecolor": face}
-            axes.plot(values, heights + shift, label=world, linestyle="", **marks)
-        axes.set_xlabel(label)
-        axes.set_xlim(left=0)
-        axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
-        for height in range(1, len(TWO_WORLDS)):
-            axes.axhline(0.5 - height, color=style.GREY, alpha=0.3, linewidth=0.5)
-        names = [*TWO_WORLDS.values()] if axes is places[0] else [""] * len(TWO_WORLDS)
-        style.name_rows(axes, names)
-    style.legend(figure, places[0].get_legend_handles_labels()[0], 2)
-    return figure
-
-
-@styled
 def gaps(table: Table) -> Figure:
     """Draw finding 4: gaps on the paper's tasks and in each family of random tasks."""
     ranking, families = table("comparison", "ranking"), table("families", "family-gaps")
@@ -176,6 +149,45 @@ def gaps(table: Table) -> Figure:
         axes.axhline(0.5 - height, color=style.GREY, alpha=0.3, linewidth=0.5)
     style.name_rows(axes, names)
     style.legend(figure, axes.get_legend_handles_labels()[0], len(METHODS))
+    return figure
+
+
+def over_random_tasks(tasks: pd.DataFrame) -> pd.DataFrame:
+    """Return the mean gap of each method over the random tasks with up to eight goals."""
+    drawn = tasks[~tasks.index.str.startswith("many-goals/")]
+    labels = drawn.method.replace(
+        {r"^dual-process/EC[14]$": LEARNER, r"^dual-process/.*-informed$": INFORMED}, regex=True
+    )
+    means = {label: mean(gaps).columns("gap") for label, gaps in drawn.gap.groupby(labels)}
+    return pd.DataFrame.from_dict(means, orient="index")
+
+
+@styled
+def two_worlds(table: Table) -> Figure:
+    """Draw the gap of each method without noise and with it, each practised and judged there."""
+    worlds = {
+        "the paper's four tasks": [table("comparison", "ranking", world) for world in ("", NOISE)],
+        "200 random tasks": [
+            over_random_tasks(table("families", "by-task", world)) for world in ("", NOISE)
+        ],
+    }
+    figure, both = panels((1, 2), (style.TWO, 3.4))
+    labels = {"without noise": {}, "with motor noise 0.01": {"markerfacecolor": "white"}}
+    for axes, (title, tables) in zip(both, worlds.items(), strict=True):
+        for (label, more), gaps_of, shift in zip(
+            labels.items(), tables, (0.14, -0.14), strict=True
+        ):
+            for place, (method, (_, color)) in enumerate(RANKED.items()):
+                if method not in gaps_of.index:
+                    continue
+                value, low, high = estimate(gaps_of.loc[method], "gap", 100)
+                axes.hlines(shift - place, low, high, color=color, linewidth=1.2)
+                axes.plot(value, shift - place, marker="o", color=color, markersize=4.5, **more)
+            axes.plot([], [], marker="o", linestyle="", color=style.GREY, label=label, **more)
+        axes.set(title=title, xlabel="gap (%)", xlim=(0, None))
+        axes.grid(axis="x", color=style.GREY, alpha=0.3, linewidth=0.5)
+        style.name_rows(axes, [name if axes is both[0] else "" for name, _ in RANKED.values()])
+    style.legend(figure, both[0].get_legend_handles_labels()[0], 2)
     return figure
 
 

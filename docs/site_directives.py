@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from inspect import getdoc
@@ -111,7 +112,7 @@ def tasks() -> Iterator[str]:
 def methods(group: str) -> Iterator[str]:
     """Yield the table of the built-in methods that use the reward of trials, its ``formula``, or
     ``none`` of it, with the first sentence of their classes and a letter for each information."""
-    letters = dict(zip(Information, "GFJATUKRS", strict=True))
+    letters = dict(zip(Information, "GFJATUKNRS", strict=True))
 
     def group_of(uses: Sequence[Information]) -> str:
         if Information.REWARD_BY_TRIAL in uses:
@@ -124,7 +125,7 @@ def methods(group: str) -> Iterator[str]:
             title_of(name),
             f"`{name}`",
             (getdoc(built_in_methods()[name]) or "").partition("\n\n")[0],
-            " ".join(sorted(map(letters.get, uses), key="GFJATUKRS".find)),
+            " ".join(sorted(map(letters.get, uses), key="GFJATUKNRS".find)),
         )
         for name, uses in declared.items()
         if group_of(uses) == group
@@ -184,6 +185,14 @@ def play() -> Iterator[str]:
     yield '<p><a href="play.html">Open this on its own page</a>; with your own task:'
     yield " <code>coartic play TASK</code></p>"
     yield "```"
+
+
+def first_screen() -> Iterator[str]:
+    """The first screen of README, to the section with the commands, with links from the site."""
+    text = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+    _, opening, first, *_ = re.split(r"(?m)^# .*\n|^(?=## )", text)
+    text = re.sub(r"(?<=\]\()studies/(\w+)/README\.md", r"studies/\1.md", opening + first)
+    yield re.sub(r"(?m)^## ", "### ", re.sub(r"(?<=\]\()docs/", "", text))
 
 
 def finish(app: Sphinx, failure: Exception | None) -> None:

@@ -228,6 +228,26 @@ def test_workers_round_alike_and_import_nothing_from_the_working_folder(tmp_path
 
 
 @pytest.mark.process
+def test_the_template_of_a_planner_keeps_the_rules(coartic, tmp_path):
+    file = tmp_path / "my_plan.py"
+    code, text, _ = coartic("new", "my-plan", "--planner", "--out", file)
+    assert code == 0
+    assert f"coartic check my-plan --method-file {file}" in text
+    code, text, error = coartic("check", "my-plan", "--method-file", file)
+    assert code == 0, text + error
+    assert "9 of 9 checks passed" in text
+
+
+def test_the_report_of_shipped_results_goes_where_git_ignores_it(coartic, monkeypatch, tmp_path):
+    written = []
+    monkeypatch.setattr(build, "write_report", lambda _, out, **__: (written.append(out) or [], {}))
+    monkeypatch.chdir(tmp_path)
+    assert coartic("report", "shipped")[0] == 0
+    assert written == [Path("results/shipped/report")]
+    assert "/results/" in (ROOT / ".gitignore").read_text().split()
+
+
+@pytest.mark.process
 def test_what_a_method_prints_and_where_it_crashes(tmp_path):
     text = Path(template.__file__).read_text().replace("def optimise", "def unused")
     body = """

@@ -37,6 +37,20 @@ def test_tasks_and_methods_given_twice_add_up(coartic, monkeypatch):
     assert len(cells) == 3 * 2
 
 
+@pytest.mark.usefixtures("here")
+def test_a_star_stands_for_the_methods_of_the_command():
+    """So that ``--methods '*,optimum/search'`` adds the search, whatever the suite and files."""
+    path = Path("g.toml")
+    block = 'tasks = ["ascending"]\nmethods = ["hill-climbing", "dual-process/EC1"]'
+    path.write_text(f'title = "G"\ndescription = "G."\nruns = 2\n[[blocks]]\n{block}', "utf-8")
+    usual, more = (
+        {job.cell.method.name for job in plan_suite(path, method_files=["mine.py"], **named)}
+        for named in ({}, {"methods": ["*", "optimum/search"]})
+    )
+    assert usual == {"hill-climbing", "dual-process/EC1", "first", "second"}
+    assert more == usual | {"optimum/search"}
+
+
 TRIALS = {
     "a grid": 'methods = ["random-search"]\ngrid = {trials = [100, 800]}',
     "two blocks": 'methods = ["random-search"]\nparameters = {trials = 100}\n[[blocks]]\n'

@@ -119,12 +119,26 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
     page = settled(visited(written(tmp_path, trials), reduced_motion="reduce"))
     assert trials_made(page) == trials
     postures, before, after = [], [], []  # postures at the goal that they share
-    for role, name in zip(("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
+    lists = page.locator("[data-is=movements] ol").all()
+    for shown, role, name in zip(lists, ("Blue", "Orange"), pages.UP_OR_DOWN, strict=True):
         runs, due = practised(name, "EC1", trials)
         before.append(ticks(page, role, "before"))
         after.append(ticks(page, role))
         assert before[-1] == -learn(name, "EC1", seed=0, trials=1).reward
         assert after[-1] == due
+        # A bar for each movement of the median run, over that of the first trial.
+        now, first = (
+            [*run.execute().ticks_by_goal()]
+            for run in (
+                sorted(runs, key=lambda run: run.reward)[2],
+                learn(name, "EC1", seed=0, trials=1),
+            )
+        )
+        words = [line.split()[-2:] for line in shown.locator("li").all_inner_texts()]
+        assert [int(count) for count, _ in words] == now
+        more = [int(change.strip("()").replace("−", "-").replace("±", "")) for _, change in words]
+        assert more == [count - each for count, each in zip(now, first, strict=True)]
+        assert more[0] > 0 > more[1]
         postures.append(np.array([run.execute().configurations[0] for run in runs]))
     learned = distance_of_means(*postures)
     assert learned > 0.1
@@ -144,6 +158,35 @@ def test_coarticulation_appears_with_practice(visited, tmp_path):
     assert reset.is_disabled()
 
 
+ACT = """<script>
+  const figure = document.getElementById("play");
+  const button = figure.querySelector("[data-is=play]");
+  const act = (kind) => button.dispatchEvent(new Event(kind, { bubbles: true }));
+  ["pointerdown", "click"].forEach(act);
+  const count = (frames) => {
+    if (figure.matches("[data-settled]")) window.frames_until_settled = frames;
+    else requestAnimationFrame(() => count(frames + 1));
+  };
+  count(0);
+</script>"""
+
+
+def test_practice_goes_on_while_the_movement_is_shown(visited, tmp_path):
+    """The trials shown grow by 5 % a frame, from a twentieth of a trial. If the button ended this,
+    the page would settle as soon as all trials are made."""
+    address = written(tmp_path, TRIALS).partition("#")[0]
+    with (tmp_path / "play.html").open("a", encoding="utf-8") as file:
+        file.write(ACT)
+    page = visited(address)
+    page.wait_for_function("window.frames_until_settled")
+    assert page.evaluate("window.frames_until_settled") > np.log(TRIALS / 0.05) / np.log(1.05)
+    assert trials_made(page) == TRIALS
+    button = page.get_by_role("button", name="Pause")
+    button.click()
+    page.evaluate(DRAWN)
+    assert page.get_by_role("button", name="Show movement").is_visible()  # and stays so
+
+
 def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     page = opened("preset=3&who=you")
     assert ticks(page, "You") == ticks(page, "Corrective process alone")
@@ -156,7 +199,7 @@ def test_postures_by_hand_have_their_true_score_and_are_in_the_link(opened):
     page.mouse.up()
     page.get_by_label("Place it at").select_option("2")
     page.get_by_label("hit by the").select_option("0")
-    page.get_by_role("button", name="Box").focus()
+    page.get_by_role("button", name="Base").focus()
     page.keyboard.press("ArrowLeft")
     page.keyboard.press("ArrowUp")  # it is on a rail
     postures = re.search(r"own=([^&]+)", settled(page).url)[1]

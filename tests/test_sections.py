@@ -7,6 +7,7 @@ has no spread.
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,7 @@ from coartic import CoarticError, corrective_trial
 from coartic.analysis import FIGURES, TABLES, runtimes
 from coartic.analysis.figures.drawings import learning_curves
 from coartic.analysis.methods import BY_FORMULA, BY_TRIAL, LEARNERS, WITHOUT_REWARD
+from coartic.analysis.report.player import player
 from coartic.analysis.study import Study, solved
 from tests.support.made_up import MadeUp, made_up_optima, row, runs_of, study_of
 
@@ -199,3 +201,10 @@ def test_ticks_saved_are_those_of_the_movements_less_those_of_the_corrective_pro
     assert len(plans) > 0
     alone = Study(traced.folder, traced.plan, traced.made_with, plans)
     assert FIGURES["saved"](alone) is None
+
+
+@pytest.mark.parametrize(("task", "learner"), [(ONE, EC1), (TWO, EC4)])
+def test_the_film_begins_with_the_learner_for_the_arms_of_the_task(traced, task, learner):
+    """As the page of `coartic play` does, also where another condition ran before it (EC3)."""
+    alone = replace(traced, stored=traced.stored[traced.stored.task == task])
+    assert f'"first":{{"who":"{learner}"}}' in player(alone)

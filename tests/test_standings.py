@@ -3,9 +3,11 @@
 import itertools
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from coartic import CoarticError
@@ -15,7 +17,7 @@ from coartic.analysis.methods import (
     WITHOUT_REWARD,
     headline_methods,
 )
-from coartic.analysis.report.sections import SECTIONS, finding
+from coartic.analysis.report.sections import SECTIONS, failed_methods, finding
 from coartic.analysis.statistics import holm, stratified_test
 from coartic.analysis.study import Study
 from coartic.analysis.tables import shown_columns
@@ -184,7 +186,7 @@ def test_methods_are_ranked_and_compared_with_equal_trials(trials, of_command, b
     assert {*TABLES["not-ranked"](seen).index} == unlike
     alike = {name for name, made in trials.items() if made == trials["mine"]} - {"mine"}
     assert {*TABLES["differences"](seen).method} == alike
-    lines = [line for line in said(seen) if "percentage points" not in line]
+    lines = [line for line in said(seen) if " points " not in line]
     assert any("mine" in line for line in lines) == (not why)
 
 
@@ -236,6 +238,26 @@ def test_an_own_method_is_compared_on_the_tasks_that_it_solved():
     assert (both.difference_low[both.against == "better"] > 0).all()
     # Runs with the same seeds are not matched.
     assert (both.difference_low[both.against == "same"] < 0).all()
+
+
+def test_the_sentence_says_how_far_an_own_method_is_behind_or_ahead():
+    """Points are positive, with their intervals, and p is said to be corrected, once."""
+    ten = {cell: (rewards * 3)[:10] for cell, rewards in CMA.items()}
+    seen = study(TEN | ten | strangers(("mine", 4), runs=10))
+    rows = TABLES["differences"](seen).set_index("method").difference
+    (line,) = [line for line in said(seen) if " points " in line]
+    (cma, learner) = (number(100 * abs(rows[name]), 1) for name in ("cma-es/bandit", BOTH))
+    assert line.startswith(f"“mine” is {cma} [")
+    assert re.search(rf"{cma} \[\d[^−]*\] points behind CMA-ES \(p.<.0.001\), {learner} \[", line)
+    assert "] ahead of the learner (EC1, EC4) (p" in line
+    assert line.endswith("p is corrected over 2 comparisons, intervals are not.")
+
+
+def test_methods_with_failed_runs_are_named_first():
+    seen = study(TEN | {("ascending", "flaky"): [-300, None], ("two-armed-1", "flaky"): [-480] * 2})
+    assert failed_methods(seen) == ["1 of 4 runs failed (flaky): it is not ranked."]
+    assert "only ranked method using" in said(seen)[0]
+    assert failed_methods(study(TEN)) == []
 
 
 def test_all_methods_are_compared_with_a_method_of_choice():
@@ -333,67 +355,144 @@ def grid(gap, spread=(-1, 0, 0, 0, 1), **values):
 NOISE, EPSILON = [0.05, 0.02, 0.1], [0.2, 0.1]
 
 
-def test_two_parameters_are_answered_with_a_line_for_each_value_of_the_second():
-    """Names have the paper's values, too, and an interaction is said that the runs decide."""
+def by_value(seen):
+    """The rows of table ``parameters``, by parameter and value."""
+    return TABLES["parameters"](seen).set_index(["parameter", "value"])
+
+
+def test_each_parameter_has_a_sentence_and_a_panel_with_its_means_over_the_others():
+    """Of two, three or more; values in the order of their size, the paper's marked."""
+    noise = [0.05, 0.02, 0.1]
     seen = grid(
-        lambda noise, epsilon: int(100 * noise) + (epsilon == 0.1) * (20 if noise == 0.1 else 3),
-        noise_sd=NOISE, epsilon=EPSILON,
+        lambda noise, epsilon, width: int(100 * noise) + 40 * (epsilon == 0.1),
+        noise_sd=noise, epsilon=EPSILON, width=[1, 2],
     )  # fmt: skip
     titles = seen.methods.title
-    assert titles[EC1] == "learner EC1 (σ 0.05, ε 0.2, the paper's)"
-    assert titles[f"{EC1} epsilon=0.1"] == "learner EC1 (σ 0.05, ε 0.1)"
-    assert [*seen.varied.columns] == ["noise_sd", "epsilon"]
-    (answer,) = said(seen)
-    assert "best setting is learner EC1 (σ 0.02, ε 0.2): " in answer
-    assert "effect of noise_sd depends on epsilon" in answer
-    assert answer.count(titles[EC1]) == 1
+    assert titles[EC1] == "learner EC1 (noise_sd 0.05, epsilon 0.2, width 1, the paper's)"
+    rows = by_value(seen)
+    for value in noise:
+        mean = (100 * value + 20) / 292
+        assert rows.gap["noise_sd", str(value)] == pytest.approx(mean)
+        assert rows.at_best["noise_sd", str(value)] == pytest.approx(100 * value / 292)
+    assert rows.gap["epsilon"].to_dict() == pytest.approx(
+        {"0.2": 17 / 3 / 292, "0.1": 137 / 3 / 292}
+    )
+    assert rows.equal.groupby("parameter").all().to_dict() == {
+        "noise_sd": False, "epsilon": False, "width": True,
+    }  # fmt: skip
+    best, *effects = said(seen)[:4]
+    assert best.startswith("The best setting of the learner EC1 is noise_sd 0.02, epsilon 0.2, ")
+    assert "cannot be told apart from noise_sd 0.02, epsilon 0.2, width 2" in best
+    assert "not made of the best value" not in best
+    assert effects == [
+        "noise_sd, 0.02 to 0.1: changes the gap by 2.7 points on average over the other "
+        "parameters, and by 2.7 at their best values; it is smallest at 0.02.",
+        "epsilon, 0.1 and 0.2: changes the gap by 13.7 points on average over the other "
+        "parameters, and by 13.7 at their best values; it is smallest at 0.2.",
+        "width, 1 and 2: changes nothing; every run has the same reward at each value.",
+    ]
     plot = FIGURES["ranking"](seen)
-    (axes,) = plot.figure.axes
-    assert axes.get_xlabel() == "noise_sd"
-    assert axes.get_xscale() == "linear"
-    drawn = {
-        line.get_label(): line.get_ydata().tolist()
-        for line in axes.lines
-        if len(line.get_xdata()) == 3
-    }
-    gaps = plot.data.set_index(["line", "value"]).gap
-    assert drawn == {str(line): pytest.approx([100 * gaps[line, noise] for noise in sorted(NOISE)])
-                     for line in EPSILON}  # fmt: skip
+    axes = plot.figure.axes[:3]
+    assert [panel.get_xlabel() for panel in axes] == ["noise_sd", "epsilon", "width"]
+    for panel in axes:
+        gaps = rows.gap[panel.get_xlabel()]
+        drawn = next(line for line in panel.lines if len(line.get_xdata()) == len(gaps))
+        assert drawn.get_ydata() == pytest.approx(100 * gaps.to_numpy())
+        assert [text.get_text() for text in panel.get_xticklabels()] == [*gaps.index]
+    assert "noise_sd 0.02" in plot.alt
 
 
-def test_settings_that_gain_nothing_are_counted():
+def test_the_default_of_a_method_from_a_file_is_named_and_drawn():
+    """Stored runs leave most parameters out that have their default."""
+    rows = [
+        run for sd in (0.01, 0.03, 0.1)
+        for run in runs_of("ascending", "mine", [-300 - int(abs(100 * sd - 3)) - k % 2
+                                                 for k in range(6)],
+                           setting=f"sd={sd}" * (sd != 0.03),
+                           parameters=json.dumps({} if sd == 0.03 else {"sd": sd}))
+    ]  # fmt: skip
+    seen = study_of(rows, optima=made_up_optima("ascending"))
+    plan = [
+        replace(job, cell=replace(job.cell, method=replace(job.cell.method, defaults={"sd": 0.03})))
+        for job in seen.plan
+    ]
+    changed = Study(seen.folder, plan, seen.made_with, seen.stored)
+    seen = MadeUp(changed, optima=seen.optima, rewards=seen.rewards)
+    assert seen.methods.title["mine"] == "mine (sd 0.03, default)"
+    assert seen.varied.sd.tolist() == [0.01, 0.03, 0.1]
+    (best, effect) = said(seen)[:2]
+    assert best.startswith("The best setting of “mine” is sd 0.03: its gap to the optimum is 2.9")
+    assert effect == "sd, 0.01 to 0.1: changes the gap by 2.4 points; it is smallest at 0.03."
+    (axes,) = FIGURES["ranking"](seen).figure.axes
+    names = [text.get_text() for text in axes.get_xticklabels()]
+    assert names == ["0.01", "0.03\n(default)", "0.1"]
+    assert len(axes.lines[0].get_xdata()) == 3
+
+
+def test_opposite_effects_are_not_lost_in_their_mean():
+    """What is best depends on the other parameter: means are equal, single settings are not."""
+    seen = grid(
+        lambda noise, epsilon: 5 + 30 * ((noise == 0.02) == (epsilon == 0.1)),
+        noise_sd=NOISE[:2], epsilon=EPSILON,
+    )  # fmt: skip
+    effects = said(seen)[1:3]
+    for name, other, line in zip(["noise_sd", "epsilon"], ["epsilon", "noise_sd"], effects,
+                                 strict=True):  # fmt: skip
+        assert line.startswith(name)
+        assert "no difference is shown" in line
+        assert f"0.0 points on average over {other}, and by 10.3 at its best value" in line
+
+
+def test_the_sentence_says_if_the_best_setting_is_not_made_of_the_best_values():
+    seen = grid(
+        lambda noise, epsilon: 2 if (noise, epsilon) == (0.1, 0.1) else 40 * (noise == 0.1) + 8,
+        noise_sd=NOISE[1:], epsilon=EPSILON,
+    )  # fmt: skip
+    best, *_ = said(seen)
+    assert "is noise_sd 0.1, epsilon 0.1" in best
+    assert "on average over the others, noise_sd is best at 0.02." in best
+
+
+def test_values_are_compared_at_equal_values_of_the_other_parameters():
+    """Where a setting is missing, as if parameters were varied one at a time, or fails."""
+    rows = []
+    for noise, epsilon, cost in ((0.05, 0.2, 300), (0.1, 0.2, 320), (0.05, 0.1, 310)):
+        parameters = {"noise_sd": noise, "epsilon": epsilon}
+        rows += runs_of("ascending", EC1, [-cost - k for k in range(5)],
+                        setting=f"noise_sd={noise}, epsilon={epsilon}",
+                        parameters=json.dumps(parameters))  # fmt: skip
+    seen = study_of(rows, optima=made_up_optima("ascending"))
+    gaps = by_value(seen).gap
+    assert gaps["noise_sd"].to_dict() == pytest.approx({"0.05": 10 / 292, "0.1": 30 / 292})
+    assert gaps["epsilon"].to_dict() == pytest.approx({"0.2": 10 / 292, "0.1": 20 / 292})
+    apart = study_of([*rows[5:]], optima=made_up_optima("ascending"))
+    assert not len(TABLES["parameters"](apart))
+    assert all("not compared" in line for line in said(apart)[1:3])
+
+
+def test_intervals_and_tests_of_values_resample_runs_with_all_their_settings():
+    """Runs with the same number are one unit: equal settings do not make more of them."""
+    spread = (-1, 2, 4, 7, 8, 13)
+    one = grid(lambda noise: int(100 * noise), spread, noise_sd=NOISE)
+    two = grid(lambda noise, width: int(100 * noise), spread, noise_sd=NOISE, width=[1, 2])
+    columns = ["gap", "gap_low", "gap_high", "p_holm"]
+    pd.testing.assert_frame_equal(
+        by_value(two).loc["noise_sd", columns], by_value(one)[columns].droplevel(0)
+    )
+
+
+def test_settings_behind_the_corrective_process_are_counted():
     """-319 is the reward of the corrective process alone: 27 ticks from the optimum."""
     seen = grid(
-        lambda noise, epsilon: (27 if noise > 0.02 else 20) + 3 * (epsilon == 0.1),
-        noise_sd=NOISE, epsilon=EPSILON,
+        lambda noise, epsilon: (40 if noise > 0.05 else 28 if noise > 0.02 else 20),
+        (-4, -3, 0, 3, 4), noise_sd=NOISE, epsilon=EPSILON,
     )  # fmt: skip
     seen.runs["corrective_best"] = -319.0
-    (answer,) = said(seen)
-    assert "4 of 6 settings gain nothing" in answer
-    assert "depends on" not in answer  # effects add up
-
-
-def test_parameters_of_many_values_are_a_heat_map():
-    values = [0.05, 0.01, 0.1, 0.2, 0.5]
-    seen = grid(lambda noise, epsilon: 5 + int(10 * noise + 20 * epsilon), [0], noise_sd=values,
-                epsilon=values)  # fmt: skip
-    plot = FIGURES["ranking"](seen)
-    (axes,) = plot.figure.axes
-    (cells,) = axes.collections
-    shown = cells.get_array().reshape(5, 5)
-    gaps = plot.data.set_index(["line", "value"]).gap
-    for (row, line), (column, value) in itertools.product(enumerate(sorted(values)), repeat=2):
-        assert shown[row, column] == pytest.approx(100 * gaps[line, value])
-    assert {text.get_text() for text in axes.texts} == {number(gap, 1) for gap in shown.flat}
-
-
-def test_more_parameters_have_a_table_and_the_sentence_says_why():
-    seen = grid(lambda *values: int(100 * sum(values)), [0], noise_sd=NOISE[:2], epsilon=EPSILON,
-                width=[1, 2])  # fmt: skip
-    assert FIGURES["ranking"](seen) is None
-    assert len(TABLES["ranking"](seen)) == 8
-    (answer,) = said(seen)
-    assert "no picture" in answer
+    *_, last = said(seen)
+    assert last == (
+        "4 of 6 settings stay behind the corrective process with its best hands, 2 of them within "
+        "chance."
+    )
 
 
 def test_a_parameter_that_is_not_run_on_all_tasks_is_not_varied():

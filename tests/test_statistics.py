@@ -217,17 +217,3 @@ def test_the_least_number_of_values_on_both_sides():
         assert math.isnan(hypotheses.stratified_test(strata)) == few
     assert math.isnan(hypotheses.bootstrap_test([1.0], 0).p)
     assert not math.isnan(hypotheses.bootstrap_test(four[:2], 0).p)
-
-
-def test_the_interaction_of_two_factors_has_its_level_and_is_found():
-    """With effects of both factors, unequal spread and skew, on two tasks."""
-    rng, p, planted, studies = np.random.default_rng(4), [], [], 40
-    for _ in range(studies):
-        draws = [[[rng.exponential(1 + i, size=5) + i + 2 * j for _ in range(2)]
-                  for j in range(2)] for i in range(3)]  # fmt: skip
-        p.append(hypotheses.interaction_test(draws))
-        draws[0][0] = [runs + 8 for runs in draws[0][0]]
-        planted.append(hypotheses.interaction_test(draws))
-    assert np.sum(np.array(p) < 0.05) <= stats.binom.ppf(0.999, studies, 0.05)
-    assert np.mean(np.array(planted) < 0.05) > 0.9
-    assert math.isnan(hypotheses.interaction_test([[[np.arange(4.0)]] * 2] * 2))

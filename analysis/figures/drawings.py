@@ -13,9 +13,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
 from coartic import Task
@@ -58,10 +57,13 @@ from coartic.analysis.statistics import other_tasks
 from coartic.analysis.study import Study, solved
 from coartic.analysis.tables import (
     by_family,
+    gaps_of_settings,
     list_contexts,
+    list_parameters,
     list_runtimes,
     list_saved,
     on_instances,
+    values_of_parameters,
 )
 from coartic.analysis.words import capital, interval, listed, marked, number, titled_apart
 from coartic.estimates import FEWEST, Estimate
@@ -73,119 +75,107 @@ from coartic.tasks.task import shipped_tasks
 
 @figure("Gap to the best reward", "Ticks of the mean beyond the {reference}, in per cent of it")
 def draw_ranking(study: Study) -> Parts | None:
-    """Draw the gap of each ranked method, or of each setting if the study varies parameters.
+    """Draw the gap of each ranked method, or of each value of the parameters that a study varies.
 
-    Returns None if no method has a gap, and if more than two parameters vary. If fewer than two
-    settings have a gap, the gaps of ranked methods are drawn.
+    Returns None if no method has a gap. If fewer than two settings have a gap, the gaps of ranked
+    methods are drawn.
     """
-    if len(study.varied.columns) > 2:
+    return _draw_parameters(study) or _draw_gaps(study)
+
+
+def _draw_parameters(study: Study) -> Parts | None:
+    """Draw gaps by the values of the parameters that the study varies, a panel for each parameter.
+
+    A panel has the means of table ``parameters``. If several parameters vary, it also has the gaps
+    at the best setting of the others; if only one varies, the gaps on each task. The values of an
+    axis are to scale if they are numbers, on a logarithmic axis if they span a factor of ten.
+    Returns None if no values can be compared.
+    """
+    rows, tasks, values = list_parameters(study), ranked_tasks(study), values_of_parameters(study)
+    if not len(rows):
         return None
-    return _draw_settings(study) or _draw_gaps(study)
-
-
-def _draw_settings(study: Study) -> Parts | None:
-    """Draw gaps by the values of the one or two parameters that the study varies.
-
-    The first parameter is on the x axis; each value of the second has a line. If both have at least
-    five values, the gaps are the cells of a heat map. Returns None if fewer than two settings have
-    a gap.
-    """
-    rows, tasks = standings(study).query("why == ''"), ranked_tasks(study)
-    varied = study.varied[study.varied.index.isin(rows.index)]
-    if len(varied) < 2:
-        return None
-    first, *others = varied.columns
-    rows = rows.loc[varied.index].reset_index(names="method")
-    rows = rows.assign(value=[*varied[first]], line=[*varied[others[0]]] if others else "")
-    drawing, (axes,) = style.panels((1, 1), (style.TWO, 2.6))
-    axes.set_xlabel(first)
-    if others and rows.line.nunique() >= 5:
-        more = _draw_cells(axes, rows)
-        axes.set_ylabel(others[0])
-    else:
-        more = _draw_lines(study, axes, rows, *others)
-        axes.set_ylabel(f"gap to the {reference(study, tasks)} (%)")
-    words = spoken(study, rows.assign(gap=100 * rows.gap), "{title} {gap:.1f} %")
-    alt = f"Gap to the {reference(study, tasks)} by setting: {words}."
-    more = " Means over all tasks." * (len(tasks) > 1) + more
-    return drawing, rows, alt, f", by the values that vary. n = {{n}} runs of a setting.{more}"
-
-
-def _draw_lines(study: Study, axes: Axes, rows: pd.DataFrame, other: str = "") -> str:
-    """Draw gaps by ``value``, with a line for each ``line``, a value of the parameter ``other``.
-
-    The axis is logarithmic if the values are numbers that span a factor of ten or more. If only one
-    parameter varies, the gaps on each task are drawn, too. Returns further sentences of the
-    caption.
-    """
-    values, tasks = [*dict.fromkeys(rows.value)], ranked_tasks(study)
-    is_number = are_numbers(values)
-    places = np.array(values if is_number else range(len(values)), dtype=np.float64)
-    if is_log := bool(is_number and places[0] > 0 and places[-1] >= 10 * places[0]):
-        axes.set_xscale("log")
-    papers = {*rows.value[rows.is_learner & (rows.setting == "")]} if not other else set()
-    names = [f"{value:g}" if is_number else str(value) for value in values]
-    axes.set_xticks(places, [name + "\n(the paper's)" * (value in papers)
-                             for name, value in zip(names, values, strict=True)])  # fmt: skip
-    axes.set_xticks([], minor=True)
-    axes.margins(x=0.08)
-    lines = [*rows.groupby("line", sort=False)]
-    is_few = False
-    for place, (line, of_line) in enumerate(lines):
-        at = of_line.value.map(dict(zip(values, places, strict=True))).to_numpy(np.float64)
-        share = 0.01 * (place - (len(lines) - 1) / 2)  # of the axis, so that no intervals overlap
-        at = at * (places[-1] / places[0]) ** share if is_log else at + share * np.ptp(places)
-        color, marker = style.PALETTE[place], "osD^"[place]
-        look: Any = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.6}
-        drawn = of_line.assign(x=at)
-        style.means(axes, drawn, x="x", y="gap", scale=100, bars=1.6, label=str(line), **look)
-        for x, row in zip(at, of_line.to_dict("records"), strict=True):
-            gaps = _gaps_of_few_runs(study, row)
-            axes.plot([x] * len(gaps), gaps, ".", **_FEW, color=color)
-            is_few |= bool(gaps)
-    each_task = tasks if 1 < len(tasks) <= 8 and not other else ()
-    gaps_on = [runs_on(study, method, tasks).groupby("task").gap.mean() for method in rows.method]
-    for task in each_task:
-        gaps = [100 * by_task[task] for by_task in gaps_on]
-        axes.plot(places, gaps, color=style.GREY, linewidth=0.8, zorder=1)
-        text: Any = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
-        axes.annotate(marked(study.tasks[task]), (places[-1], gaps[-1]), color=style.GREY, **text)
-    axes.set_ylim(bottom=min(0, axes.get_ylim()[0]))
-    if other:
-        axes.legend(title=other)
-    return (
-        " Thin: the gap on each." * bool(each_task)
-        + f" Points: runs, if there are fewer than {FEWEST}." * is_few
-        + f" Lines at the means: {style.COVERAGE} bootstrap intervals over runs."
+    shown = [*dict.fromkeys(rows.parameter)]
+    shape = style.grid(len(shown))
+    size = (style.TWO if len(shown) > 1 else style.ONE), 2.1 * shape[0] + 0.2
+    drawing, panels = style.panels(shape, size, len(shown), style.LEAST_SMALL_PANEL, sharey=True)
+    is_alone, is_few = len(values) == 1, False
+    thin: Any = {"color": style.GREY, "linewidth": 0.8, "zorder": 1}
+    for place, (axes, parameter) in enumerate(zip(panels, shown, strict=True)):
+        of_parameter = rows[rows.parameter == parameter]
+        at, is_log = _places_of([value.value for value in values[parameter]])
+        if is_log:
+            axes.set_xscale("log")
+        is_default = of_parameter.default != ""
+        names = of_parameter.value + ("\n(" + of_parameter.default + ")").where(is_default, "")
+        axes.set_xticks(at, names)
+        axes.set_xticks([], minor=True)
+        axes.margins(x=0.1)
+        look: Any = {"color": style.BLUE, "markersize": 5, "linewidth": 1.6}
+        style.means(axes, of_parameter.assign(x=at), x="x", y="gap", scale=100, bars=1.6, **look)
+        axes.plot(at[is_default], 100 * of_parameter.gap[is_default], "o", markersize=8,
+                  markerfacecolor="none", color=style.INK)  # fmt: skip
+        if not is_alone:
+            axes.plot(at, 100 * of_parameter.at_best, "--", **thin)
+        by_value = [gaps_of_settings(study, value.labels) for value in values[parameter]]
+        for x, gaps in zip(at, by_value, strict=True):
+            few = 1 < int(gaps.groupby("task").size().min()) < FEWEST
+            by_run = 100 * gaps.groupby("run").mean() if few else gaps[:0]
+            axes.plot([x] * len(by_run), by_run, ".", **_FEW, color=style.BLUE)
+            is_few |= few
+        if is_alone and 1 < len(tasks) <= 8:
+            by_task = pd.DataFrame([100 * gaps.groupby("task").mean() for gaps in by_value])
+            axes.plot(at, by_task[[*tasks]], **thin)
+            ends = {marked(study.tasks[name]): by_task[name].iloc[-1] for name in tasks}
+            _name_lines(axes, at[-1], ends)
+        axes.set_ylim(bottom=min(0, axes.get_ylim()[0]))
+        axes.set_xlabel(parameter)
+        axes.set_ylabel("" if place % shape[1] else f"gap to the {reference(study, tasks)} (%)")
+        axes.yaxis.set_tick_params(labelleft=True)  # a phone shows each panel by itself
+    style.letters(panels if len(panels) > 1 else ())
+    alt = f"Gap to the {reference(study, tasks)} by value of each parameter: " + "; ".join(
+        f"{row['parameter']} {row['value']}: {100 * row['gap']:.1f} %"
+        for row in rows.to_dict("records")
+    )
+    has_thin = not is_alone and bool(rows.at_best.notna().any())
+    over = ["the values of the other parameters"] * (not is_alone) + ["runs"]
+    over += ["tasks"] * (len(tasks) > 1)
+    more = (
+        f", by the values that vary. Points: means over {listed(over)}"
+        + f", with their {style.COVERAGE} bootstrap intervals over runs"
         * bool(rows.gap_low.notna().any())
+        + ". n = {n} runs of a value."
+        + " Dashed: the gap at the best setting of the other parameters." * has_thin
+        + " Thin: the gap on each task." * (is_alone and 1 < len(tasks) <= 8)
+        + f" Small points: runs, if there are fewer than {FEWEST}." * is_few
+        + " A circle marks the default." * bool((rows.default != "").any())
     )
+    return drawing, rows, f"{alt}.", more
 
 
-def _draw_cells(axes: Axes, rows: pd.DataFrame) -> str:
-    """Draw gaps as a heat map by ``value`` and ``line``, and return a sentence of the caption."""
-    values, lines = [*dict.fromkeys(rows.value)], [*dict.fromkeys(rows.line)]
-    gap_of = dict(zip(zip(rows.line, rows.value, strict=True), 100 * rows.gap, strict=True))
-    gaps = np.array([[gap_of.get((line, value), math.nan) for value in values] for line in lines])
-    shades = LinearSegmentedColormap.from_list("", ["#f4f7fa", style.BLUE, "#08306b"])
-    axes.pcolormesh(gaps, cmap=shades, edgecolors=style.BACKGROUND, linewidth=1)
-    size = min(8.0, 96 / len(values))  # points
-    for (y, x), gap in np.ndenumerate(gaps):
-        is_dark = gap > np.nanmin(gaps) + 0.43 * np.ptp(rows.gap * 100)
-        color = "#fefefe" if is_dark else "#101010"  # also on a dark page
-        at: Any = {"ha": "center", "va": "center", "color": color, "fontsize": size}
-        if not math.isnan(gap):
-            axes.text(x + 0.5, y + 0.5, number(gap, 1), **at)
-    least = int(rows.gap.argmin())
-    corner = values.index(rows.value.iloc[least]), lines.index(rows.line.iloc[least])
-    axes.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor=style.INK, linewidth=2))
-    axes.set_xticks(np.arange(len(values)) + 0.5, map(str, values))
-    axes.set_yticks(np.arange(len(lines)) + 0.5, map(str, lines))
-    axes.tick_params(length=0)
-    has_intervals = bool(rows.gap_low.notna().any())
-    return (
-        " The numbers are gaps in per cent; the smallest is framed."
-        + " The table has intervals." * has_intervals
-    )
+def _places_of(values: Sequence[Any]) -> tuple[np.ndarray[Any, Any], bool]:
+    """Return where values of a parameter stand on an axis, and whether the axis is logarithmic.
+
+    Numbers have their place if they stand far enough apart; other values are equally far apart.
+    """
+    places = np.arange(len(values), dtype=np.float64)
+    if not are_numbers(values):
+        return places, False
+    numbers = np.array(values, dtype=np.float64)
+    is_log = bool(numbers[0] > 0 and numbers[-1] >= 10 * numbers[0])
+    scaled = np.log(numbers) if is_log else numbers
+    if np.diff(scaled).min() < np.ptp(scaled) / 12:  # their names would overlap
+        return places, False
+    return numbers, is_log
+
+
+def _name_lines(axes: Axes, x: float, ends: Mapping[str, float]) -> None:
+    """Write names at the right of lines that end at ``x`` and these heights, without overlap."""
+    low, high = axes.get_ylim()
+    least, last = 0.075 * (high - min(low, 0.0)), -math.inf
+    for name, height in sorted(ends.items(), key=lambda item: item[1]):
+        last = max(height, last + least)
+        axes.annotate(name, (x, last), xytext=(6, 0), textcoords="offset points", va="center",
+                      color=style.GREY, annotation_clip=False)  # fmt: skip
 
 
 _FEW: Any = {"markersize": 3, "alpha": 0.6}
@@ -342,7 +332,8 @@ def draw_saved(study: Study) -> Parts | None:
                 scale * np.array([row[f"{column}{end}"] for column in columns]) - place
                 for end in ("_low", "_high")
             )
-            axes.axhline(-place, color=style.GREY, linewidth=0.5)
+            # Not beyond the last bar, where a stump would look like a minus sign after the sum.
+            axes.hlines(-place, 0.6, at[-1] + 0.2, color=style.GREY, linewidth=0.5)
             axes.bar(at, scale * ticks, 0.4, -place, color=color, alpha=0.55, linewidth=0)
             axes.vlines(at, low, high, color=style.INK, linewidth=0.9)
             for x, value in zip(at, ticks.round(), strict=True):
@@ -609,7 +600,7 @@ def draw_runtimes(study: Study) -> Parts | None:
     return drawing, data, alt, " Means over all tasks." * (len(target_ranges(study)) > 1)
 
 
-CURVES = (*LEARNERS, "hill-climbing", "cma-es/bandit")
+CURVES = (*LEARNERS, RANDOM_SEARCH, "hill-climbing", "cma-es/bandit")
 """Built-in methods with learning curves. All methods from files with trials also have them."""
 
 
@@ -925,6 +916,6 @@ def _draw_order(axes: Axes, goals: Array, apart: float) -> None:
     for start, end in itertools.pairwise(places):
         axes.annotate("", end, start, arrowprops={"arrowstyle": "->", "linewidth": 0.8, **ends})
     axes.plot(*places.T, "o", clip_on=False, zorder=4, **_DISC_LOOK)
-    for goal, place in enumerate(places, 1):
+    for goal, (x, y) in enumerate(places, 1):
         text: Any = {"ha": "center", "va": "center_baseline", "fontsize": 7, "zorder": 5}
-        axes.text(*place, str(goal), **text)
+        axes.text(x, y, str(goal), **text)

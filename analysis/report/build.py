@@ -30,6 +30,8 @@ from coartic.analysis.tables import (
     html_of,
     is_setting,
     latex_of,
+    list_not_ranked,
+    list_ranking,
 )
 from coartic.analysis.words import ending_of, id_of, listed, marked, number
 from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
@@ -40,7 +42,7 @@ from coartic.tasks.task import shipped_tasks
 
 HERE = Path(__file__).parent
 LONG = 10
-"""Most rows of a table that the page does not fold."""
+"""Most rows of a table that the page does not fold, except the ranking."""
 
 
 def write_report(
@@ -170,11 +172,13 @@ def _rows_shown(study: Study, table: Table) -> pd.DataFrame:
 def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str, Any]:
     """Return the values of a section that the page's template needs, by name.
 
-    - ``finding``: a list of lines;
+    - ``finding``: a list of lines, of which the page shows ``first_lines`` on its first screen;
     - ``figures``: for each figure except ``first``, those at the top of the page, a tuple of the
       plot, its SVG and the SVGs of its panels for phones (:func:`.panels_for_page`);
     - ``shown``: for each table with rows, a dictionary of its ``id``, name of its ``file``,
-      ``caption``, number of ``rows`` and ``html``, and whether it is ``folded``.
+      ``caption``, number of ``rows`` and ``html``, and whether it is ``folded`` and
+      ``is_printed``. The ranking is never folded; methods that are not ranked are always, and are
+      not printed.
     """
     drawn = {plot.id for plot in first}
     draws = [draw for draw in section.figures if id_of(draw) + ending_of(study) not in drawn]
@@ -185,11 +189,16 @@ def _parts_of(study: Study, section: Section, first: Sequence[Plot]) -> dict[str
         if len(frame := _rows_shown(study, table)):
             is_long = table not in section.unfolded or len(frame) > LONG
             folded = is_long and (has_figure or not section.figures)
+            folded = (folded or table is list_not_ranked) and table is not list_ranking
             words: dict[str, Any] = {"id": table.id + ending_of(study), "file": table.id}
+            words |= {"is_printed": table is not list_not_ranked}
             words |= {"caption": caption_of(table, study), "rows": len(frame)}
             tables.append({**words, "html": html_of(table, study, frame), "folded": folded})
+    finding = sections.finding(study, section)
+    is_answer = list_ranking in section.tables and sections.varies_parameters(study)
     return {
-        "finding": sections.finding(study, section),
+        "finding": finding,
+        "first_lines": len(finding) if is_answer else 1,
         "figures": [(plot, for_page(plot), panels_for_page(plot)) for plot in figures],
         "shown": tables,
     }
@@ -240,7 +249,7 @@ def _sections_shown(
     for section in of_page:
         watch(section.title)
         parts = sections.attempt(failures, section.title, _parts_of, study, section, first)
-        parts = parts or {"finding": [], "figures": [], "shown": []}
+        parts = parts or {"finding": [], "first_lines": 1, "figures": [], "shown": []}
         failure = failures.get(section.title, "")
         if failure or parts["figures"] or parts["shown"]:
             note = section.note.replace("{reference}", reference(study, study.optima))
@@ -295,6 +304,7 @@ def _page(
         version=made_with["coartic"],
         commit=made_with["commit"]["id"][:12] if made_with["commit"] else "",
         date=made_with["date"][:10],
+        not_ranked=[line for of in study.worlds.values() for line in sections.failed_methods(of)],
         limits=sections.limits(main) | sections.failures_in(study.stored),
         worlds=[*map(world_title, study.worlds)] if [*study.worlds] != [""] else [],
         in_noise=IN_NOISE if any(of.is_noisy for of in study.worlds.values()) else "",

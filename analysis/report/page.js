@@ -33,6 +33,7 @@
           ordered = [...rows].sort((a, b) => missing(a) - missing(b) || sign * compare(key(a, column), key(b, column)));
         }
         body.append(...ordered);
+        table.dispatchEvent(new Event("sorted"));
       });
     });
   });
@@ -41,6 +42,8 @@
     const table = document.getElementById(tools.dataset.table);
     const search = tools.querySelector("[type=search]");
     const status = tools.querySelector("output");
+    const more = tools.querySelector("[data-is=more]");
+    let most = Number(tools.dataset.most) || Infinity;
     const show = () => {
       const words = (search ? search.value : "").toLowerCase().split(/\s+/).filter(Boolean);
       let shown = 0;
@@ -48,13 +51,23 @@
         const text = row.textContent.toLowerCase();
         row.hidden = !words.every((word) => text.includes(word));
         shown += !row.hidden;
+        /* On paper all rows are printed. */
+        row.classList.toggle("later", words.length === 0 && shown > most);
       });
-      status.textContent = search ? `${shown} of ${table.tBodies[0].rows.length} rows` : "";
+      if (more) more.hidden = words.length > 0 || most === Infinity;
+      status.textContent = search ? `${words.length ? shown : Math.min(shown, most)} of ${table.tBodies[0].rows.length} rows` : "";
     };
     tools.addEventListener("input", show);
+    table.addEventListener("sorted", show);
+    if (more) {
+      more.addEventListener("click", () => {
+        most = Infinity;
+        show();
+      });
+    }
     /* Rows in sight, for a spreadsheet: tabs between cells, a plain minus, thousands not apart, and an apostrophe before
        text that it would take for a formula. */
-    tools.querySelector("button").addEventListener("click", async () => {
+    tools.querySelector("[data-is=copy]").addEventListener("click", async () => {
       const rows = [...table.rows].filter((row) => !row.hidden);
       const plain = (cell) => cell.innerText.replace(/\u202f/g, "").replace(/−/g, "-").replace(/\s+/g, " ").trim().replace(/^(?=[=+@]|-(?!\d))/, "'");
       await navigator.clipboard.writeText(rows.map((row) => [...row.cells].map(plain).join("\t")).join("\n"));

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from coartic.analysis.control import contexts_of_control, shared_goal
+from coartic.analysis.methods import EC1, EC4
 from coartic.analysis.standings import cells_of, runs_by_method, standings
 from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, solved, typical_run
 from coartic.analysis.tables import SHORT_ID, list_not_ranked, list_ranking, shown_columns
@@ -30,6 +31,8 @@ def player(study: Study) -> str:
 
     - the first method from a file that is in a preset, in the order of :func:`.standings`;
     - otherwise the method of :func:`.shared_goal`, if it is in the first preset;
+    - otherwise the paper's learner that explores as many arms as the first preset has, if it is in
+      the preset, as on the page of ``coartic play``;
     - otherwise the first method of the first preset.
     """
     presets, first = [], ""
@@ -62,12 +65,14 @@ def player(study: Study) -> str:
         for number, methods in enumerate(ids)
         if method in methods
     )
+    learner = EC4 if len(presets[0]["task"]["hands"]) > 1 else EC1
+    default = next((method for method in (first, learner) if method in ids[0]), ids[0][0])
     where = {name: presets.index(preset) for name, preset in single_presets.items()}
     return player_figure(
         presets,
         page=None,
         folder=study.folder_in_commands,
-        first=next(own, {"who": first if first in ids[0] else ids[0][0]}),
+        first=next(own, {"who": default}),
         cells=[
             (cell, {"preset": where[task], "who": label})
             for cell, task, label in _cells_shown(study)

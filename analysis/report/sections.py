@@ -12,7 +12,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 import pandas as pd
 from jinja2 import Environment, StrictUndefined, Template
 
@@ -32,21 +31,20 @@ from coartic.analysis.methods import (
     EC4,
     GROUPS,
     KNOWN_METHODS,
-    MARK,
     RANDOM_SEARCH,
     SEARCHES,
     joined_label,
+    subject_of,
     title_of,
 )
+from coartic.analysis.report.settings import TOO_FEW, answer_on_parameters
 from coartic.analysis.standings import (
+    has_few_runs,
     ranked_tasks,
-    ranking_budget,
     reference,
-    runs_on,
     solved_tasks,
     standings,
 )
-from coartic.analysis.statistics import interaction_test
 from coartic.analysis.study import Study
 from coartic.analysis.tables import (
     Table,
@@ -57,6 +55,7 @@ from coartic.analysis.tables import (
     list_family_gaps,
     list_methods,
     list_not_ranked,
+    list_parameters,
     list_ranking,
     list_runtimes,
     list_signatures,
@@ -74,17 +73,14 @@ from coartic.analysis.words import (
     p_value,
 )
 from coartic.errors import CoarticError
-from coartic.estimates import FEWEST, LEVEL
-from coartic.internal.text import error_line, one_line
+from coartic.estimates import FEWEST
+from coartic.internal.text import counted, error_line, one_line
 from coartic.method import TRIALS
 from coartic.runs.plan import world_title
 
 Made = TypeVar("Made")
 RUNS = 20
 """Number of runs of each experiment of the paper."""
-TOO_FEW = f" (too few runs to test, which needs {FEWEST})"
-_WITHOUT_ARTICLE = ("CMA-ES", "random search", "hill climbing", "posture planning")
-"""Algorithms whose names have no article in a sentence."""
 NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer runs as points."
 
 
@@ -116,7 +112,7 @@ class Section:
     """Jinja template of the finding in words, or empty. It can use
 
     - ``rows``: the first table with ``title`` and ``information`` of each method and its
-      ``subject`` (:func:`subject_of`), without settings and ablations;
+      ``subject`` (:func:`.subject_of`), without settings and ablations;
     - ``others``: a list of the other tables, likewise;
     - further names that :func:`.finding` defines.
     """
@@ -133,50 +129,19 @@ SECTIONS = (
     Section(
         "ranking",
         "Ranking",
-        (list_ranking, list_not_ranked, list_differences),
+        (list_ranking, list_not_ranked, list_differences, list_parameters),
         (draw_ranking,),
         sentence="""\
-{% if parameters %}
-{% for best in leading(rows)[:1] %}
-{% set tied = (rows.gap == best.gap).sum() %}
-{{ "The best setting is %s: its" % best.title if tied == 1 else "The smallest" }} gap to the \
-{{ reference }} is {{ interval(best, "gap", scale=100, unit=" %") }}\
-{{ ", which %s settings have" % tied if tied > 1 }}.
-{%- for next in others[1].to_dict("records")[:1] if tied == 1 %}
- The gap of {{ next.subject.removesuffix(",") }} is larger by \
-{{ interval(next, "difference", scale=100) }} percentage points\
-{{ ", which %s chance (%s)" % ("exceeds" if next.p_holm < LEVEL else "may be", \
-p_value(next.p_holm)) if next.p_holm >= 0 else few(next) }}.
-{%- endfor %}
-{%- set said = [best.method] + others[1].method[:1].tolist() %}
-{% for row in rows[rows.method.isin(papers)].to_dict("records") if row.method not in said %}
- The gap of {{ row.subject.removesuffix(",") }} is {{ interval(row, "gap", scale=100, unit=" %") }}.
-{%- endfor %}
-{%- set useless = (rows.share <= 0).sum() %}
-{% if useless %}
- {{ "None of the settings gains anything" if useless == rows | length else \
-"%d of %d settings gain%s nothing" % (useless, rows | length, "s" if useless == 1 else "") }}\
-{{ " in %s trials" % number(budget) if budget }}.
-{%- endif %}
-{% if interaction < LEVEL %}
- The effect of {{ parameters[0] }} depends on {{ parameters[1] }} ({{ p_value(interaction) }}).
-{%- endif %}
-{% if parameters | length > 2 %}
- There is no picture, because a picture shows at most two parameters, and \
-{{ parameters | listed }} vary.
-{%- endif %}
-
-{% endfor %}
-{% else %}
 {% for use in uses %}
 {% set of_use = rows[rows.information == use] %}
 {% for row in leading(of_use) %}
 {% set place = (of_use.gap < row.gap).sum() + 1 %}
 {% set gap = interval(row, "gap", scale=100, unit=" %") %}
 {% if of_use | length == 1 %}
-The only method {{ use }} is {{ row.title }}; its gap to the {{ reference }} is {{ gap }}\
+The only ranked method {{ use }} is {{ row.title }}; its gap to the {{ reference }} is {{ gap }}\
 {% elif loop.first %}
-Among methods {{ use }}, the smallest gap to the {{ reference }} is {{ gap }} ({{ row.title }})\
+Among ranked methods {{ use }}, the smallest gap to the {{ reference }} is {{ gap }} \
+({{ row.title }})\
 {% else %}
 {{ ". Others: " if loop.index == 2 else "; " }}{{ row.title }} {{ gap }}\
 {{ ", place %d of %d" % (place, of_use | length) if place > loop.index }}\
@@ -185,15 +150,16 @@ Among methods {{ use }}, the smallest gap to the {{ reference }} is {{ gap }} ({
 {%- endfor %}
 
 {% endfor %}
-{% endif %}
-{% for against, group in others[1].groupby("against", sort=False) if not parameters %}
-On the tasks that it solved, {{ subjects[against] }} has a gap that these {{ rivals }} methods \
-exceed by so many percentage points (negative: their gap is smaller): \
+{% for against, group in others[1].groupby("against", sort=False) %}
+{{ "On the tasks that it solved, " if group.tasks.max() < tasks }}{{ subjects[against] }} is \
 {% for row in leading(group) %}
-{{ row.title }} {{ interval(row, "difference", scale=100) }}\
-{{ " (%s)" % p_value(row.p_holm) if row.p_holm >= 0 else few(row) }}\
-{{ "." if loop.last else "; " }}
+{{ beside(row, loop.first) }}{{ " (%s)" % p_value(row.p_holm) if row.p_holm >= 0 else few(row) }}\
+{{ "." if loop.last else ", " }}
 {%- endfor %}
+{%- set tests = (group.p_holm >= 0).sum() %}
+{% if tests > 1 %}
+ p is corrected over {{ tests }} comparisons, intervals are not.
+{%- endif %}
 
 {% endfor %}""",
         note="The gap is the ticks of the mean reward beyond the {reference}, in per cent of it. "
@@ -210,16 +176,16 @@ exceed by so many percentage points (negative: their gap is smaller): \
         "asked for, or in any number if one method was asked for several; planners have no "
         "trials. The author of an own method declares how it uses the reward; own methods are "
         "bold.",
-        unfolded=(list_not_ranked, list_differences),
+        unfolded=(list_differences,),
         single=False,
     ),
     Section(
         "coarticulation",
         "Coarticulation",
         (list_contexts, list_signatures),
-        (draw_shared_goal, draw_postures, draw_saved),
+        (draw_shared_goal, draw_saved, draw_postures),
         sentence="""\
-{% set of_best = rows[rows.method == first] if parameters else rows[:0] %}
+{% set of_best = rows[rows.method == first] if varies else rows[:0] %}
 {% for row in (of_best if of_best | length else rows).head(1).to_dict("records") %}
 {{ row.subject }} hits {{ row.place }} {{ {
 "different postures": "in postures that depend on the next goal",
@@ -374,24 +340,19 @@ def finding(study: Study, section: Section) -> list[str]:
     The template ``sentence`` is filled in from the section's tables. The list is empty if the
     section has no sentence, or if its first table has no rows and is not the ranking.
     """
+    is_ranking = section.tables[0] is list_ranking
     if not section.sentence or not len(section.tables[0](study)):
-        return ["No method is ranked."] * (section.tables[0] is list_ranking)
+        return ["No method is ranked."] * is_ranking
+    if is_ranking and varies_parameters(study):
+        return [shown(line) for line in answer_on_parameters(study)]
     methods = study.methods
     built_in = methods.index[methods.built_in.astype(bool)]
     subjects = methods.apply(subject_of, axis=1)
 
     def few(row: Mapping[str, Any]) -> str:
         """Return a remark that a stochastic method has too few runs for a test, or ""."""
-        labels = {str(row["method"]), str(row["against"])}
-        drawn = [
-            runs_on(study, label, solved_tasks(study, str(row["against"]))) for label in labels
-        ]
-        counts = [
-            len(of_task)
-            for runs in drawn
-            for _, of_task in runs[runs.label.map(methods.stochastic).astype(bool)].groupby("task")
-        ]
-        return TOO_FEW if counts and min(counts) < FEWEST else ""
+        labels = str(row["method"]), str(row["against"])
+        return TOO_FEW * has_few_runs(study, labels, solved_tasks(study, labels[1]))
 
     def named(table: Table) -> pd.DataFrame:
         all_rows = table(study)
@@ -400,20 +361,23 @@ def finding(study: Study, section: Section) -> list[str]:
         subject = rows.method.map(subjects)
         return rows.assign(**of_method, subject=subject, own=~rows.method.isin(built_in))
 
-    rows, *others = map(named, section.tables)
+    rows, *others = map(named, [each for each in section.tables if each is not list_parameters])
     names = {
-        "interval": interval, "number": number, "p_value": p_value, "leading": leading, "few": few,
+        "interval": interval, "number": number, "p_value": p_value, "few": few,
+        "leading": _first_two if varies_parameters(study) else leading,
         "infinite": math.inf,
         "uses": GROUPS, "first": next(iter(standings(study).index), ""),
         "subjects": subjects,
-        "reference": reference(study, ranked_tasks(study)),
-        "LEVEL": LEVEL, "parameters": [] if study.against else [*study.varied.columns],
-        "interaction": _interaction(study), "budget": ranking_budget(study),
-        "papers": methods.index[methods.is_learner & (methods.setting == "")],
-        "rivals": "other" if study.against else "built-in",
+        "reference": reference(study, ranked_tasks(study)), "varies": varies_parameters(study),
+        "beside": _beside, "tasks": len(ranked_tasks(study)),
     }  # fmt: skip
     text = _template_of(section.sentence).render(rows=rows, others=others, **names)
     return [capital(shown(line.strip())) for line in text.split("\n") if line.strip()]
+
+
+def varies_parameters(study: Study) -> bool:
+    """Return True if a study varies parameters, and is not asked to compare with one method."""
+    return not (study.varied.empty or study.against)
 
 
 @lru_cache  # compiling takes longer than rendering
@@ -424,46 +388,24 @@ def _template_of(sentence: str) -> Template:
     return environment.from_string(sentence)
 
 
-def subject_of(method: Mapping[str, Any]) -> str:
-    """Return the name of a method as the subject of a sentence.
+def _beside(row: Mapping[str, Any], is_first: bool) -> str:
+    """Return in words how far a method is ahead of or behind another, a row of ``differences``.
 
-    A method from a file has a free title, which gets quotation marks. Other names get an article,
-    except names of activities, such as random search, and CMA-ES. A name that contains a comma,
-    such as ``CMA-ES, hands goal by goal``, ends in one.
-
-    Parameters
-    ----------
-    method : mapping
-        Row of :attr:`.Study.methods`.
+    Only the first of several names the unit: ``5.0 [4.2, 5.9] points behind CMA-ES``.
     """
-    title = str(method["title"])
-    if not method["built_in"]:
-        plain_title = title.removesuffix(MARK)
-        return f"“{plain_title}”{title[len(plain_title) :]}"
-    article = "" if method["algorithm"] in _WITHOUT_ARTICLE else "the "
-    comma = "," if "," in title.partition("(")[0] else ""
-    return f"{article}{title}{comma}"
+    other = str(row["subject"]).removesuffix(",")
+    if row["difference"] == 0:
+        return f"level with {other}"
+    sign = 1 if row["difference"] > 0 else -1
+    ends = [sign * float(row[f"difference_{end}"]) for end in ("low", "high")][::sign]
+    distance = dict(zip(("d", "d_low", "d_high"), [abs(row["difference"]), *ends], strict=True))
+    words = f"{interval(distance, 'd', scale=100)}{' points' * is_first}"
+    return f"{words} {'ahead of' if sign > 0 else 'behind'} {other}"
 
 
-@lru_cache(maxsize=4)
-def _interaction(study: Study) -> float:
-    """Return p of the interaction of two varied parameters (:func:`.interaction_test`).
-
-    It is NaN unless two parameters vary and each combination of their values is ranked.
-    """
-    varied, rows = study.varied, standings(study).query("why == ''")
-    if len(varied.columns) != 2 or not {*varied.index} <= {*rows.index}:
-        return math.nan
-    labels = {tuple(values): str(label) for label, *values in varied.map(repr).itertuples()}
-    firsts, seconds = (dict.fromkeys(values) for values in zip(*labels, strict=True))
-    if len(labels) < len(firsts) * len(seconds):
-        return math.nan
-    tasks = ranked_tasks(study)
-    gaps = [[[of_task.to_numpy(np.float64)
-              for _, of_task in runs_on(study, labels[first, second], tasks).groupby("task").gap]
-             for second in seconds]
-            for first in firsts]  # fmt: skip
-    return interaction_test(gaps)
+def _first_two(rows: pd.DataFrame) -> list[dict[Any, Any]]:
+    """Return the first two rows of a table as dicts: all others are settings of the same method."""
+    return rows[:2].to_dict("records")
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
@@ -527,6 +469,16 @@ def limits(study: Study) -> dict[str, Any]:
             title_of(study.declared[name]): listed(used) for name, used in study.imports.items()
         },
     }
+
+
+def failed_methods(study: Study) -> list[str]:
+    """Return a sentence for each method that is not ranked because runs failed."""
+    rows = standings(study).query("why != '' and failed > 0")
+    where = f" in {world_title(study.world)}" if study.world else ""
+    return [
+        f"{row.failed} of {counted(row.runs, 'run')} failed ({row.title}){where}: it is not ranked."
+        for _, row in rows.iterrows()
+    ]
 
 
 def failures_in(runs: pd.DataFrame) -> dict[str, Any]:

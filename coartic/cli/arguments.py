@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -146,7 +147,8 @@ def methods_meant(names: Sequence[str], registered: Registry, *, expand: bool = 
             check_kind(name)  # has a better message for a thing of another kind
             if os.path.isfile(file := file_name(name)):
                 raise CoarticError(
-                    f"unknown method {name!r}: if {file} defines it, add --method-file {file}"
+                    f"unknown method {name!r}: if {file} defines it, add "
+                    f"`--method-file {quote(file)}`"
                 ) from None
             known = [*titles, *EVERY_CONDITION, *ids]
             raise CoarticError(unknown("method", name, known)) from None

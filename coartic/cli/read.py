@@ -30,7 +30,10 @@ if TYPE_CHECKING:
 def report(
     folder: given.ResultsFolder,
     out: Annotated[
-        Path | None, given.file_or_folder("FOLDER", "Folder to write; by default FOLDER/report.")
+        Path | None,
+        given.file_or_folder(
+            "FOLDER", "Folder to write; by default FOLDER/report, or results/shipped/report."
+        ),
     ] = None,
     for_paper: Annotated[
         bool, typer.Option("--for-paper", help="Also figures as SVG and PDF, and tables as LaTeX.")
@@ -51,7 +54,10 @@ def report(
     """Write the report of a results folder."""
     if width is not None and not for_paper:
         raise CoarticError("--width has no effect without --for-paper")
-    out = folder / "report" if out is None else out
+    from coartic.runs.shipped import SHIPPED
+
+    if out is None:  # shipped results have no folder; Git ignores `results` in a checkout
+        out = Path("results" if str(folder) == SHIPPED else "") / folder / "report"
     from coartic.analysis import TABLES
     from coartic.analysis.report.build import write_report
     from coartic.analysis.study import load
@@ -114,8 +120,12 @@ def _say_ranking_of_world(study: Study) -> None:
     from coartic.runs.record import MOTOR_NOISE
 
     methods, notes = standings(study), limits(study)
+    has_others = bool(methods.built_in.any())
     names = [
-        row.title if row.built_in or row.title.startswith(row.base) else f"{row.base}: {row.title}"
+        row.title
+        if row.built_in
+        else "> " * has_others
+        + (row.title if row.title.startswith(row.base) else f"{row.base}: {row.title}")
         for _, row in methods.iterrows()
     ]
     methods = methods.assign(name=names)
@@ -131,8 +141,8 @@ def _say_ranking_of_world(study: Study) -> None:
     ]  # fmt: skip
     say_table(headings, cells)
     has_answer = not (len(ranked) and study.varied.empty)
-    answer = finding(study, SECTIONS[0])[:1] if has_answer else []
-    pairs = [("Answer", sentence) for sentence in answer]
+    answer = finding(study, SECTIONS[0]) if has_answer else []
+    pairs = [("" if place else "Answer", sentence) for place, sentence in enumerate(answer)]
     brief = unranked.title.where(unranked.built_in.astype(bool), unranked.index)
     pairs += [
         ("Not ranked", f"{why}: {'; '.join(brief[of_reason.index])}")
@@ -146,9 +156,10 @@ def _say_ranking_of_world(study: Study) -> None:
     if notes["own"]:
         known = f"for {listed(notes['own'])} only the best reward of this folder is known"
         if searches := notes["searches"]:
-            all_methods = ",".join(dict.fromkeys([*study.declared, *searches]))
-            search = f"repeat the command with `--methods {quote(all_methods)}`"
-            known += f"; to search for the optimum, {search}"
+            known += (
+                f"; to search for the optimum, add `{searches[0]}` to the command's `--methods`"
+            )
+            known += f", or `--methods '*,{searches[0]}'` if it has none"
         pairs.append(("", known))
     if notes["unknown"]:
         pairs.append(("", f"for {listed(notes['unknown'])} no reward is known"))
@@ -303,7 +314,8 @@ def cite(
         ),
     ] = None,
     analysis: Annotated[
-        bool, typer.Option("--analysis", help="Also cite works on the statistics and signatures.")
+        bool,
+        typer.Option("--analysis", help="Also cite works on statistics, signatures and theories."),
     ] = False,
 ) -> None:
     """Print BibTeX entries of coartic, the paper and the methods."""
@@ -369,7 +381,7 @@ def draw(
 
     if run:
         if len(tasks := tasks or []) != 1:
-            raise CoarticError("--run needs one results folder: coartic draw FOLDER --run ID")
+            raise CoarticError("--run needs one results folder: `coartic draw FOLDER --run ID`")
         film, folder = out or Path("film.gif"), folder_named(tasks[0])
         if tasks[0] in builtin_tasks() and not folder.exists():
             raise CoarticError(f"--run needs a results folder; {folder} is a task")
@@ -390,8 +402,8 @@ def draw(
         if Path(name).is_dir():
             with open_store(Path(name)):  # explains what another folder lacks
                 raise CoarticError(
-                    f"{name} is a results folder, not a task. `coartic draw {name} --run ID` films "
-                    f"a run, and `coartic list {name}` lists the ids."
+                    f"{name} is a results folder, not a task. `coartic draw {quote(name)} --run "
+                    f"ID` films a run, and `coartic list {quote(name)}` lists the ids."
                 )
         check_kind(name, "task", "family")
     out = out or Path("tasks.svg")

@@ -369,18 +369,23 @@ def new(
     name: Annotated[
         str, typer.Argument(metavar="NAME", help="Id of the method, such as my-search.")
     ],
+    planner: Annotated[
+        bool,
+        typer.Option("--planner", help="A planner, not an optimiser that learns from trials."),
+    ] = False,
     out: given.Out = None,
     replace: given.Replace = False,
 ) -> None:
     """Write a small working method into a file, to start your own."""
-    from coartic.benchmarks import template
+    from coartic.benchmarks import template, template_planner
     from coartic.benchmarks.registry import check_id, registry
     from coartic.internal.files import check_ending, write_output
 
     path = Path(given.file_name(name)) if out is None else out
     check_ending(path, [".py"])
     check_id(name, "coartic new", registry())
-    text = Path(template.__file__).read_text(encoding="utf-8").replace("NAME", name)
+    module = template_planner if planner else template
+    text = Path(str(module.__file__)).read_text(encoding="utf-8").replace("NAME", name)
     write_output(path, text.encode(), replace=replace)
     file = quote(str(path))
     say_pairs(

@@ -76,7 +76,7 @@ class Picture {
     this.text(counted(unit, "length unit"), [18 + unit * scale, size[1] - 12], ink, "left", 12);
   }
 
-  /* The rail on which the box slides, below or next to it. */
+  /* The rail on which the base slides, below or next to it. */
   rail([x, y], off, level, colour) {
     const [[left, top], [right, bottom]] = [[0, 0], this.size].map((point) => this.toWorld(point));
     this.context.strokeStyle = colour;

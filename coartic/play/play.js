@@ -14,13 +14,15 @@ const FAR = 12; // largest coordinate of a goal or angle of a joint, length unit
 const STRIDE = 2; // distance to a new goal, for arms of length 4
 const ROLES = ["first", "second"];
 const NAMES = {
-  alone: "corrective process alone", learner: "the learner", plan: "the planner (local search)", you: "you",
+  alone: "corrective process alone", learner: "the learner", plan: "the planner", you: "you",
 };
+const PLANNER = "planner, all goals ahead"; // with which others are compared
 const short = (value) => Number(value.toFixed(2)).toString();
 const grouped = (count) => `${count}`.replace(/\B(?=(\d{3})+$)/g, "\u202f");
 const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 const capital = (words) => words[0].toUpperCase() + words.slice(1);
 const bounded = (values) => values.map((value) => Math.max(-FAR, Math.min(FAR, value)));
+const ticks_by_goal = ({ hands, movements }) => hands.map((_, at) => movements.reduce((sum, { goal, ticks }) => sum + (goal === at ? ticks : 0), 0));
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 /* The reader's choices, all of which are in the link. `mate` moves the second robot if the reader moves the first.
@@ -91,8 +93,11 @@ class Play {
     this.worker.onmessage = ({ data: message }) => this.hear(message);
     this.fresh = new Set(); // results for the present state
     root.classList.add("live");
-    // Until the reader acts, show how the robot learned and then play, while in sight; not with reduced motion.
-    ["pointerdown", "keydown", "input"].forEach((kind) => root.addEventListener(kind, () => { this.waits = false; }, true));
+    // Show how the robot learned and then play, while in sight; not with reduced motion. The button that shows the
+    // movement does not end this, but any other act of the reader does.
+    ["pointerdown", "keydown", "input"].forEach((kind) => root.addEventListener(kind, ({ target, key }) => {
+      if (target !== this.find("play") && key !== "Tab") this.waits = false;
+    }, true));
     this.restore(saved);
     new ResizeObserver(() => { this.box = null; this.refresh(); }).observe(root);
     window.matchMedia("print").addEventListener("change", () => this.draw()); // at once, in the size and colours of the print
@@ -278,7 +283,37 @@ class Play {
     const meets = (mover) => (this.main.length > 1 && mover.hits[this.shared]) || 0;
     this.meeting = Math.max(...this.main.map(meets));
     this.movers.forEach((mover) => Object.assign(mover, { meets: meets(mover), waits: this.meeting - meets(mover) }));
+    this.showMovements();
     this.refresh();
+  }
+
+  /* A bar for each movement of each robot, over a bar for the same movement before practice. With one robot, and without
+     practice, the bar below is that of the corrective process alone. */
+  showMovements() {
+    const first = this.announced || this.state.who === "alone" ? [] : this.first_trials;
+    const trials = this.main.map(({ trial }, k) => [trial, first.length ? execute(this.problems[k], first[k].movements) : this.alone[k]]);
+    const shown = !this.announced && this.state.who !== "alone" && trials.flat().every(({ going }) => going);
+    this.find("movements").hidden = !shown;
+    if (!shown) return;
+    const ticks = trials.map((pair) => pair.map(ticks_by_goal));
+    const most = Math.max(1, ...ticks.flat(2));
+    const element = (kind, className, ...content) => {
+      const made = Object.assign(document.createElement(kind), { className });
+      made.append(...content);
+      return made;
+    };
+    const bar = (count) => {
+      const made = element("span", "");
+      made.style.width = `${(100 * count) / most}%`;
+      return made;
+    };
+    const lists = ticks.map(([after, before], k) => element("ol", ROLES[k], ...after.map((count, g) => {
+      const more = count - before[g];
+      return element("li", "", element("span", "", `goal ${this.labelOf(k, g)} `), element("span", "bars", bar(count), bar(before[g])),
+        element("span", "", ` ${count} (${more > 0 ? "+" : more < 0 ? "−" : "±"}${Math.abs(more)})`));
+    })));
+    const words = first.length ? " after practice; below, in grey, before practice" : "; below, in grey, those of the corrective process alone";
+    this.find("movements").replaceChildren(element("p", "note", `Ticks of each movement${words}:`), element("div", "pair", ...lists));
   }
 
   /* The optimum of the task, if it is known. */
@@ -516,7 +551,7 @@ class Play {
         curve.text(name, [left + 4, free], ink, "left", 12);
       };
       level(NAMES.alone, this.alone[k].reward, [2, 4], colour);
-      level("planner", this.plan[k] && this.plan[k].reward, [8, 4], this.problems.length > 1 ? colour : colours.second);
+      level(PLANNER, this.plan[k] && this.plan[k].reward, [8, 4], this.problems.length > 1 ? colour : colours.second);
       level("proven optimum", this.optimum || NaN, [], colour);
       context.strokeStyle = colour;
       runs_of(k).forEach(({ snapshots }) => curve.path(snapshots.flatMap(({ trials, reward }, i) => (
@@ -536,13 +571,19 @@ class Play {
     const two = this.main.length > 1;
     let seen = `the robot hits ${goals.length > 1 ? `goals 1 to ${goals.length} in turn` : "goal 1"}${hands.length > 1 ? ", with either hand" : ""}.`;
     if (two) seen = "both robots hit goal 1; then blue goes for the blue goals, orange for the orange ones.";
-    if (this.announced) seen = `goal ${this.announced.goal + 1} has just moved. Blue is its next trial, orange a planner's.`;
-    if (who === "you") seen = `drag box and elbows of the ${two ? "blue " : ""}robot to place a posture for each goal.${two ? ` Orange: ${this.nameOf(mate)}.` : ""}`;
+    if (this.announced) seen = `goal ${this.announced.goal + 1} has just moved. Blue is its next trial, orange that of a planner that sees all goals.`;
+    if (who === "you") seen = `drag base and elbows of the ${two ? "blue " : ""}robot to place a posture for each goal.${two ? ` Orange: ${this.nameOf(mate)}.` : ""}`;
     return `${capital(this.nameOf(who))}: ${seen}${this.editing ? "" : " Goals can be dragged."}`;
   }
 
   nameOf(who) {
-    return (this.stored(who) || { name: NAMES[who] }).name;
+    return (this.stored(who) || { name: `${NAMES[who]}${who === "plan" ? `, ${this.horizon(this.state.ahead)}` : ""}` }).name;
+  }
+
+  /* The number of goals ahead that a planner sees, in words. */
+  horizon(ahead) {
+    if (!ahead) return "no goal ahead";
+    return `${ahead < this.state.goals.length - 1 ? counted(ahead, "goal") : "all goals"} ahead`;
   }
 
   /* The result, and what its words mean. */
@@ -550,12 +591,13 @@ class Play {
     const { state, main, announced, difference } = this;
     const missed = main.find((mover) => !mover.trial.going);
     if (missed) return [`Goal ${missed.trial.reached.length + 1} is out of the robot's reach.`];
-    const far = "A distance counts box and joints together, in length units and radians.";
+    const far = "A distance counts base and joints together, in length units and radians.";
     if (announced) {
       const [learner, planner] = difference && main.length > 1 ? difference.shifts.map(short) : ["…", "…"];
       return [`At goal ${announced.goal} the learner's posture has shifted by ${learner}, the planner's by ${planner}.`, `${far} Thin: before the goal moved.`];
     }
-    if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) return ["You are as fast as the planner!"];
+    if (state.who === "you" && main[0].trial.reward === this.optimum) return ["No solution takes fewer ticks than yours!"];
+    if (state.who === "you" && this.plan[0] && main[0].trial.reward >= this.plan[0].reward) return [`You are as fast as the ${PLANNER}!`];
     if (state.who === "you" || (main.length < 2 && state.who !== "alone")) {
       const saved = main[0].trial.reward - this.alone[0].reward;
       const [{ hands, goals }] = this.problems;
@@ -594,8 +636,8 @@ class Play {
     const scores = main.map(({ role, trial }, k) => [role, names[k], trial.reward]);
     if (main.length > 1 && !you) return scores;
     if (main.length < 2 && state.who !== "alone") scores.push(["ghost", "Corrective process alone", this.alone[0].reward]);
-    if (this.plan[0] && state.who !== "plan") scores.push([main.length > 1 ? "bare" : "second", `Planner (local search)${main.length > 1 ? ", blue goals" : ""}`, this.plan[0].reward]);
-    if (this.optimum) scores.push(["bare", "Optimum (proven)", this.optimum]);
+    if (this.plan[0] && state.who !== "plan") scores.push([main.length > 1 ? "bare" : "second", `${capital(PLANNER)}${main.length > 1 ? " (blue goals)" : ""}`, this.plan[0].reward]);
+    if (this.optimum) scores.push(["bare", "Proven optimum", this.optimum]);
     return scores;
   }
 
@@ -625,7 +667,7 @@ class Play {
     this.find("first-score").replaceChildren(...lines(first));
     const drift = state.drift ? `, drift ${state.drift}` : "";
     this.set("textContent", {
-      lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", now: `After ${counted(at, "trial")}`, play: this.playing ? "Pause" : "Play",
+      lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", now: `After ${counted(at, "trial")}`, play: this.playing ? "Pause" : "Show movement",
       count: this.main.map((mover, k, all) => `${all.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${k < all.length - 1 ? mover.last + 1 : counted(mover.last + 1, "tick")}`).join(", "),
     });
     const stored = this.stored(state.who);
@@ -651,7 +693,7 @@ class Play {
     if (this.paced < TRIALS && (this.inSight || !this.waits)) {
       this.paced = this.waits ? PRACTICE * this.paced : Infinity;
       requestAnimationFrame(() => this.answer());
-    } else if (!open && this.waits && this.inSight && !this.calm.matches) this.play();
+    } else if (!open && this.waits && !this.paused && this.inSight && !this.calm.matches) this.play();
   }
 
   /* ---- Handles ---- */
@@ -661,7 +703,7 @@ class Play {
     const wanted = new Map();
     if (this.editing) {
       const { hand: chosen, q } = this.postures[this.state.edited - 1];
-      wanted.set("base", { at: [q[0], q[1]], label: "Box", move: (to) => this.bend("base", to) });
+      wanted.set("base", { at: [q[0], q[1]], label: "Base", move: (to) => this.bend("base", to) });
       this.problems[0].hands.forEach((hand) => {
         joint_positions(this.problems[0], q, hand).forEach((at, k, all) => {
           if (k && !(hand === chosen && k === all.length - 1)) {
@@ -859,7 +901,7 @@ class Play {
     on("play", "click", () => {
       if (!this.playing) this.play();
       else {
-        this.playing = false;
+        [this.playing, this.paused] = [false, true];
         if (this.state.who === "you") this.state.tick = -1;
         this.refresh();
         this.keep();
@@ -921,7 +963,7 @@ class Play {
     this.your_trials = [];
     this.box = null;
     this.view = null;
-    this.playing = false;
+    [this.playing, this.paused] = [false, false];
     this.waits = state.tick < 0 && state.who !== "you";
     this.paced = this.waits && !state.trials && !this.calm.matches && state.who === "learner" ? FIRST_SEEN : Infinity;
     this.ask();
@@ -944,7 +986,7 @@ class Play {
     const changed = !same([goals, others], [preset.task.goals, preset.others || null]);
     fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
     fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => counted(ticks, "tick")).join(" and ")}`])]);
-    fill("ahead", goals.map((_, k) => [k, k ? `${counted(k, "goal")} ahead` : "no goal ahead"]));
+    fill("ahead", goals.map((_, k) => [k, this.horizon(k)]));
     fill("edited", goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
     this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores, drift: DRIFTS.indexOf(drift) });
     this.find("drift").setAttribute("aria-valuetext", `drift ${drift}`);
@@ -954,6 +996,7 @@ class Play {
     this.find("announced").textContent = `Move goal ${this.moved + 1} now`;
     const [few, full] = [goals.length < 2, goals.length >= MOST_GOALS];
     this.set("disabled", { reset: !changed && !state.own && !trials && drift === this.first.drift, two: few, fewer: few, announced: few, add: full });
+    this.find("goad").textContent = this.optimum ? "Can you reach the proven optimum?" : `Can you beat the ${PLANNER}?`;
     this.find("why").textContent = (few && "The only goal cannot be removed, and has no next goal.") || (full && `A task can have at most ${MOST_GOALS} goals here.`) || "";
     const other = who !== "learner";
     this.set("hidden", {
@@ -981,7 +1024,7 @@ class Play {
   /* The reader has placed a posture or chosen a hand: note one more trial. */
   note() {
     const [{ trial }] = this.main;
-    const ticks = trial.hands.map((_, goal) => trial.movements.reduce((sum, movement) => sum + (movement.goal === goal ? movement.ticks : 0), 0));
+    const ticks = ticks_by_goal(trial);
     const hits = trial.hands.map((hand, goal) => [goal + 1, HANDS[hand], ticks[goal], ...trial.reached[goal]]);
     if (!same(this.your_trials.at(-1) || null, hits)) this.your_trials.push(hits);
   }

@@ -68,7 +68,7 @@ def load_task(name_or_path: str | Path) -> Task:
             raise TaskError(
                 f"{name_or_path}: the task is called {task.name!r}, but it differs from the "
                 "instance with this name. Give it another name, or write the instance again: "
-                f"coartic draw {task.name} --out FOLDER"
+                f"`coartic draw {task.name} --out FOLDER`"
             )
         return task
     if name_or_path in shipped_tasks():

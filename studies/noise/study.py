@@ -79,7 +79,7 @@ def tables_of(rows, hands, resamples=RESAMPLES):
 @figures.styled
 def draw(results):
     """Draw the gap of each method in the four cases, with a label at the end of each line."""
-    figure, (axes,) = figures.panels((1, 1), (figures.TWO, 3.4))
+    figure, (axes,) = figures.panels((1, 1), (figures.TWO, 3.2))
     rows = results.reset_index().query("group == 'all'").set_index("name")
     methods = {name: label for label, name in order.LABELS.items()}
     places = range(len(order.CASES))
@@ -96,12 +96,15 @@ def draw(results):
     ends = _spread(rows.practised.sort_values(), 0.045)
     for name, height in ends.items():
         color = figures.look_of(methods[name].partition(" ")[0])["color"]
-        axes.annotate(name, (places[-1], height), (8, 0), textcoords="offset points",
-                      va="center", color=color)  # fmt: skip
+        label = axes.annotate(
+            name, (places[-1], height), (8, 0), textcoords="offset points", va="center",
+            color=color,
+        )  # fmt: skip
+        label.set_in_layout(False)
     axes.set(yscale="log", ylabel="gap (%), log scale; lower is better", xlim=(-0.3, 4.4))
     axes.set_xticks(places, ["found and made\nwithout noise", "the same in noise,\nas it aims",
                              "in noise,\nat its hits", "practised and\nmade in noise"])  # fmt: skip
-    axes.set_ylim(4, 40)
+    axes.set_ylim(4, 50)
     axes.set_yticks([5, 10, 20, 40], ["5", "10", "20", "40"])
     axes.set_yticks([], minor=True)
     return figure

@@ -90,6 +90,28 @@ def contexts_of(table):
     return contexts
 
 
+def carried(table):
+    """Return the contexts of carry-over, by contrast and person, for :func:`leans`.
+
+    A contrast is a target that is reached from another target (context A) and from rest (context
+    B). Carry-over is a lean that is turned round: the posture in which a reach began stands in the
+    place of the next posture, so n_A − n_B becomes s_A − s_B, and zeros stand in the place of the
+    start. Then ``at_end`` and ``more`` of the leans are the carry-over. Raises ValueError as
+    :func:`contexts_of` does.
+    """
+    contrasts = {}
+    for target, before in sorted({*zip(table.target, table.context, strict=True)}):
+        if before != REST:
+            rows = table[(table.target == target) & table.context.isin([before, REST])]
+            contrasts[f"{target} after {before}"] = {
+                person: [
+                    np.stack([0 * each[:, 0], each[:, 1], each[:, 0]], axis=1) for each in both
+                ]
+                for person, both in contexts_of(rows)[target].items()
+            }
+    return contrasts
+
+
 def leans(contexts, own=False, average=np.mean):
     """Return the leans of people, with a row for each person and target.
 
@@ -242,6 +264,29 @@ def tabulate_power(contexts):
     return pd.DataFrame(rows).set_index("spread")
 
 
+def tabulate_carry_over_power(contrasts):
+    """Return the smallest carry-over that is found with 90 % power, by contrast and over all.
+
+    ``length`` is the mean of |s_A − s_B|, in rad, of the other people's postures. Rows of contrasts
+    have the spread that the repeats explain: the longer the way, the smaller the carry-over that
+    can be found. The rows of all contrasts have each of :func:`spreads`.
+    """
+    rows = []
+    for name, contrast in {**{name: {name: each} for name, each in contrasts.items()},
+                           "all": contrasts}.items():  # fmt: skip
+        length = np.mean([
+            np.linalg.norm(np.mean([
+                both[0][:, 2].mean(axis=0) - both[1][:, 2].mean(axis=0)
+                for other, both in of_people.items() if other != person
+            ], axis=0))
+            for of_people in contrast.values() for person in of_people
+        ])  # fmt: skip
+        table = tabulate_power(contrast).assign(length=length)
+        kept = table if name == "all" else table.loc[["repeats"]]
+        rows.append(kept.rename(index=f"{name}, {{}}".format))
+    return pd.concat(rows).rename_axis("spread")
+
+
 def repeats_needed(n, lean_of_people, between, sd, repeats):
     """Return how many repeats of each context give 90 % power for a lean, if contexts alternate.
 
@@ -276,3 +321,7 @@ if __name__ == "__main__":
     stored = read(folder / "postures.csv")
     counts = contexts_of(stored[left_out(stored) == ""])
     tabulate_power(counts).to_csv(folder / "power.csv", float_format="%.6g", lineterminator="\n")
+    stored = read(folder / "carry_over_postures.csv")
+    tabulate_carry_over_power(carried(stored[left_out(stored) == ""])).to_csv(
+        folder / "carry_over_power.csv", float_format="%.6g", lineterminator="\n"
+    )

@@ -1,4 +1,4 @@
-"""Measure whether people lean towards the posture that comes next.
+"""Measure whether people lean towards the next posture, and whether they keep the last one.
 
     python studies/people/make_table.py FOLDER          makes postures.csv from the public files
     python studies/people/protocols.py results/people   runs methods on tasks of the same form
@@ -6,7 +6,7 @@
 
 The expected answer is that people lean. Against it would be a mean over people that sign flips do
 not distinguish from 0. README.md has the rule, which was committed before any lean of a person was
-computed.
+computed, and that of carry-over, which was committed before any carry-over was computed.
 """
 
 import sys
@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from protocols import INSTANCES, METHODS, names
 from rules import (
+    carried,
     contexts_of,
     leans,
     left_out,
@@ -24,20 +25,27 @@ from rules import (
     read,
     sign_flips,
     smallest_shift,
+    tabulate_carry_over_power,
     tabulate_plan,
     tabulate_power,
 )
 from scipy import stats
 
-from coartic.analysis import TABLES, TwoContexts, figures, load, mean
+from coartic.analysis import TABLES, figures, lean, load, mean
+from coartic.analysis.signatures import distance_of_means
 from common.writing import write_study
 
 HERE = Path(__file__).parent
 PANELS = {
-    "difference": "posture difference\n(rad; methods: and length unit)",
-    "apart": "distance of the next postures\n(rad; methods: and length unit)",
+    "difference": "posture difference\n(rad)",
+    "apart": "distance of the next postures\n(rad)",
     "lean": "lean\n(share of the way)",
 }
+CONTEXTS = ("goal", "back")
+"""Contexts of the methods' tasks: goal 2 follows goal 1, or the place where the hand started."""
+JOINTS = ["1", "2", "3", "4"]
+PARTS = {"all": ["x", "y", *JOINTS], "base": ["x", "y"], "joints": JOINTS}
+"""Coordinates of the methods' postures by part. People have four joint angles, and no base."""
 QUANTITIES = {"lean": "more", "difference": "difference", "apart": "apart"}
 """Columns of the results, with the columns of the leans from which they are made."""
 
@@ -78,40 +86,85 @@ def measure_people(table):
     return tables | {"power": power, "plan": tabulate_plan(power.sd["repeats"])}, shown
 
 
-def measure_pairs(study):
-    """Return the lean of each method on each pair of tasks, and the runs from which it is made."""
-    rows, runs = [], []
+def measure_carry_over(table):
+    """Return the carry-over of each person and contrast, and the test with what is beside it."""
+    contrasts = carried(table[left_out(table) == ""])
+    rows = leans(contrasts).rename(columns={"target": "contrast", "more": "carry_over"})
+    described = {
+        "judged": people(leans(contrasts)),
+        "own starts": people(leans(contrasts, own=True)),
+        "medians": people(leans(contrasts, average=np.median)),
+        "all repeats": people(leans(carried(table))),
+    }
+    described |= {name: people(leans({name: each})) for name, each in contrasts.items()}
+    tests = pd.DataFrame({name: over_people(values) for name, values in described.items()}).T
+    kept = ["person", "contrast", "repeats", "carry_over", "low", "high", "difference", "apart"]
+    return {
+        "carry_over": rows[kept].set_index("person"),
+        "carry_over_tests": tests.drop(columns=["at_end", "at_start"]).rename_axis("test"),
+        "carry_over_power": tabulate_carry_over_power(contrasts),
+    }
+
+
+def tabulate_postures(study):
+    """Return the postures of each run at both goals of its task: base and joints of the arm."""
+    rows = []
     for instance in INSTANCES:
         for label in METHODS:
-            both = [study.executed(task, label) for task in names(instance)]
-            contexts = TwoContexts(*both, 1, "right")
-            found = contexts.lean
-            rows.append({
-                "method": label, "task": instance, "lean": found.more.value,
-                "difference": contexts.posture_difference, "apart": found.apart,
-                "runs": min(found.more.n),
-            })  # fmt: skip
-            for task, of_task in zip(("goal", "back"), both, strict=True):
+            for context, task in zip(CONTEXTS, names(instance), strict=True):
+                of_task = study.executed(task, label)
+                arm = of_task.task.robot.joints("right")
                 for number, hits in enumerate(of_task.configurations):
-                    named = {"method": label, "task": instance, "context": task, "run": number}
-                    pair = zip(("at", "next"), hits[:2], strict=True)
-                    arm = of_task.task.robot.joints("right")
-                    for kind, q in pair:
+                    row = {"run_id": of_task.run_ids[number], "method": label, "task": instance}
+                    row |= {"context": context, "run": number}
+                    for kind, q in zip(("at", "next"), hits[:2], strict=True):
                         moved = {"x": q[0], "y": q[1], **dict(enumerate(q[arm], 1))}
-                        named |= {f"{kind}_{name}": value for name, value in moved.items()}
-                    runs.append({"run_id": of_task.run_ids[number], **named})
-    return pd.DataFrame(rows).set_index("method"), pd.DataFrame(runs).set_index("run_id")
+                        row |= {f"{kind}_{name}": value for name, value in moved.items()}
+                    rows.append(row)
+    return pd.DataFrame(rows).set_index("run_id")
+
+
+def measure_pairs(runs):
+    """Return the lean of each method on each pair of tasks, by part of the posture.
+
+    ``runs`` is a table as of :func:`tabulate_postures`. All runs of a pair begin in one posture. A
+    method with one run is deterministic.
+    """
+    rows = []
+    for (label, instance), of_pair in runs.groupby(["method", "task"], sort=False):
+        for part, coordinates in PARTS.items():
+            both = []
+            for context in CONTEXTS:
+                of_task = of_pair[of_pair.context == context]
+                at, following = (
+                    of_task[[f"{kind}_{name}" for name in coordinates]].to_numpy()
+                    for kind in ("at", "next")
+                )
+                both.append(np.stack([0 * at, at, following], axis=1))
+            alone = min(map(len, both)) == 1
+            found = lean(*both, np.random.default_rng(0), deterministic=alone)
+            rows.append({
+                "method": label, "task": instance, "part": part, "lean": found.more.value,
+                "difference": distance_of_means(*(each[:, 1] for each in both)),
+                "apart": found.apart, "runs": min(found.more.n),
+            })  # fmt: skip
+    return pd.DataFrame(rows).set_index("method")
 
 
 def of_methods(rows):
-    """Return a row of the figure for each method: means over tasks, with intervals of the lean."""
+    """Return a row of the figure for each method: means over tasks, with intervals of the lean.
+
+    They are of the joints. The mean lean of the base stands in columns ``base``.
+    """
     shown = {}
     for label, of_method in rows.groupby("method", sort=False):
         applies = of_method.dropna(subset="lean")
+        joints, base = (applies[applies.part == part] for part in ("joints", "base"))
         shown[METHODS[label]] = {
-            **mean(applies.lean.to_numpy()).columns("lean"),
-            **mean(applies.difference.to_numpy()).columns("difference"),
-            "apart": applies.apart.mean(), "tasks": len(applies), "kind": "methods",
+            **mean(joints.lean.to_numpy()).columns("lean"), "median": joints.lean.median(),
+            **mean(joints.difference.to_numpy()).columns("difference"),
+            "apart": joints.apart.mean(), "tasks": len(joints), "kind": "methods",
+            **mean(base.lean.to_numpy()).columns("base"), "base_tasks": len(base),
         }  # fmt: skip
     return pd.DataFrame.from_dict(shown, orient="index")
 
@@ -119,23 +172,25 @@ def of_methods(rows):
 def of_comparison():
     """Return the leans of the methods' shipped runs on tasks ascending and descending."""
     rows = TABLES["contexts"](load("shipped").worlds[""]).set_index("method").loc[[*METHODS]]
-    columns = ["lean", "lean_low", "lean_high", "distance", "next_apart", "lean_runs"]
+    ends = ("", "_low", "_high")
+    columns = [f"lean_{part}{end}" for part in ("joints", "base") for end in ends]
+    columns += ["distance_joints", "next_apart_joints", "lean_runs"]
     return rows[columns].rename(index=METHODS)
 
 
 def measure(folder=""):
     """Return the tables by name.
 
-    The tables of methods are made from the runs in ``folder``, or left out if it is empty.
+    The tables of methods are made from the runs in ``folder``, or from runs.csv.xz if it is empty.
     """
     tables, shown = measure_people(read(HERE / "postures.csv"))
     if folder:
-        rows, runs = measure_pairs(load(folder))
-        tables |= {"pairs": rows, "runs": runs, "comparison": of_comparison()}
-    else:
-        rows = pd.read_csv(HERE / "pairs.csv", index_col=0)
-    tables["results"] = pd.concat([shown, of_methods(rows)]).rename_axis("row")
-    return tables
+        tables["runs"] = tabulate_postures(load(folder))
+    tables |= measure_carry_over(read(HERE / "carry_over_postures.csv"))
+    runs = tables.get("runs", pd.read_csv(HERE / "runs.csv.xz", index_col="run_id"))
+    tables |= {"pairs": measure_pairs(runs), "comparison": of_comparison()}
+    rows = pd.concat([shown, of_methods(tables["pairs"])])
+    return tables | {"results": rows.rename_axis("row")}
 
 
 @figures.styled

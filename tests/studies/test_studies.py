@@ -20,6 +20,7 @@ from coartic.tasks.optima import KnownOptimum
 from coartic.tasks.task import address_of, task_text
 from common.writing import fill_page, stored_picture, write_study
 from tests.support.made_up import row, study_of
+from tests.support.pictures import draw_the_same
 from tests.support.processes import ROOT, program
 
 ALL = sorted(path.parent for path in (ROOT / "studies").glob("*/study.py"))
@@ -76,7 +77,8 @@ def test_page_says_what_the_tables_say(folder):
 def test_figure_is_drawn_from_the_stored_results(folder):
     study, results = program(folder / "study.py"), read(folder / "results.csv")
     todo = f"make it again: PYTHONPATH=studies python studies/{folder.name}/study.py"
-    assert stored_picture(study.draw, results) == (folder / "figure.svg").read_bytes(), todo
+    drawn = stored_picture(study.draw, results)
+    assert draw_the_same(drawn, (folder / "figure.svg").read_bytes()), todo
 
 
 def test_families_of_studies_are_what_they_were():
@@ -111,3 +113,12 @@ def test_the_page_on_studies_has_a_whole_study(tmp_path):
     assert b"gap is 3.0 %" in written[0][0]
     evidence = read(folder / "claims.csv").evidence["goals-ahead-gain"]
     assert evidence.startswith("The gap falls by 2.00 ")
+
+
+def test_a_picture_with_another_mark_is_another_picture():
+    svg = (ROOT / "studies" / "dose" / "figure.svg").read_bytes()
+    assert draw_the_same(svg, svg)
+    moved = re.sub(rb'x="(\d+)\.', lambda found: b'x="%d.' % (int(found[1]) + 1), svg, count=1)
+    assert moved != svg
+    assert not draw_the_same(svg, moved)
+    assert not draw_the_same(svg, svg.replace(b"<use", b"<g", 1))

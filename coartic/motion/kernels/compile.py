@@ -14,6 +14,7 @@ import ctypes
 import fcntl
 import hashlib
 import logging
+import multiprocessing
 import os
 import re
 import shutil
@@ -36,7 +37,7 @@ from coartic.robot import chain, lever
 PACKAGE = Path(__file__).parents[2]
 _KEPT_S = 30 * 24 * 3600.0  # time for which unused machine code of other sources is stored
 _LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
-_TOLD_S = 5.0  # time after which a message names the process that is waited for
+_TOLD_S = 60.0  # time after which a message names the process that is waited for
 _IMPORTING = Lock()  # an option of LLVM can be set only once
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -346,6 +347,12 @@ def _remove_old(root: Path, current: Path) -> None:
 
 
 @cache
+def _command_id() -> int:
+    """Return the id of the process that started this one as a worker, or else of this one."""
+    parent = multiprocessing.parent_process()
+    return (parent.pid if parent else None) or os.getpid()
+
+
 def _log_once(message: str) -> None:
     """Log a message once per process (logger ``coartic``, level info)."""
     logging.getLogger("coartic").info(message)
@@ -406,9 +413,10 @@ class _MachineCode:
     def wait_for_lock(self) -> bool:
         """Lock this function's code for this process, and return whether that succeeded.
 
-        The process id is written into the lock file, unless the disk is full. Locking fails if the
-        file cannot be locked, or if another process holds the lock for more than 120 s. After 5 s a
-        message names that process.
+        The ids of the process and of its command are written into the lock file, unless the disk is
+        full. Locking fails if the file cannot be locked, or if another process holds the lock for
+        more than 120 s. After 60 s a message names that process, unless it belongs to the same
+        command.
         """
         with contextlib.suppress(OSError):
             file = open(f"{self.cache_path}/{self.name}.lock", "a+b", buffering=0)  # noqa: SIM115
@@ -418,13 +426,14 @@ class _MachineCode:
                     self.lock = file
                     with contextlib.suppress(OSError):  # a full disk
                         file.truncate(0)
-                        file.write(str(os.getpid()).encode())
+                        file.write(f"{os.getpid()} {_command_id()}".encode())
                     return True
                 time.sleep(_RETRY_S)
                 if tries == round(_TOLD_S / _RETRY_S):
-                    process = os.pread(file.fileno(), 20, 0).decode(errors="replace")
+                    ids = os.pread(file.fileno(), 40, 0).decode(errors="replace").split()
                     state = f"which compiles, or is stopped: it holds {file.name}"
-                    _log_once(f"Waiting for process {process}, {state}")
+                    if ids[1:] != [str(_command_id())]:
+                        _log_once(f"Waiting for process {' '.join(ids[:1])}, {state}")
             file.close()
         return False
 

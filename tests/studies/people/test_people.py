@@ -171,3 +171,117 @@ def test_the_guide_has_the_plan_of_the_study():
     rows = re.findall(r"\| (\d+) \| (\d+) % \| (\d+) \| (\d+) \|", page)
     plan = pd.read_csv(FOLDER / "plan.csv").assign(lean=lambda table: 100 * table.lean)
     assert np.array(rows, float) == pytest.approx(plan.to_numpy(float))
+
+
+def reaches(rng, studies, share=0.0, block=0.0, shared=0.0, people=7, repeats=3):
+    """Contexts of carry-over in studies with three contrasts, as of ``carried``.
+
+    The starts of contexts A and B are 1 rad apart, and ends keep ``share`` of it. ``block`` is the
+    SD of an offset of each block of a person that start and end share; the first two contrasts have
+    the same block from rest. ``shared`` is the length of an offset of the end in context A along
+    the way that all people share.
+    """
+    contexts, rest = {}, (0.0, 0.0)
+    for contrast in range(3 * studies):
+        way, start, end = directions(rng), rng.normal(size=4), rng.normal(size=4)
+        means = np.array([[start + way, end + (share + shared) * way], [start, end]])
+        offsets = block * rng.normal(size=(people, 2, 1, 4))
+        noises = 0.05 * rng.normal(size=(people, 2, repeats, 2, 4))
+        if contrast % 3 == 1:
+            offsets[:, 1], noises[:, 1] = rest
+        rest = offsets[:, 1], noises[:, 1]
+        runs = (means + offsets)[:, :, None] + noises  # people, contexts, repeats, 2, 4
+        both = np.stack([0 * runs[..., 0, :], runs[..., 1, :], runs[..., 0, :]], axis=-2)
+        contexts[contrast] = dict(enumerate(both, people * (contrast // 3)))
+    return contexts
+
+
+@pytest.mark.parametrize("block", [0.05, 0.1, 0.2])
+def test_without_carry_over_the_test_keeps_its_level(block):
+    """Level 6/128 with a shift between blocks that start and end share; of 400 studies at most
+    7.9 % (three standard errors). With a person's own starts the shift is carry-over."""
+    contexts = reaches(np.random.default_rng(17), 400, block=block)
+    values = values_of(contexts)
+    assert values.shape == (400, 7)
+    assert abs(values.mean()) < 0.01
+    assert 0.015 < share_rejected(values) < 0.079
+    few = {contrast: contexts[contrast] for contrast in range(300)}
+    own = values_of(few, own=True)
+    assert own.mean() > values.mean() + 0.5 * block**2
+    assert block < 0.1 or share_rejected(own) > 0.079
+
+
+def test_a_planted_carry_over_is_found_and_a_shift_that_all_share_as_well():
+    """The second is a limit of the study: no sign flip sees it."""
+    for planted_share in ({"share": 0.1}, {"shared": 0.1}):
+        values = values_of(reaches(np.random.default_rng(5), 40, block=0.05, **planted_share))
+        assert 0.09 < values.mean() < 0.11
+        assert share_rejected(values) > 0.9
+
+
+def test_power_follows_the_length_of_the_way():
+    """Twice as far apart, the repeats hide half as much."""
+    near = reaches(np.random.default_rng(9), 1, repeats=10)
+    far = {
+        name: {person: both * [[[1.0], [1.0], [2.0]]] for person, both in of_people.items()}
+        for name, of_people in near.items()
+    }
+    first, second = (RULES.tabulate_carry_over_power(each) for each in (near, far))
+    assert (second.length / first.length).to_numpy() == pytest.approx(2.0)
+    assert (first.smallest / second.smallest).to_numpy() == pytest.approx(2.0)
+
+
+def carry_over_by_hand(table, person, target, before):
+    """Carry-over of a person at a target, in own code on a table in rad."""
+    starts, ends = ([f"{kind}_{joint}" for joint in range(1, 5)] for kind in ("start", "end"))
+    of_target = table[(table.target == target) & table.context.isin([before, "R"])]
+    means = of_target.groupby(["person", "context"])[starts + ends].mean()
+    apart = means.xs(before, level="context") - means.xs("R", level="context")
+    way = apart.loc[apart.index != person, starts].mean().to_numpy()
+    return apart.loc[person, ends].to_numpy() @ way / (way @ way)
+
+
+def test_stored_carry_over_is_that_of_own_code():
+    table = RULES.read(FOLDER / "carry_over_postures.csv")
+    counted = table[RULES.left_out(table) == ""]
+    made = pd.read_csv(FOLDER / "carry_over.csv")
+    assert len(made) == 7 * 3
+    for row in made.itertuples():
+        target, _, before = row.contrast.split()
+        expected = carry_over_by_hand(counted, row.person, int(target), before)
+        assert row.carry_over == pytest.approx(expected, abs=1e-6)
+    tests = pd.read_csv(FOLDER / "carry_over_tests.csv", index_col=0)
+    values = made.groupby("person").carry_over.mean()
+    assert tests.more["judged"] == pytest.approx(values.mean(), abs=1e-6)
+    assert tests.p["judged"] == pytest.approx(RULES.sign_flips(values), abs=1e-6)
+
+
+def test_starts_that_are_too_near_have_no_carry_over():
+    contexts = reaches(np.random.default_rng(2), 1)
+    for both in contexts[0].values():
+        both[:, :, 2] *= 0.05
+    rows = RULES.leans(contexts)
+    assert rows.more.isna().groupby(rows.target).mean().to_dict() == {0: 1.0, 1: 0.0, 2: 0.0}
+    assert (RULES.people(rows).targets == 2).all()
+
+
+def test_the_joints_of_methods_stand_beside_people():
+    """Means over tasks from the shipped runs, in own code: people's form has one start."""
+    runs = pd.read_csv(FOLDER / "runs.csv.xz").query("method == 'dual-process/EC1'")
+    joints = {kind: [f"{kind}_{joint}" for joint in range(1, 5)] for kind in ("at", "next")}
+    leans = []
+    for _, of_task in runs.groupby("task"):
+        sides = []
+        for even in (0, 1):
+            p, n = (
+                np.subtract(*(
+                    of_task[of_task.context == context].iloc[parity::2][joints[kind]].mean()
+                    for context in ("goal", "back")
+                ))
+                for kind, parity in (("at", even), ("next", 1 - even))
+            )  # fmt: skip
+            sides.append(p.to_numpy() @ n.to_numpy() / (n.to_numpy() @ n.to_numpy()))
+        leans.append(np.mean(sides))
+    results = pd.read_csv(FOLDER / "results.csv", index_col=0).loc["learner"]
+    assert results["lean"] == pytest.approx(np.mean(leans), abs=1e-5)
+    assert results["median"] == pytest.approx(np.median(leans), abs=1e-5)
