@@ -140,8 +140,10 @@ class EvolutionStrategy:
 
     @property
     def costs(self) -> Array:
-        """Sorted costs of the last generation, shape ``(size,)``; empty before the first
-        :meth:`tell`."""
+        """Sorted costs of the last generation, shape ``(size,)``.
+
+        The array is empty before the first :meth:`tell`.
+        """
         return self._costs
 
     def ask(self) -> Array:

@@ -187,7 +187,7 @@ def chains_of(
 def _extend(
     task: Task, layers: Layers, begun: Beginning, base_weight: float
 ) -> Iterator[Beginning]:
-    """Yield prefix ``begun`` extended by one goal, for each hand that has a node at this goal."""
+    """Yield ``begun`` extended by one goal, for each hand with a node at that goal."""
     hands, nodes, cost, back = begun
     goal = len(hands)
     for hand in sorted(task.hands):  # left before right

@@ -38,7 +38,7 @@ class TickPlan:
 
     @property
     def ticks(self) -> int:
-        """Number of ticks of all movements: k + 1 for a movement of k steps, 0 for no movement."""
+        """Number of ticks of all movements (k + 1 for k > 0 steps)."""
         return sum(steps + 1 for steps in self.steps if steps)
 
 
