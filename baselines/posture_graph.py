@@ -86,8 +86,9 @@ def _sample_postures(
 class Beginning(NamedTuple):
     """A prefix of hand sequences, with the costs of its cheapest paths.
 
-    Dynamic programming over prefixes: for each pair of last nodes, one of each hand, the cheapest
-    path through the layers of the prefix.
+    Dynamic programming over prefixes: the state is a pair of last nodes, namely the last node of
+    the left hand and the last node of the right hand. For each pair, the class stores the cost of
+    the cheapest path through the layers of the prefix.
     """
 
     hands: HandSequence

@@ -372,8 +372,9 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     """Return the least cost of a segment between two states of the joints.
 
     A cubic minimises ∫|q̈|² and a quintic minimises ∫|q⃛|² (Flash & Hogan 1985). Both integrals are
-    exact formulas in the end states. For jerk of the hand, the result is the cost of joint jerk,
-    without its weight. Path length is not a cost of this function.
+    exact formulas in the end states. For the cost ``hand-jerk``, this function returns only the
+    integral of the joint jerk, without the weight ``JOINT_WEIGHT``. The cost ``path-length`` is not
+    allowed.
 
     Parameters
     ----------

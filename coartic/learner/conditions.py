@@ -238,10 +238,10 @@ EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """Return an exploration condition by its id, such as ``"EC4"`` or ``"dual-process/EC4"``.
+    """Look up an exploration condition by its id, such as ``"EC4"`` or ``"dual-process/EC4"``.
 
-    A condition is returned unchanged. Raises CoarticError for an unknown id, and TypeError for an
-    object that is neither a string nor a condition.
+    If the argument is a condition already, it is returned unchanged. Raises CoarticError for an
+    unknown id, and TypeError for an object that is neither a string nor a condition.
     """
     if isinstance(condition, ExplorationCondition):
         return condition

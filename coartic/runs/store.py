@@ -299,14 +299,14 @@ class Store:
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
     def solved(self) -> dict[str, list[str]]:
-        """Return a dict that maps ids of cells to the ids of their runs with status ``ok``."""
+        """Return a dict that maps ids of cells to ids of runs with status ``ok``."""
         by_cell = defaultdict[str, list[str]](list)
         for cell, run_id in self._rows("SELECT cell, run_id FROM results WHERE status = 'ok'"):
             by_cell[cell].append(run_id)
         return dict(by_cell)
 
     def results(self) -> dict[str, str]:
-        """Return a dict that maps the id of each run in the folder to the hash of its outcome."""
+        """Return a dict that maps ids of all stored runs to hashes of their outcomes."""
         return dict(self._rows("SELECT run_id, result FROM results"))
 
     # Writing and reading runs.
@@ -452,7 +452,7 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the rewards of trials for each run of the plan that has any.
+        """Yield the rewards of the trials of each run of the plan, if rewards are stored.
 
         Yields
         ------

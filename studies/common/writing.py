@@ -1,4 +1,4 @@
-"""Write the tables and the page of a study, and a suite of the controls that it lacks."""
+"""Write the tables and the page of a study, and a suite of its missing control runs."""
 
 from __future__ import annotations
 
