@@ -34,8 +34,7 @@ The controller was tuned only on thirty development instances (``d000`` to ``d00
 one-armed, two-armed and aligned): 12 settings of the controller and, before that, some 50 settings
 of a prototype. The table has the mean gap of ``goals-ahead`` to the best known path for the 12
 settings, which were changed one at a time. A star marks the value that is used. *Speed* is the
-lower bound on the speed of the hand towards the goal; *paths to come* are the segments of the path
-after the current goal:
+lower bound on the speed of the hand towards the goal:
 
 =========================  ====================================================================
 least speed of the hand    0: 2.2 %, 0.03 ★: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
