@@ -1,8 +1,8 @@
 """A bandit over hand sequences, each with its own search over target configurations.
 
-UCB1 decides on the best reward of each sequence which search makes the next generation of trials.
-Each search starts from the postures in which the corrective process **A** on its own hits the
-goals; finding them takes one trial.
+UCB1 chooses the search that makes the next generation of trials; the value of a search is the best
+reward of its hand sequence so far. Each search starts from the postures in which the corrective
+process **A** on its own hits the goals; finding them takes one trial.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from coartic.robot import Array
 class Search(ABC):
     """Search over the targets of one hand sequence.
 
-    Making a search makes a trial by the corrective process. :attr:`reward` is -inf if that trial
-    fails, and the search then cannot make generations.
+    The constructor makes one trial, in which only the corrective process acts. If that trial fails,
+    :attr:`reward` is -inf, and the search cannot make generations.
 
     Parameters
     ----------
     attempts : Attempts
-        Account of the trials of the run.
+        Makes and counts the trials of the run.
     hands : str
         Hand sequence, such as ``"RRLR"``.
     """
@@ -63,19 +63,29 @@ class Search(ABC):
 
     @abstractmethod
     def generation(self) -> None:
-        """Make the trials of a generation, and learn from them. At least one trial must be
-        left."""
+        """Make the trials of a generation, and update the search from their rewards.
+
+        At least one trial must be left.
+        """
 
     @property
     @abstractmethod
     def answer(self) -> tuple[float, Array]:
-        """The mean that the search recommends, shape ``(n,)``, and the mean cost of its last
-        complete generation in ticks; infinity if there is none."""
+        """Cost of the recommended mean, and that mean.
+
+        - The cost is the mean cost of the last complete generation, in ticks. Without a complete
+          generation the cost is infinity.
+        - The mean has shape ``(n,)``, in length units and rad.
+        """
 
 
 def sequences_to_try(session: Session, given: str | None) -> list[str]:
-    """Return the given hand sequence; without one all, or only the initial one if there are more
-    than 4096."""
+    """Return the hand sequences that a bandit tries.
+
+    - If ``given`` is a sequence, only that sequence is tried.
+    - Otherwise all hand sequences of the task are tried, if there are at most 4096.
+    - If there are more than 4096, only the task's initial sequence is tried.
+    """
     return sequences_of(session) if given is None else [given]
 
 
@@ -83,9 +93,8 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
     """Let searches make generations until no trial of ``attempts`` is left.
 
     The next generation comes from the search with the highest upper confidence bound (UCB1). The
-    constant c of UCB1 is ``exploration`` times the range of the searches' first rewards (at least
-    1 tick). Searches whose hand sequence the corrective process did not complete make no
-    generation.
+    constant c of UCB1 is ``exploration`` times the range of the searches' first rewards (at least 1
+    tick). A search makes no generation if the corrective process failed with its hand sequence.
     """
     promising = [search for search in searches if search.reward > -math.inf]
     rewards = [search.reward for search in promising] or [0.0]
@@ -102,9 +111,9 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
 
 
 def recommend(searches: Iterable[Search], attempts: Attempts) -> tuple[Movement, ...]:
-    """Return the movements of the searches' best answer (:attr:`Search.answer`).
+    """Return movements to the recommended mean with the lowest cost (:attr:`Search.answer`).
 
-    If no search has a complete generation, the hand sequence of the best trial decides.
+    If no search has a complete generation, the mean of the best trial's hand sequence is returned.
     """
     best = min(searches, key=lambda each: (each.answer[0], each.hands != attempts.hands))
     targets = np.full(attempts.explored.shape, np.nan)

@@ -5,14 +5,14 @@ Level 1 meets an inequality task as nearly as damping allows::
     min  s² + λ² |x|²     subject to   A x + s >= b,       |x_i| <= L
     s, x
 
-Level 2 finds the change that is nearest to the preferred change z, among the changes that meet the
-task as nearly as the solution of level 1, to within ε::
+Level 2 finds the change x that is nearest to the preferred change z. The violation of the task may
+exceed the violation at the solution of level 1 by at most ε::
 
     min  |x - z|²         subject to   A x >= b - s⁺ - ε,  |x_i| <= L
      x
 
-Here A and b state the task, s is its slack, s⁺ = max(s, 0), λ is ``DAMPING``, L is ``LIMIT`` and ε
-is ``SLACK``.
+Here A x >= b is the task, s is its slack variable, s⁺ = max(s, 0), λ is ``DAMPING``, L is ``LIMIT``
+and ε is ``SLACK``.
 
 Inequality tasks in lexicographic quadratic programmes come from O. Kanoun, F. Lamiraux, P.-B.
 Wieber (2011), Kinematic control of redundant manipulators: generalizing the task-priority framework
@@ -61,7 +61,7 @@ def solve_cascade(rows: Array, least: Array, preferred: Array) -> Solution:
     rows : ndarray, shape (m, joints)
         Matrix A of the task, in length units per unit of change.
     least : ndarray, shape (m,)
-        Vector b of the task: the least values of A x, in length units.
+        Vector b of the task: lower bounds of A x, in length units.
     preferred : ndarray, shape (joints,)
         Preferred change z.
 

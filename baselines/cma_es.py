@@ -2,32 +2,34 @@
 
 Each hand sequence has its own evolution strategy (CMA-ES) over the targets of all explored joints:
 
-- It uses only the total reward of each trial. A failed trial ranks last.
-- Its first mean is made of the postures in which the corrective process **A** on its own hits the
+- The strategy uses only the total reward of each trial. A failed trial ranks last.
+- Its first mean consists of the postures in which the corrective process **A** on its own hits the
   goals. Finding these postures takes one trial.
 - Its first step size is ``sigma``.
-- When it stops by its own criteria, it restarts from the first mean with twice the population
-  (IPOP).
+- When a stopping criterion of CMA-ES is met, the strategy restarts from the first mean with twice
+  the population size (IPOP).
 
-``cma-es/bandit`` tries each hand sequence once while trials are left. If there are more than 4096,
-it uses only the initial sequence. Then UCB1 on the best reward of each sequence decides which
-strategy makes the next generation of trials. The bonus for exploration is scaled by the range of
-the first rewards.
+``cma-es/bandit`` first makes one trial with each hand sequence. If the task has more than 4096 hand
+sequences, the method uses only the initial sequence. Then UCB1 chooses the strategy that makes the
+next generation of trials; the value of a strategy is the best reward of its sequence so far. The
+exploration bonus of UCB1 is scaled by the range of the rewards of the first trials.
 
-``cma-es/goal-by-goal`` has a value for each pair of hands at two goals in a row: the best reward of
-the hand sequences with this pair that it has tried. For each goal it chooses the hand with the
-higher value, or, with probability ε, a random hand. A new sequence takes one trial by the
-corrective process. If that trial succeeds, the sequence gets a generation of its own strategy each
-time it is chosen again.
+``cma-es/goal-by-goal`` keeps a table with a value for each goal, hand at the goal before, and hand
+at this goal. The value is the best reward of the hand sequences tried so far that contain these two
+hands. The method chooses the hands of a sequence from the first goal to the last: the hand with the
+higher value, or a random hand with probability ε. When a sequence is chosen for the first time, the
+method makes one trial with only the corrective process. If that trial succeeds, each later choice
+of the sequence makes one generation of the sequence's own strategy.
 
-In noise the best trial was partly lucky, so the answer is a mean of CMA-ES: among the means at the
-end of each restart of each hand sequence, the one whose last complete generation has the lowest
-mean cost. In this mean cost a failed trial counts as twice the ticks of the corrective process.
+With motor noise the best trial was partly lucky, so the answer is a mean of CMA-ES. The candidates
+are the last means of all restarts of all hand sequences. The answer is the candidate whose last
+complete generation has the lowest mean cost. In this mean cost a failed trial counts as twice the
+ticks of the corrective process.
 
 Tuning, with three or four runs for each value:
 
 - c = 0.02, 0.05, 0.1, 0.2 and 0.5 on the two-armed tasks: rewards differ by at most 2.4. If the
-  other arm does not move, c up to 0.05 can settle on RRRR in two-armed-2 (mean reward -339; 0.1 and
+  idle arm does not move, c up to 0.05 can settle on RRRR in two-armed-2 (mean reward -339; 0.1 and
   above give -331).
 - Step sizes 0.02, 0.05, 0.1 and 0.2 with one hand sequence: rewards are within 5 of each other
   after 2000 trials. After 300 trials 0.05 is best, or within 2 of the best.
@@ -70,7 +72,7 @@ class Strategy(Search):
     ----------
     session : Session
     attempts : Attempts
-        Account of the trials of the run.
+        Makes and counts the trials of the run.
     hands : str
         Hand sequence, such as ``"RRLR"``.
     sigma : float
@@ -110,13 +112,16 @@ class Strategy(Search):
 
     @property
     def answer(self) -> tuple[float, Array]:
-        """The least mean cost of the last complete generation of a restart, and the mean after
-        this generation. Without a complete generation: infinity, and the first mean."""
+        """Cost of the best restart, and the last mean of that restart.
+
+        The cost of a restart is the mean cost of its last complete generation, in ticks. Without a
+        complete generation the answer is infinity and the first mean, shape ``(n,)``.
+        """
         return min(self._means, key=itemgetter(0))
 
 
 class CMAES(Method):
-    """CMA-ES for each hand sequence, among which a bandit chooses (UCB1)."""
+    """CMA-ES for each hand sequence; a bandit (UCB1) divides the trials among the sequences."""
 
     name = "cma-es/bandit"
     version = 2
@@ -131,9 +136,12 @@ class CMAES(Method):
 
         In noise, return movements to a mean (:func:`recommend`).
 
-        Each hand sequence first gets a trial by the corrective process. If there are more than 4096
-        sequences, only the initial one does; if parameter ``sequence`` is given, only this one. If
-        all of these first trials fail, the method stops.
+        The method first makes one trial with each hand sequence, in which only the corrective
+        process acts. If all of these trials fail, the method stops. It uses only one sequence in
+        two cases:
+
+        - If parameter ``sequence`` is given, the method uses that sequence.
+        - If there are more than 4096 sequences, the method uses the task's initial sequence.
 
         Raises MethodError if no trial hits every goal.
         """
@@ -154,11 +162,11 @@ class GoalByGoalParameters(UninformedParameters):
     """Parameters of CMA-ES that chooses hands goal by goal."""
 
     epsilon: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """Probability with which the hand for a goal is random."""
+    """Probability of choosing a random hand for a goal."""
 
 
 class GoalByGoal(Method):
-    """CMA-ES for each hand sequence, which is chosen hand by hand from the best rewards."""
+    """CMA-ES for each hand sequence; the hands are chosen goal by goal from a value table."""
 
     name = "cma-es/goal-by-goal"
     version = 2

@@ -2,8 +2,8 @@
 
 A controller makes control steps of at most ``period`` ticks until the hand is in its goal. The
 cascade (:mod:`coartic.baselines.cascade`) computes each step: level 1 moves the hand, and level 2
-chooses among the joint changes that do so. The search simulates each hand sequence as long as the
-sequence can still be the best.
+chooses among the joint changes that do so. The search is best-first over prefixes of hand
+sequences: it extends the prefix with the fewest ticks by the next goal.
 """
 
 from __future__ import annotations
@@ -49,18 +49,19 @@ class Leg(NamedTuple):
     q: Array
     """Configuration in which the hand hits the goal, shape ``(dof,)``."""
     memory: Any
-    """Memory of the controller after the last control step. The next leg begins with it."""
+    """Memory of the controller after the last control step; the next leg begins with this
+    memory."""
     steps: NDArray[np.int64]
     """Numbers of control steps, shape ``(3,)``:
 
     - all steps;
-    - steps in which level 1 binds: the changes are not the preferred ones;
-    - steps in which level 2 binds: the changes are not those of level 1.
+    - steps in which level 1 binds: the changes of level 1 differ from the preferred changes;
+    - steps in which level 2 binds: the changes of level 2 differ from the changes of level 1.
     """
 
 
 class _StuckError(Exception):
-    """Raised if a hand cannot reach its goal, or gets no nearer to it."""
+    """Raised if a hand cannot reach its goal, or no longer comes nearer to its goal."""
 
 
 @dataclass
@@ -183,7 +184,7 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Solve the cascade (:func:`solve_cascade`), and count programmes and iterations."""
+        """Solve the cascade by :func:`solve_cascade`; count the programmes and the iterations."""
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)
@@ -245,10 +246,11 @@ class Control(Method):
     def solve(self, session: Session) -> Result:
         """Find the hand sequence that takes the controller the fewest ticks.
 
-        The search extends the sequence with the fewest ticks so far by the path to its next goal,
-        until that sequence is complete. Of sequences with equal ticks, it chooses the one with the
-        fewest changes of hand, then the first one. Return a movement for each goal, and counts of
-        the search as details.
+        The search is best-first over prefixes of hand sequences. It extends the prefix with the
+        fewest ticks by the path to the next goal, until the prefix with the fewest ticks is a
+        complete sequence. Ties are broken by the smaller number of changes of hand, then by the
+        order of the sequences. The result has a movement for each goal; the details have the counts
+        of the search.
 
         Raises MethodError if the hand gets stuck in all sequences, or the solver fails.
         """

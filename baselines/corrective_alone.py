@@ -24,7 +24,7 @@ class GivenHands(Method):
     stochastic = False
 
     def solve(self, session: Session) -> Result:
-        """Make one trial with the task's initial hands, and return its movements.
+        """Make one trial with the task's initial hands, and return the movements of the trial.
 
         Raises MethodError if the trial misses a goal.
         """
@@ -54,8 +54,8 @@ class BestHands(GivenHands):
     def solve(self, session: Session) -> Result:
         """Make a trial for each hand sequence, and return the movements of the best trial.
 
-        Trials stop when the budget ends. Of trials with equal rewards, the one with the fewest
-        changes of hand is best.
+        The method stops early if the trial budget is used up. Of trials with equal rewards, the
+        trial with the fewest changes of hand is best.
 
         Raises MethodError if no trial hits every goal.
         """

@@ -1,4 +1,4 @@
-"""CMA-ES as in the package ``cma``, bit for bit, but faster and without its slow import.
+"""CMA-ES with the same points as the package ``cma``, bit for bit, but faster.
 
 The algorithm is that of N. Hansen (2016), The CMA evolution strategy: a tutorial
 (arXiv:1604.00772), with negative weights. Symbols are the tutorial's, and numbers in brackets are
@@ -8,11 +8,11 @@ two differences:
 
 - The package mirrors some points of a generation with fewer than six points. This strategy does
   not.
-- The package begins to rescale the coordinates at variances 1e8 apart or a condition number of
-  1e12. This strategy stops there.
+- The package rescales the coordinates when the ratio of two variances exceeds 1e8 or the condition
+  number of the covariance exceeds 1e12. This strategy stops instead.
 
-Weights are added from left to right, as the package adds them up to Python 3.11. The ``sum`` of
-later versions of Python rounds differently.
+Weights are added from left to right, as ``sum`` adds them in Python 3.11 and earlier. The ``sum``
+of later versions of Python rounds differently.
 """
 
 from __future__ import annotations
@@ -45,9 +45,10 @@ def _sum(weights: list[float]) -> float:
 
 
 class EvolutionStrategy:
-    """Evolution strategy with covariance matrix adaptation, by an ask-and-tell interface.
+    """Evolution strategy with covariance matrix adaptation and an ask-and-tell interface.
 
-    Call :meth:`ask` for points and :meth:`tell` for their costs in turn until :meth:`has_ended`.
+    Until :meth:`has_ended` returns True, get points from :meth:`ask` and pass their costs to
+    :meth:`tell`.
 
     Parameters
     ----------
@@ -139,8 +140,10 @@ class EvolutionStrategy:
 
     @property
     def costs(self) -> Array:
-        """Sorted costs of the last generation, shape ``(size,)``; empty before the first
-        :meth:`tell`."""
+        """Sorted costs of the last generation, shape ``(size,)``.
+
+        The array is empty before the first :meth:`tell`.
+        """
         return self._costs
 
     def ask(self) -> Array:

@@ -1,23 +1,27 @@
 """Hill climbing: Gaussian noise and random hands, with a (1+1) climber for each hand sequence.
 
 Each hand sequence has a centre. In the first trial of a sequence only the corrective process **A**
-acts (but see ``begin``). The configurations in which this trial hits the goals are the first
-centre. Each later trial perturbs all explored joints of the centre at once. A better trial moves
-the centre to the configurations in which it hit the goals, as in the learner. Moving the centre to
-the trial's targets instead would gain more: on the paper's tasks random search with 1,000
-``stages`` gains 0 to 16 ticks more with targets.
+acts (parameter ``begin`` can change this). The configurations in which this trial hits the goals
+are the first centre. The targets of each later trial are the centre plus noise on all explored
+joints. If a trial is better than the centre, the configurations in which the trial hit the goals
+become the new centre, as in the learner. Taking the trial's targets as the new centre would gain
+more: on the paper's tasks random search with 1,000 ``stages`` gains 0 to 16 ticks more with
+targets.
 
 Hands are explored as in the learner: for each goal of the best sequence known, with probability ε,
 a random hand replaces the hand. The default standard deviation and ε are the learner's; they were
 not tuned.
 
-With ``spread="learned"`` each hand sequence has its own standard deviation, which follows the
-one-fifth rule (Beyer and Schwefel 2002). After every W trials with the sequence it is multiplied by
-1.5 if more than a fifth of these trials were at least as good as the centre was at their time;
-otherwise it is divided by 1.5^(1/4). It stays between a floor and 0.3.
+With ``spread="learned"`` each hand sequence has its own standard deviation σ, which follows the
+one-fifth rule (Beyer and Schwefel 2002). A trial succeeds if it is at least as good as the centre
+around which it was drawn. After every W trials with the sequence
 
-In noise the value of a centre is the reward of the trial that made it, which was partly lucky, as
-in the learner.
+- σ is multiplied by 1.5 if more than a fifth of the W trials succeeded;
+- otherwise σ is divided by 1.5^(1/4);
+- σ is then clipped to the interval from ``floor`` to 0.3.
+
+With motor noise the value of a centre is the reward of one trial, the trial that made this centre.
+That trial was partly lucky. The learner has the same bias.
 """
 
 from __future__ import annotations
@@ -55,9 +59,10 @@ class HillClimbingParameters(SequenceParameters):
     """Targets of the first trial of a hand sequence:
 
     - ``"correction"``: there are none; only **A** acts.
-    - ``"best"``: as in the learner's table. If a goal has the same hand and the same hand before as
-      in the best sequence so far, its target is the centre of that sequence plus noise. At the
-      other goals, and at all goals before the first success, **A** acts.
+    - ``"best"``: as in the learner's table. Where the sequence has the same hand at a goal and the
+      same hand at the goal before as the best sequence so far, the target is the centre of the best
+      sequence plus noise. At the other goals **A** acts. Until a trial has succeeded, **A** acts at
+      all goals.
     """
     spread: Literal["fixed", "learned"] = "fixed"
     """``"fixed"`` if the standard deviation is always ``sigma``; ``"learned"`` if it begins with
@@ -82,8 +87,8 @@ class HillClimbing(Method):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left or all hand sequences have failed.
 
-        Return the movements of the best trial. In noise, return movements to the centre of its hand
-        sequence, round which the next trial with these hands would be drawn.
+        Return the movements of the best trial. With motor noise, return movements to the present
+        centre of the best trial's hand sequence.
 
         Raises MethodError if no trial hits every goal.
         """

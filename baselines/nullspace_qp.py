@@ -1,23 +1,25 @@
 """Prioritised null-space control by quadratic programmes: the hand first, then the joints.
 
 At each control step level 1 of the cascade (:mod:`coartic.baselines.cascade`) moves the hand
-straight towards the centre of its goal. Many joint changes x do so; they differ by motion in the
-null space of the hand's Jacobian J. Level 2 chooses among them. Level 1 is::
+straight towards the centre of its goal. Many joint changes x move the hand in this way; they differ
+by motion in the null space of the hand's Jacobian J. Level 2 chooses one of these changes. Level 1
+is::
 
     J x = v J J⁺ u,  that is  A = (J; -J),  b = A v J⁺ u,      v = min(1 / |J⁺ u|, d)
 
-Here u is the unit vector from the hand to the centre, d is their distance and v is the speed of the
-hand. Lengths are in lengths of a control step. The speed is that of the minimum-norm solution, but
-at most d. If level 2 makes the joint step longer than a control step may be, the whole step is
-shortened: the hand still goes straight, but slower.
+Here u is the unit vector from the hand to the centre, d is the distance from the hand to the
+centre, and v is the speed of the hand. The unit of length is the length of a control step. The
+speed v is the speed of the minimum-norm solution, but at most d. If the solution of level 2 is
+longer than a control step, it is scaled down to the length of a control step: the hand still goes
+straight, but slower.
 
 Level 2 chooses the x that is nearest to
 
 - 0 in ``least-motion``, so that x is almost v J⁺ u;
-- a step towards a posture of the next goal in ``next-goal-posture``. With equal steps of this kind
-  the robot would be in the posture when the hand is at its goal. The step is at most as long as a
-  control step. The corrective process finds the posture at the moment when a goal becomes current,
-  from the configuration of that moment.
+- a step towards a posture of the next goal in ``next-goal-posture``. The step is the change to that
+  posture divided by the number of control steps to the goal, but no longer than a control step.
+  When a goal becomes current, the corrective process finds the posture of the next goal from the
+  robot's configuration.
 
 Sources: Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987), Task-priority based redundancy control of
 robot manipulators; O. Kanoun, F. Lamiraux, P.-B. Wieber (2011); with the next goal as the objective
@@ -92,10 +94,11 @@ class NextGoalController(HandController):
     """
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Return a posture of the next goal as the memory, shape ``(dof,)``.
+        """Find a posture for the next goal, shape ``(dof,)``, and return it as the memory.
 
-        The memory is the posture in which the corrective process, starting from ``q``, hits the
-        first goal ahead for which it converges. If it converges for none, the memory is ``q``.
+        The corrective process starts from ``q`` and tries the goals ahead in order. The memory is
+        the posture of the first goal for which the process converges, or ``q`` if it converges for
+        none.
         """
         for hand, goal in aims[1:]:
             correction = self.session.correct(q, hand, goal + 1)
@@ -104,10 +107,10 @@ class NextGoalController(HandController):
         return q
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return an equal share of the joint changes from ``q`` to the posture ``memory``.
+        """Return the change from ``q`` to the posture ``memory``, divided by the steps to the goal.
 
-        The changes are divided by ``steps``, or by 1 if ``steps`` is smaller. If their norm is
-        above 1, they are scaled to norm 1. Shapes and units are those of the base class.
+        The divisor is ``max(steps, 1)``. A change with a norm above 1 is scaled to norm 1. Shapes
+        and units are those of the base class.
         """
         path = (memory - q)[self.moving] / self.length
         return np.asarray(path / max(steps, float(np.linalg.norm(path)), 1.0))

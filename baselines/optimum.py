@@ -1,10 +1,10 @@
 """The search for the optimum, the best reward that a global search finds.
 
 A trial loses reward in proportion to the length of its path in joint space. So this method
-searches, over hand sequences, for the shortest path that touches the discs of all goals in turn. It
-starts from the chains of posture graphs (layered dynamic programming). It then rounds the plans
-that may be best to whole control ticks. In some roundings a goal takes no movement, because the
-hand is already inside the goal when its turn comes.
+searches, over hand sequences, for the shortest path that touches the discs of all goals in their
+order. The starts of the search are the shortest paths through posture graphs, which dynamic
+programming finds. The method then rounds the best plans to whole control ticks. In some roundings a
+goal takes no movement, because the hand is already inside the goal when its turn comes.
 
 The method is the reference for the gaps of all other methods, not a competitor. The study
 ``studies/optima`` proves bounds on the optima.
@@ -12,12 +12,16 @@ The method is the reference for the gaps of all other methods, not a competitor.
 ``trajectory-optimisation/path-length`` searches for the same paths from other graphs and starts.
 
 With motor noise the shortest path is not the best solution, and in the maximum norm it is not even
-the shortest. ``optimum/in-model`` searches in any world: CMA-ES minimises the mean ticks over the
-targets, from two starts. One is the path that ``optimum/search`` finds (in the maximum norm with
-Euclidean lengths), the other are the postures of the corrective process with its best hands. In
-noise, all solutions of a generation meet the same 100 draws, and each generation meets other draws.
-What the starts end with is judged by 1,000 draws that no generation has met. The best of them is
-the best that is known in this world; nothing proves that it is the optimum.
+the shortest. ``optimum/in-model`` searches in any motion model: CMA-ES varies the targets to
+minimise the mean ticks. CMA-ES runs from two starts:
+
+- the path that ``optimum/search`` finds (in the maximum norm with Euclidean lengths);
+- the postures of the corrective process with its best hands.
+
+With motor noise, all solutions of a generation are executed with the same 100 noise draws, and
+each generation has new draws. The start and the results of each search are then compared on 1,000
+draws that no generation has used. The solution with the fewest mean ticks on these draws is the
+best known solution in this model; nothing proves that it is the optimum.
 """
 
 from __future__ import annotations
@@ -67,7 +71,7 @@ MOST_KEPT = 64  # hand sequences whose shortest paths are stored with the soluti
 
 
 class OptimumParameters(Parameters):
-    """Restriction of the movements, and effort of the search."""
+    """Parameters: restrictions of the movements, and effort of the search."""
 
     other_arm: Literal["free", "still"] = "free"
     """``"still"`` if the arm whose hand is not chosen for a goal must not move on the way to the
@@ -76,7 +80,7 @@ class OptimumParameters(Parameters):
     """Base coordinates to lock in addition to the task's own locks: ``"y"``, ``"xy"``, or
     ``"task"`` for none."""
     nodes: Nodes = 200
-    """Largest number of postures for a goal and hand in a graph."""
+    """Largest number of postures in a graph for each pair of goal and hand."""
     graphs: Count = 3
     """Least number of independent graphs. More graphs are made until there are enough chains."""
     chains: Count = 100
@@ -85,7 +89,7 @@ class OptimumParameters(Parameters):
 
 
 class OptimumSearch(Method):
-    """The shortest path found over hand sequences, in whole ticks."""
+    """Search over hand sequences for the shortest path, rounded to whole ticks."""
 
     name = "optimum/search"
     version = 2
@@ -166,7 +170,7 @@ def with_locks(task: Task, base: str) -> Task:
 
 
 class InModelParameters(Parameters):
-    """Effort of the search in any world."""
+    """Parameters: effort of the search in any motion model."""
 
     evaluations: Annotated[int, Field(ge=0)] = 4000
     """Number of solutions that CMA-ES tries from each start; the last generation is completed."""
@@ -190,7 +194,7 @@ class _Start(NamedTuple):
 
 
 class InModel(Method):
-    """The solution with the fewest mean ticks found in a world, with noise or without."""
+    """Search for the solution with the fewest mean ticks in any motion model, noisy or not."""
 
     name = "optimum/in-model"
     tuned_on = "ascending and two-armed-2: two step sizes"
@@ -211,8 +215,8 @@ class InModel(Method):
     def solve(self, session: Session) -> Result:
         """Search from both starts, and return the movements with the fewest mean ticks.
 
-        The details have, for each start, its hands and two mean ticks in the judging noise: of the
-        start itself, and of the best solution that was found from it.
+        The details have, for each start, its hands and two mean ticks over the judging draws:
+        ``start``, of the start itself, and ``end``, of the best solution found from it.
 
         Raises MethodError if no path is found and the corrective process completes no sequence.
         """
@@ -286,10 +290,18 @@ def _postures(session: Session, task: Task) -> _Start | None:
 
 
 def with_entries(targets: Configs, points: Array) -> Configs:
-    """Return a copy of targets ``(G, dof)`` for each point, with its values in place of numbers.
+    """Return N copies of targets, in which the entries that are not NaN are replaced.
 
-    ``points`` has shape ``(N, n)``, where n is the number of entries of ``targets`` that are not
-    NaN; the result has shape ``(N, G, dof)``.
+    Parameters
+    ----------
+    targets : ndarray, shape (G, dof)
+        Targets, of which n entries are not NaN.
+    points : ndarray, shape (N, n)
+        For each copy, the values of these n entries, goal by goal.
+
+    Returns
+    -------
+    ndarray, shape (N, G, dof)
     """
     copies = np.repeat(targets[None], len(points), axis=0)
     copies[:, ~np.isnan(targets)] = points
@@ -297,15 +309,18 @@ def with_entries(targets: Configs, points: Array) -> Configs:
 
 
 MeanTicks = Callable[[Array, int, int], Array]
-"""Function of points ``(N, n)``, the number of a first draw, and a number of executions. It returns
-the mean ticks of each point, shape ``(N,)``."""
+"""Function that returns the mean ticks of points, shape ``(N,)``.
+
+Its arguments are the points, shape ``(N, n)``, the number of the first noise draw, and the number
+of executions of each point."""
 
 
 def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed: int) -> MeanTicks:
-    """Return a function that executes points with the hands of a start, side by side.
+    """Return a function that computes the mean ticks of points, with the hands of a start.
 
-    A point has the entries of targets that are not NaN in the start. All points meet the same
-    draws, of a seed that no session has. A failed execution counts as ``worst`` ticks.
+    A point is a vector of the target entries that are not NaN in the start. All points are executed
+    with the same noise draws, whose seed no session uses. A failed execution counts as ``worst``
+    ticks.
     """
     compiled = compiled_task(task, session.model)
     world = world_seed(seed, _SEARCH)
@@ -333,10 +348,11 @@ def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed:
 def minima(
     mean_ticks: MeanTicks, start: Array, evaluations: int, executions: int
 ) -> Iterator[Array]:
-    """Minimise mean ticks by CMA-ES, and yield the solutions of each restart.
+    """Minimise mean ticks by CMA-ES, and yield two solutions of each restart.
 
-    These are its last mean, and the point with the fewest mean ticks in its generation. A restart
-    begins at that point, with twice the population.
+    The two solutions are the last mean, and the best point: the point with the fewest mean ticks
+    of all generations of the restart. The next restart begins at the best point, with twice the
+    population size.
 
     Parameters
     ----------
@@ -345,9 +361,9 @@ def minima(
     start : ndarray, shape (n,)
         Mean of the first generation.
     evaluations : int
-        Number of points to try, to within a generation.
+        Number of points to evaluate; the last generation is completed.
     executions : int
-        Number of executions of each point. Each generation has other draws.
+        Number of executions of each point. Each generation has new noise draws.
 
     Yields
     ------

@@ -1,35 +1,39 @@
-"""Policy gradient: a Gaussian over targets whose mean and spread follow the gradient of the reward.
+"""Policy gradient: the mean and spread of Gaussian targets follow the gradient of reward.
 
 The rule is REINFORCE (Williams 1992) for a Gaussian policy. Haith (2025) proposes it as a theory of
 how people improve a movement by practice: after each trial the mean *and* the spread of their
 movements change in the direction that makes better movements more frequent.
 
 Each hand sequence has a Gaussian policy over the targets of all explored joints, with mean m and a
-standard deviation e^ν for each coordinate. The first mean is made of the postures in which the
-corrective process **A** on its own hits the goals, which takes one trial. The first standard
-deviations are ``sigma``. A batch has B trials, with targets m + e^ν z, where z is standard normal,
-and rewards R::
+standard deviation e^ν for each coordinate. The first mean consists of the postures in which the
+corrective process **A** on its own hits the goals; finding them takes one trial. The first standard
+deviations are ``sigma``. A batch has B trials with targets m + e^ν z, where z is standard normal.
+After a batch with rewards R the policy is updated by ::
 
     A = (R - b) / d, at least -3 and at most 3
     m <- m + α e^ν mean(A z)
     ν <- ν + β mean(A (z² - 1)), with e^ν at least 0.005 and at most 0.3
 
-- b is a running mean of the rewards, and d is a running mean of 1.25 |R - b|, which estimates their
-  standard deviation, but at least 1 tick. A batch uses b and d from before it, the first batch its
-  own. Then both move by a tenth towards the values of the batch, d with the b from before it.
-- Without the bound on A, one bad batch can carry the policy away.
-- A failed trial counts as the worst reward of all batches so far, less one tick. While no trial of
-  a batch has hit every goal, it counts as twice the ticks of the corrective process.
-- The last batch changes nothing if it is incomplete.
+- The baseline b is an exponential moving average of the rewards.
+- The scale d is an exponential moving average of 1.25 |R - b|, an estimate of the standard
+  deviation. Where d is below 1 tick, A is computed with 1 tick.
+- A batch is updated with the b and d before this batch; the first batch is updated with its own
+  mean reward and its own mean of 1.25 |R - b|. After the update, b and d move by a tenth of the
+  difference towards the values of the batch, where |R - b| is computed with the old b.
+- Without the bounds on A, a single bad batch can move the policy far away.
+- A failed trial counts as the worst reward of all batches so far, less one tick. Until a trial of a
+  batch has hit every goal, a failed trial counts as minus twice the ticks of the corrective
+  process.
+- An incomplete last batch does not change the policy.
 
-With ``spread="fixed"`` ν stays. The hands are chosen by the same bandit as in ``cma-es/bandit``. A
-softmax over the hands of each goal, whose preferences follow the same gradient, was tried on the
-development instances on which the method was tuned. With the better of two steps for the
-preferences its answers take 23 % more ticks than the bandit's (geometric means over runs; 10 to
-46 % in the four families with two arms).
+With ``spread="fixed"`` ν does not change. The hands are chosen by the same bandit as in
+``cma-es/bandit``. A softmax policy over the hands of each goal, whose preferences follow the same
+gradient, was tried on the development instances on which the method was tuned. With the better of
+two step sizes for the preferences, the answers of the softmax policy take 23 % more ticks than the
+answers of the bandit (geometric means over runs; 10 to 46 % in the four families with two arms).
 
-In noise the answer is a mean: that of the hand sequence whose last complete batch has the best mean
-reward.
+With motor noise the answer is the mean m of one hand sequence: the sequence whose last complete
+batch has the best mean reward.
 """
 
 from __future__ import annotations
@@ -62,8 +66,8 @@ class PolicyGradientParameters(SequenceParameters):
     """``"fixed"`` if the standard deviation of each coordinate is always ``sigma``; ``"learned"``
     if it begins with ``sigma`` and follows the gradient."""
     batch: Annotated[int, Field(ge=2)] | None = None
-    """Number B of trials in a batch. None stands for the number that was tuned for ``spread``, as
-    in the two following parameters."""
+    """Number B of trials in a batch. None stands for the value that was tuned for the given
+    ``spread``; so it does for ``step`` and ``spread_step``."""
     step: Annotated[float, Field(gt=0, le=1000)] | None = None
     """Step α of the mean."""
     spread_step: Annotated[float, Field(gt=0, le=1000)] | None = None
@@ -85,7 +89,7 @@ class Policy(Search):
     ----------
     rng : numpy.random.Generator
     attempts : Attempts
-        Account of the trials of the run.
+        Makes and counts the trials of the run.
     hands : str
         Hand sequence, such as ``"RRLR"``.
     parameters : PolicyGradientParameters
@@ -111,7 +115,7 @@ class Policy(Search):
         self._cost = math.inf
 
     def generation(self) -> None:
-        """Make the trials of a batch, and move mean and spread along the gradient."""
+        """Make the trials of a batch, and update mean and spread by the gradient."""
         z = self._rng.standard_normal((self._batch, len(self.mean)))
         spread = exp(self.log_spread)
         rewards = self.make_trials(self.mean + spread * z)
@@ -137,13 +141,15 @@ class Policy(Search):
 
     @property
     def answer(self) -> tuple[float, Array]:
-        """Mean cost of the last complete batch in ticks, infinity if there is none; and the
-        mean."""
+        """Mean cost of the last complete batch in ticks, and the mean of the policy.
+
+        Without a complete batch the cost is infinity.
+        """
         return self._cost, self.mean
 
 
 class PolicyGradient(Method):
-    """A Gaussian for each hand sequence, whose mean and spread follow the gradient of reward."""
+    """REINFORCE with a Gaussian policy over targets for each hand sequence."""
 
     name = "policy-gradient"
     tuned_on = "development instances d000 to d002 of five families, in two worlds"
@@ -157,9 +163,12 @@ class PolicyGradient(Method):
 
         In noise, return movements to a mean (:func:`.recommend`).
 
-        Each hand sequence first gets a trial by the corrective process. If there are more than 4096
-        sequences, only the initial one does; if parameter ``sequence`` is given, only this one. If
-        all of these first trials fail, the method stops.
+        The method first makes one trial with each hand sequence, in which only the corrective
+        process acts. If all of these trials fail, the method stops. It uses only one sequence in
+        two cases:
+
+        - If parameter ``sequence`` is given, the method uses that sequence.
+        - If there are more than 4096 sequences, the method uses the task's initial sequence.
 
         Raises MethodError if no trial hits every goal.
         """

@@ -3,11 +3,12 @@
 For each goal the planner first finds a posture, and then moves to it straight in joint space
 (Rosenbaum, Meulenbroek, Vaughan & Jansen 2001):
 
-1. *Instance retrieval.* The stored postures are corrected towards the goal. Among those whose hand
-   is then at the goal, the posture with the least cost of travel is retrieved.
+1. *Instance retrieval.* The stored postures are corrected towards the goal. Of the corrected
+   postures whose hand is at the goal, the posture with the lowest cost of travel is retrieved.
 2. *Instance generation.* Until a deadline the planner generates postures that resemble the
-   retrieved one, and evaluates them in the same way. Feedforward correction improves their accuracy
-   (Rosenbaum, Loukopoulos, Meulenbroek, Vaughan & Engelbrecht 1995).
+   retrieved one, and corrects and evaluates the new postures in the same way. Feedforward
+   correction improves their accuracy (Rosenbaum, Loukopoulos, Meulenbroek, Vaughan & Engelbrecht
+   1995).
 3. An internal simulation computes where the movement ends. The planned postures are added to the
    store.
 
@@ -23,7 +24,7 @@ The method differs from the theory in these points:
 - The store begins with random postures of the arms around the start. The base is placed so that the
   hand is at the goal.
 - Diffusion becomes narrower until the deadline, around a weighted sum of the better postures (the
-  rule of 1995). This makes it converge.
+  rule of 1995). The narrowing makes the search converge.
 - The hand is planned together with the posture.
 """
 
@@ -81,7 +82,7 @@ class PostureBasedParameters(Parameters):
 
 
 class PostureBased(Method):
-    """Base of posture-based planning, which plans for ``horizon`` goals (1 or 2) at a time."""
+    """Base class of posture-based planning over a horizon of ``horizon`` goals (1 or 2)."""
 
     version = 2
     horizon: ClassVar[Literal[1, 2]]
@@ -91,7 +92,7 @@ class PostureBased(Method):
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
 
     def solve(self, session: Session) -> Result:
-        """Plan a movement to each goal from the expected end of the movement before.
+        """Plan the movements to the goals in their order; return them and their expected ticks.
 
         Raises MethodError if correction brings no posture to a goal.
         """
@@ -103,7 +104,7 @@ class PostureBased(Method):
 
 
 class OneGoal(PostureBased):
-    """Posture-based planning of each posture for its own goal only."""
+    """Posture-based planning that chooses each posture only for its own goal."""
 
     name = "posture-based/one-goal"
     title = "posture planning, one goal"
@@ -116,7 +117,7 @@ class OneGoal(PostureBased):
 
 
 class TwoGoals(PostureBased):
-    """Posture-based planning of each posture together with a posture for the next goal."""
+    """Posture-based planning that chooses each posture together with one for the next goal."""
 
     name = "posture-based/two-goals"
     title = "posture planning, two goals"
@@ -168,7 +169,7 @@ class PosturePlanner:
     def plan(self) -> tuple[tuple[Movement, ...], list[int]]:
         """Plan the movements to all goals.
 
-        Call it once: it changes ``q`` and ``store``.
+        Call this method once: it changes ``q`` and ``store``.
 
         Returns
         -------
@@ -218,12 +219,12 @@ class PosturePlanner:
         return tuple(movements), ticks
 
     def retrieve(self, goals: range) -> Layers:
-        """Return postures with a hand at a goal, from the store.
+        """Correct the stored postures towards the goals, and return those that hit them.
 
-        A posture is made in three steps:
+        For each goal and hand, each stored posture is corrected in three steps:
 
-        1. The posture has the angles of the hand's arm from a stored posture, and all other entries
-           from ``q``.
+        1. The angles of the hand's arm are copied from the stored posture, all other entries from
+           ``q``.
         2. The free base coordinates move by the displacement from the hand to the goal.
         3. Base and arm are corrected (:meth:`correct`). Postures whose hand is still not at the
            goal are left out.
@@ -236,7 +237,7 @@ class PosturePlanner:
         Returns
         -------
         dict
-            Postures, shape ``(n, dof)``, by goal and hand.
+            Maps each pair (goal, hand) to the postures that hit, shape ``(n, dof)``.
         """
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
@@ -251,14 +252,14 @@ class PosturePlanner:
     def most_promising(self, hands: HandSequence, layers: list[Array]) -> Array:
         """Return the retrieved postures with the shortest joint-space path from ``q``.
 
-        On the way to a second posture only the base and the arm of its hand move.
+        On the way to the second of two postures only the base and the arm of the second hand move.
 
         Parameters
         ----------
         hands : tuple of str
             Hand of each goal.
         layers : list of ndarray, shape (n, dof)
-            Retrieved postures of one goal, or of two goals in turn.
+            Retrieved postures of each goal: one array for a horizon of 1, two arrays for 2.
 
         Returns
         -------
@@ -284,12 +285,12 @@ class PosturePlanner:
     def generate(
         self, promising: dict[HandSequence, Array], noises: Array, goals: range
     ) -> list[tuple[float, HandSequence, Array]]:
-        """Generate postures around the retrieved ones, and return the cheapest.
+        """Improve the retrieved postures of each hand sequence by random search.
 
         Parameters
         ----------
         promising : dict
-            Retrieved postures, shape ``(goals, dof)``, by hand sequence.
+            Maps each hand sequence to its retrieved postures, shape ``(goals, dof)``.
         noises : ndarray, shape (hand sequences, rounds, PER_ROUND, goals, dof)
             Standard normal noise.
         goals : range
@@ -298,8 +299,9 @@ class PosturePlanner:
         Returns
         -------
         list of tuple
-            For each hand sequence: the cost of its cheapest postures (joint-space length of the
-            path from ``q`` through them), the hand sequence, and the postures, ``(goals, dof)``.
+            For each hand sequence a tuple (cost, hand sequence, postures). The postures, shape
+            ``(goals, dof)``, are the cheapest that were found; their cost is the joint-space length
+            of the path from ``q`` through the postures.
         """
         sequences = [*promising]
         centre = best = np.stack([*promising.values()])
@@ -332,14 +334,14 @@ class PosturePlanner:
         return list(zip(costs.tolist(), sequences, best, strict=True))
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
-        """Move a hand towards a goal, by changing postures in place.
+        """Correct postures in place, so that a hand comes to a goal.
 
         The session counts the evaluations.
 
         Parameters
         ----------
         postures : ndarray, shape (..., dof)
-            Contiguous postures, which are changed.
+            Postures, a contiguous array that is changed in place.
         goal : int
             Number of the goal, from 0.
         hand : {"left", "right"}
@@ -349,7 +351,7 @@ class PosturePlanner:
         Returns
         -------
         ndarray of bool, shape (...)
-            True where the hand is then within ``tolerance`` of the goal's centre.
+            True for each posture whose hand is now within ``tolerance`` of the goal's centre.
         """
         flat = postures.reshape(-1, postures.shape[-1])
         arm = self.robot.arm(hand)

@@ -2,8 +2,9 @@
 
 Each goal is a layer. Its nodes are postures (base and one arm) that put a hand inside the goal's
 disc. A movement moves the base and the chosen arm; the other arm stays in the posture in which it
-was last used. So the state at a goal is a pair of nodes, one for each arm, and dynamic programming
-finds the cheapest chain of nodes for a hand sequence exactly.
+was last used. So the state at a goal is a pair of nodes, one for each arm. Dynamic programming over
+prefixes of the hand sequence finds the cheapest path through the layers exactly. Such a path, with
+a node for each goal, is called a *chain*.
 
 This is the global part of a search. The local part is :mod:`coartic.baselines.trajectory_problem`.
 """
@@ -27,17 +28,17 @@ KINEMATICS = frozenset({Information.GOALS, Information.FORWARD_KINEMATICS, Infor
 """Information that planners use about goals and hands."""
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
-"""A hand sequence with a configuration for each goal, ``(G, dof)``, from which a solver starts."""
+"""A hand sequence, and the configurations at the goals, shape ``(G, dof)``: a solver's start."""
 Layers = dict[tuple[int, Hand], Array]
-"""Nodes, shape ``(n, dof)``, by goal (from 0) and hand."""
+"""Dict that maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``."""
 Nodes = Annotated[int, Field(ge=10, le=1000)]
 """Parameter: number of samples for a layer."""
 Count = Annotated[int, Field(ge=1)]
 """Parameter: a number of graphs, chains or starts."""
 BEAM_WIDTH = 64
-"""Largest number of hand sequences that are planned for each graph. With two hands, these are all
-sequences for up to six goals. For more goals, a beam search of this width over the goals chooses
-the sequences."""
+"""Largest number of hand sequences that are planned for each graph. With two hands and up to six
+goals this includes all sequences. For more goals, a beam search of this width over the goals
+chooses the sequences."""
 QUICK = {"nodes": 40, "graphs": 1, "chains": 1}
 """Parameters of a planner for a check that takes seconds."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
@@ -83,43 +84,45 @@ def _sample_postures(
 
 
 class Beginning(NamedTuple):
-    """The first goals of a hand sequence, with their cheapest chains of nodes.
+    """A prefix of hand sequences, with the costs of its cheapest paths.
 
-    A chain has a node for each goal. There is a cheapest chain to each pair of end nodes, one node
-    for each hand.
+    Dynamic programming over prefixes: the state is a pair of last nodes, namely the last node of
+    the left hand and the last node of the right hand. For each pair, the class stores the cost of
+    the cheapest path through the layers of the prefix.
     """
 
     hands: HandSequence
     nodes: dict[Hand, Array]
-    """Nodes of the layer in which each hand was last used, shape ``(n, dof)``. A hand that was not
-    used yet has the start as its only node."""
+    """Nodes of the layer in which each hand was last used, shape ``(n, dof)``. For a hand that was
+    not used yet, the only node is the start."""
     cost: Array
-    """``cost[i, j]`` is the joint-space length of the shortest chain to node i of the hand used
-    last and node j of the other hand."""
+    """``cost[i, j]`` is the joint-space length of the shortest path whose last nodes are node i of
+    the hand used last and node j of the other hand."""
     back: tuple[NDArray[np.int32], ...]
-    """For each goal an array. Its entry ``[i, j]`` is the index of the node from which the hand
-    came to node i in the cheapest chain to the pair i, j."""
+    """Predecessors, an array for each goal. Entry ``[i, j]`` is the index of the node before node i
+    of the same hand, on the cheapest path to the pair (i, j)."""
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
-    """Sample postures with the hand in the goal, for each goal and hand.
+    """Sample postures that hit the goal, for each pair of goal and hand.
 
-    Half of the samples begin at nodes of the goal before, of either hand, if there are any. The
-    other samples begin at the task's start.
+    Sampling projects a random configuration onto the goal's disc. Half of the configurations are
+    drawn around nodes of the goal before, for either hand, if there are any nodes. The other
+    configurations are drawn around the task's start.
 
     Parameters
     ----------
     task : Task
     count : int
-        Number of samples for a goal and hand. Samples that miss the goal are left out.
+        Number of samples for each pair of goal and hand. Samples that miss the goal are left out.
     rng : numpy.random.Generator
 
     Returns
     -------
     dict
-        Nodes, shape ``(n, dof)``, by goal (from 0) and hand.
-    Counter
-        Numbers of ``forward_kinematics`` and ``jacobians`` evaluated.
+        Maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``.
+            Counter
+        Numbers of evaluations, keyed by ``forward_kinematics`` and ``jacobians``.
     """
     spent: Counter[str] = Counter()
     layers: Layers = {}
@@ -138,24 +141,24 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
 def chains_of(
     task: Task, layers: Layers, most: int | None = None, base_weight: float = 1.0
 ) -> list[Chain]:
-    """Find the cheapest chain of nodes of each hand sequence.
+    """Find the cheapest chain of nodes for each hand sequence, by dynamic programming.
 
     Parameters
     ----------
     task : Task
     layers : dict
-        Nodes, shape ``(n, dof)``, by goal (from 0) and hand.
-    most : int, optional
-        Width of the beam search: at each goal the search continues with this many cheapest
-        beginnings of sequences. By default it continues with all.
+        Maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``.
+            most : int, optional
+                Width of the beam search: at each goal only this many prefixes, the cheapest, are
+                continued. By default all prefixes are continued.
     base_weight : float
         Weight of the base in the length of a movement (:class:`.MotionModel`).
 
     Returns
     -------
     list of tuple
-        Hand sequence and configurations, shape ``(G, dof)``, of each chain, in alphabetical order
-        of the hands. Hand sequences without a chain are left out.
+        A tuple (hand sequence, configurations of shape ``(G, dof)``) for each chain, in the
+        alphabetical order of the hand sequences. Hand sequences without a chain are left out.
     """
     start = dict.fromkeys(HANDS, np.array(task.q0)[None, :])
     beam = [Beginning((), start, np.zeros((1, 1)), ())]
@@ -185,7 +188,7 @@ def chains_of(
 def _extend(
     task: Task, layers: Layers, begun: Beginning, base_weight: float
 ) -> Iterator[Beginning]:
-    """Yield ``begun`` extended by one goal, for each hand that has a node at this goal."""
+    """Yield ``begun`` extended by one goal, for each hand with a node at that goal."""
     hands, nodes, cost, back = begun
     goal = len(hands)
     for hand in sorted(task.hands):  # left before right
@@ -218,7 +221,7 @@ def cheapest_chains(
     most: int = BEAM_WIDTH,
     spread: bool = False,
 ) -> Iterator[Chain]:
-    """Yield the cheapest chain of each hand sequence from random posture graphs.
+    """Sample random posture graphs, and yield the cheapest chain of each hand sequence.
 
     Parameters
     ----------
@@ -227,11 +230,11 @@ def cheapest_chains(
     task : Task
     rng : numpy.random.Generator
     nodes : int
-        Number of samples for a goal and hand of a graph.
+        Number of samples in a graph for each pair of goal and hand.
     graphs : int
         Least number of graphs.
     chains : int
-        Least number of chains. More graphs are made until there are this many.
+        Least number of chains. More graphs are made until there are this many chains.
     most : int
         Largest number of hand sequences of a graph (:func:`chains_of`).
     spread : bool
@@ -271,8 +274,9 @@ def cheapest_chains(
 def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
     """Return a copy of a chain in which idle arms move towards their next posture.
 
-    From the start to the first goal that its hand hits, and from each such goal to the next, an arm
-    moves in equal steps, goal by goal. After its last goal it does not move.
+    Between two goals that its hand hits, an arm moves by the same change on the way to each goal.
+    The same holds between the start and the first goal that its hand hits. After the last goal that
+    its hand hits, an arm does not move.
 
     Parameters
     ----------

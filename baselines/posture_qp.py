@@ -6,33 +6,35 @@ posture that hits the goal. The ``details`` of a run count how often the priorit
 
 The controller has a **posture** for the current goal and for each goal ahead. The cascade
 (:mod:`coartic.baselines.cascade`) computes both the changes of postures and the control steps:
-level 1 puts the hand into a disc, and level 2 moves the joints towards the preferred configuration.
-A regular polygon replaces the disc, so that the constraint is linear in the change x of the
-joints::
+level 1 moves the hand into a disc, and level 2 moves the joints towards the preferred
+configuration. A regular polygon replaces the disc, so that the constraint is linear in the change x
+of the joints::
 
     n_i · (c - p(q) - J x) <= ρ  for all i,  that is  A = (n_i · J),  b = (n_i · (c - p(q)) - ρ)
 
 Here p(q) is the position of the hand, J its Jacobian, c the centre of the disc, n_i are the normals
-of the polygon's sides and ρ is their distance from c.
+of the polygon's sides and ρ is the distance of the sides from c.
 
-- A posture has its hand in its goal's disc. Changes of postures make the path from one posture to
-  the next shorter, in the metric of the reward, which is Euclidean in joint space. They find a
-  local minimum.
-- A control step has the hand in a disc around the goal that shrinks from the hand's present
-  distance to the goal's radius. The joints prefer to go straight to the posture. So the hand comes
-  nearer step by step, on any path that suits the joints.
+- *Postures.* The disc is the goal's disc. The preferred configurations shorten the path through
+  the postures, which is measured in the metric of the reward (Euclidean in joint space). The
+  postures converge to a local minimum.
+- *Control steps.* The disc around the goal shrinks from the hand's present distance to the goal's
+  radius. The preferred configuration lies straight ahead towards the posture. So the hand comes
+  nearer with each step, on any path that suits the joints.
 
-A posture is found once for each goal. Later each control step, except the first step to a goal,
-also moves the postures by a step. The objective decides which posture hits the current goal:
+Descent finds each posture once. After that, each control step also moves the postures by a step;
+the first control step to a goal does not. The two methods differ in the objective that chooses the
+posture for the current goal:
 
 - ``current-goal``: the posture that is nearest to the robot's configuration;
-- ``goals-ahead``: the posture for which the path to it and on to the next goal's posture is
-  shortest. The next goal's posture is chosen in the same way, with the goal after it.
+- ``goals-ahead``: the posture that makes the path through the postures of this goal and the next
+  two goals shortest. The postures of the next goals are variables of the same problem.
 
 The controller was tuned only on thirty development instances (``d000`` to ``d009`` of families
 one-armed, two-armed and aligned): 12 settings of the controller and, before that, some 50 settings
-of a prototype. The table has the 12 settings, one changed at a time, with the mean gap of
-``goals-ahead`` to the best known path. A star marks the value that is used:
+of a prototype. The table has the mean gap of ``goals-ahead`` to the best known path for the 12
+settings, which were changed one at a time. A star marks the value that is used. *Speed* is the
+lower bound on the speed of the hand towards the goal:
 
 =========================  ====================================================================
 least speed of the hand    0: 2.2 %, 0.03 ★: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
@@ -61,8 +63,8 @@ from coartic.method import Facts, Information
 from coartic.robot import Array, directions
 
 FACES = 16
-"""Number of sides of the polygon that replaces a goal's disc. The polygon is inside the disc, and
-its sides are at most 2 % of the radius from the rim."""
+"""Number of sides of the polygon that replaces a goal's disc. The polygon is inscribed in the disc;
+the distance from its sides to the rim is at most 2 % of the radius."""
 
 _FACE_NORMALS = directions(2 * np.pi * np.arange(FACES) / FACES)
 _INSET = float(directions(np.pi / FACES)[0])
@@ -78,18 +80,22 @@ _SHORTEST = 0.02  # shorter paths get the weight of this length, in length units
 class PostureController(Controller):
     """Go straight in joint space to a posture that hits the current goal.
 
-    The memory has a posture, shape ``(dof,)``, for each aim: the current goal and the goals ahead.
+    The memory is a dict that maps each aim (the current goal and the goals ahead, each with its
+    hand) to a posture, shape ``(dof,)``.
     """
 
     def begin(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
-        """Return a posture that hits its goal for each aim.
+        """Return the memory: a dict that maps each aim to a posture that hits its goal.
 
-        The posture of an aim is the one in ``memory``, if there is one. Otherwise descent finds the
-        posture, beginning at the posture of the aim before, or at ``q`` for the first aim. With
-        more than one aim all postures then move to shorten the path from ``q`` through them. A
-        search that does not converge ends after 400 steps, and its posture may be outside the goal.
+        1. If ``memory`` has a posture for the aim, that posture is used. Otherwise descent finds a
+           posture; the descent begins at the posture of the aim before, or at ``q`` for the first
+           aim.
+        2. If there is more than one aim, all postures then move to shorten the path from ``q``
+           through the postures.
+
+        A search that does not converge ends after 400 steps; its posture may then miss the goal.
 
         Parameters
         ----------
@@ -98,12 +104,12 @@ class PostureController(Controller):
         aims : tuple of Aim
             Hand and goal: the current goal, then the goals ahead.
         memory : dict or None
-            Postures, shape ``(dof,)``, by aim; None for the first movement.
+            Maps each aim to its posture, shape ``(dof,)``; None for the first movement.
 
         Returns
         -------
         dict
-            Postures, shape ``(dof,)``, by aim.
+            Maps each aim to its posture, shape ``(dof,)``.
         """
         earlier, postures = memory or {}, list[Array]()
         for aim in aims:
@@ -124,8 +130,9 @@ class PostureController(Controller):
     ) -> tuple[Solution, Array, dict[Aim, Array]]:
         """Compute a control step towards the posture of the current goal.
 
-        Except at the first step of a movement, the postures of ``memory`` first make a step of
-        their own. Parameters and returned values are those of :meth:`Controller.step`.
+        Before the control step, the postures of ``memory`` move by a step (:meth:`sweep`); not so
+        at the first control step of a movement. Parameters and returned values are those of
+        :meth:`Controller.step`.
         """
         postures = [memory[aim] for aim in aims]
         if not first:
@@ -141,9 +148,10 @@ class PostureController(Controller):
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
         """Move each posture by a step that shortens the path from ``q`` through all of them.
 
-        Each posture steps towards a preferred one (:meth:`step_nearer`): the mean of its two
-        neighbours on the path, weighted by inverse distances (Weiszfeld 1937). The neighbour before
-        the first posture is ``q``. The last posture has one neighbour, and steps towards it.
+        Each posture steps towards a preferred posture (:meth:`step_nearer`). The preferred posture
+        is the mean of the two neighbours on the path, weighted by inverse distances (Weiszfeld
+        1937). The neighbour before the first posture is ``q``. For the last posture, which has only
+        one neighbour, the preferred posture is this neighbour.
 
         Parameters
         ----------
@@ -173,10 +181,10 @@ class PostureController(Controller):
         return largest
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
-        """Make a Gauss-Newton step towards the posture that hits a goal and is nearest to another.
+        """Make a Gauss-Newton step to the posture that hits a goal nearest to ``preferred``.
 
-        If the step hardly brings the hand nearer to the goal, it also bends the arm. Joints do not
-        have limits.
+        If the step brings the hand hardly any nearer to the goal, the step also bends the arm.
+        Joints do not have limits.
 
         Parameters
         ----------

@@ -1,16 +1,17 @@
-"""Random search: the paper's learner without its memory. The solution is the best trial.
+"""Random search: the paper's learner without its table. The solution is the best trial.
 
 In the first trials only the corrective process acts. Each later trial draws Gaussian noise around
 the postures in which the corrective process hits the goals, by default with the learner's standard
 deviation. With one stage, the default, the noise does not depend on earlier rewards. So random
-search cannot learn to coarticulate: its best trial shows the effect of selecting one of many noisy
-trials by the reward of the whole task. Random search is therefore the control for signatures of
-coarticulation (:mod:`coartic.analysis.control`). It remembers nothing but its best trial, so the
-targets of this trial are its answer in noise, too.
+search cannot learn to coarticulate: its best trial shows what selection alone does, when one of
+many noisy trials is selected by the reward of the whole task. Random search is therefore the
+control for signatures of coarticulation (:mod:`coartic.analysis.control`). Random search remembers
+nothing but its best trial. With motor noise its answer is therefore movements to the targets of
+that trial.
 
 With ``stages`` above 1 the trials are divided into equal parts. After each part the centre of the
-noise moves to the best trial so far: to the postures that this trial reached, or to the targets
-that it aimed at (``keep``).
+noise moves to the best trial so far. Parameter ``keep`` decides whether the new centre consists of
+the postures that this trial reached or of its targets.
 
 ``random-search`` uses the hands of its parameter or, by default, the hands with which the
 corrective process on its own gets the highest reward. ``random-search/hands`` divides its trials
@@ -48,14 +49,14 @@ class RandomSearchHandsParameters(Parameters):
     (joints). The default is the learner's."""
     stages: Annotated[int, Field(ge=1)] = 1
     """Number r of equal parts of the T trials with a hand sequence. Part k ends after ⌊kT/r⌋
-    trials; then noise is drawn around the best trial so far. With one stage the centre does not
-    move."""
+    trials; the next part draws noise around the best trial so far. With one stage the centre does
+    not move."""
     keep: Literal["postures", "targets"] = "postures"
     """Centre of the noise after a part: the postures in which the best trial hit its goals, or the
     targets that it aimed at. This parameter has no effect with one stage."""
     idle_arm: bool = True
-    """True if an arm gets noise also at goals of the other hand. If False, the arm does not move at
-    these goals, as under the learner's condition EC3."""
+    """True if the idle arm (the arm of the hand that is not chosen for a goal) gets noise as well.
+    If False, the idle arm does not move, as under the learner's condition EC3."""
 
     @model_validator(mode="after")
     def _check_stages(self) -> Self:
@@ -78,7 +79,9 @@ class RandomSearchParameters(RandomSearchHandsParameters):
 def draw_trials(
     session: Session, hands: str | None, parameters: RandomSearchHandsParameters
 ) -> tuple[Attempts, int]:
-    """Make trials with noise around the corrective process until none is left.
+    """Draw trials with Gaussian noise around a centre until the trial budget is used up.
+
+    The first centre consists of the postures that the corrective process reached.
 
     Parameters
     ----------
@@ -91,7 +94,7 @@ def draw_trials(
     Returns
     -------
     Attempts
-        The trials that were made, with the best one.
+        The trials that were made, and the best trial.
     int
         Number of trials with noise.
 
@@ -154,16 +157,16 @@ class RandomSearchHands(Method):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        The number is at most 72 and at least 1. Within these limits, the sessions together make at
-        most 4,000,000 trials.
+        The number is chosen so that the sessions together make at most 4,000,000 trials; it is at
+        least 1 and at most 72.
         """
         return runs_at_once(self.parameters.trials)
 
     def solve(self, session: Session) -> Result:
         """Divide the trials among the hand sequences, and return the movements of the best trial.
 
-        The shares of the sequences differ by at most one trial. If the corrective process fails
-        with a sequence, the rest of its share is not used.
+        The numbers of trials of two sequences differ by at most one. If the corrective process
+        fails with a sequence, the other trials of this sequence are not made.
 
         Raises MethodError if the corrective process completes no hand sequence that has a trial.
         """

@@ -1,23 +1,23 @@
 """A planner that looks a fixed number of goals ahead (model predictive control).
 
 The window of the planner is the current goal and ``horizon`` goals after it. The planner searches,
-over hand sequences, for the shortest movements through the window, makes the first of them, and
-plans again from its end.
+over hand sequences, for the shortest path through the window, makes the first movement, and plans
+again from the end of that movement.
 
 - With ``horizon`` 0 the planner takes the shortest path to each goal.
-- A window that contains the last goal is followed to its end, because planning again would find the
-  rest of it.
-- With a horizon of all goals the planner plans the whole task at once. Its gap to the optimum is
-  then the price of the smaller search.
+- In a window that contains the last goal, all movements are made, because planning again would find
+  the same movements.
+- With a horizon of all goals the planner plans the whole task at once. The gap to the optimum is
+  then due only to the smaller search.
 
 A window is planned as ``optimum/search`` plans a task (:mod:`.shortest_paths`): chains of posture
-graphs, IPOPT, whole ticks. For speed there are fewer chains, smaller graphs with two hands, and
-IPOPT solves only from the shortest ``starts``.
+graphs, IPOPT, whole ticks. To save time, there are fewer chains, the graphs for two hands are
+smaller, and IPOPT starts only from the shortest ``starts`` chains.
 
 Movements are rounded to whole ticks in each window. Otherwise each goal would lose half a tick on
-average, at any horizon. With rounding, only the last goal of a window that is followed to its end
-loses half a tick: once in the whole task, or at each goal if the horizon is 0. ``path_length`` in
-the details does not have this loss: it is the sum of the plans before rounding.
+average, at any horizon. With rounding, half a tick is lost only at the last goal of a window of
+which all movements are made: once in the whole task, or at each goal if the horizon is 0.
+``path_length`` in the details is summed before rounding, and does not have this loss.
 """
 
 from __future__ import annotations
@@ -44,13 +44,14 @@ from coartic.tasks.task import MOST_GOALS, Start
 
 
 class RecedingHorizonParameters(Parameters):
-    """The horizon, and the effort of the search."""
+    """Parameters: the horizon, and the effort of the search."""
 
     horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
-    """Number of goals after the current goal in a window; fewer at the end of a task."""
+    """Number of goals in a window after the current goal. At the end of a task the window has fewer
+    goals."""
     nodes: Nodes = 200
-    """Largest number of postures for a goal of a posture graph. With two hands, each hand has at
-    most half as many."""
+    """Largest number of postures in a posture graph for each goal. With two hands, each hand has at
+    most half of this number."""
     graphs: Count = 3
     """Least number of independent graphs for each window. More graphs are made until there are
     enough chains."""
@@ -82,7 +83,7 @@ class RecedingHorizon(Method):
     quick = QUICK
 
     def solve(self, session: Session) -> Result:
-        """Plan window by window, and return the movements that were made.
+        """Plan and move window by window, and return the movements that were made.
 
         Raises MethodError if no path is found.
         """

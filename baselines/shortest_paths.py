@@ -1,9 +1,9 @@
 """The shortest path over hand sequences, in whole control ticks.
 
 The search for the optimum and the planner with a receding horizon share this code. IPOPT solves
-from each start. The shortest plan of each hand sequence that may be best is then rounded to whole
-ticks. In some roundings a goal takes no movement, because the hand is already inside the goal when
-its turn comes.
+from each start. For each hand sequence, the shortest plan is then rounded to whole ticks, unless
+even its approximate lower bound is not below the best rounding so far. In some roundings a goal
+takes no movement, because the hand is already inside the goal when its turn comes.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ REWARD_INFORMATION = MODEL_BASED | {Information.REWARD_FORMULA}
 
 
 class ShortestPlans(NamedTuple):
-    """The plans found from many starts."""
+    """Shortest plans of the hand sequences, and the counts of the solves."""
 
     ranked: list[PathPlan]
-    """Shortest plan of each hand sequence for which a solve converged; the shortest is first."""
+    """Shortest plan of each hand sequence for which a solve converged, in the order of length."""
     solves: int
     """Number of solves, one for each start."""
     failed: int
@@ -52,7 +52,7 @@ def shortest_plans(
     *,
     still: bool,
 ) -> ShortestPlans:
-    """Solve for the shortest path of a task from a number of starts.
+    """Find the shortest path of each hand sequence, solving from a number of starts.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def shortest_plans(
     problem : TrajectoryProblem
         Problem of cost ``path-length``.
     starts : iterable of tuple
-        Hand sequence and configurations, shape ``(G, dof)``, of each start.
+        A tuple (hand sequence, configurations of shape ``(G, dof)``) for each start.
     still : bool
         True if, on the way to a goal, the arm whose hand is not chosen must not move.
 
@@ -96,17 +96,19 @@ def fewest_ticks(
 ) -> PlanInTicks:
     """Round plans to whole ticks, and return the rounding with the fewest ticks.
 
-    Each rounding is executed, and must hit every goal. Of roundings with equal ticks, the one with
-    the fewest corrections is returned. Some roundings are not tried:
+    Each rounding is executed; roundings that miss a goal are discarded. Of roundings with equal
+    ticks, the rounding with the fewest corrections is returned. Two kinds of roundings are not
+    tried:
 
-    - roundings of a plan after its nearest 64 (:meth:`.Rounding.every`);
-    - roundings whose least number of ticks is not below that of the best rounding so far.
+    - all roundings of a plan except the 64 nearest to it (:meth:`.Rounding.every`);
+    - roundings whose approximate lower bound (:meth:`.Rounding.least`) is not below the ticks of
+      the best rounding so far.
 
     Parameters
     ----------
     session : Session
-        Session that counts the solver's effort and forward kinematics, but not the iterations and
-        Jacobians of corrections.
+        Session that counts the solver's effort and the evaluations of forward kinematics. The
+        iterations and Jacobians of corrections are not counted.
     task : Task
     problem : TrajectoryProblem
         Problem of cost ``path-length``.

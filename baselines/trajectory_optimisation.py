@@ -1,17 +1,17 @@
 """Trajectory optimisation: informed search with the objective as a formula.
 
-There is a method for each cost. Path length is the task's own reward. The other costs are the
-smoothness objectives of informed accounts of coarticulation:
+There is a method for each cost. The cost *path length* corresponds to the task's reward. The other
+costs are the smoothness objectives of theories of coarticulation in which the mover has a model:
 
 - the sum of squared joint displacements (Jordan 1986, 1992);
 - acceleration of the joints;
 - jerk of the joints;
 - jerk of the hand (Flash & Hogan 1985).
 
-For the last three the times of the movements are free, and their total is constant.
+For the last three costs the durations of the movements are variables with a constant sum.
 
-Each method plans hand sequences from the cheapest chains of posture graphs, and returns the plan
-that is cheapest *by its own cost*.
+Each method solves for a plan for each hand sequence, from the cheapest chains of posture graphs,
+and returns the plan that is cheapest *by its own cost*.
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ SAMPLES = 200  # points of a smooth path from goal to goal; with 800 no reward c
 
 
 class TrajectoryParameters(Parameters):
-    """Parameters for the hand sequences that are planned, and for their starts."""
+    """Parameters: hand sequences that are planned, and starts of the solver."""
 
     most_sequences: Count = BEAM_WIDTH
-    """Largest number of hand sequences that are planned in a graph. With two hands, 64 are all
-    sequences for six goals. If there are more, a beam search of this width over the goals chooses
-    the sequences."""
+    """Largest number of hand sequences that are planned in a graph. With two hands and six goals
+    there are 64 sequences. If there are more sequences than this number, a beam search of this
+    width over the goals chooses the sequences."""
     nodes: Nodes = 150
     """Largest number of postures for a goal and hand in a graph."""
     graphs: Count = 3
@@ -71,11 +71,11 @@ class TrajectoryParameters(Parameters):
 
 
 class SmoothParameters(TrajectoryParameters):
-    """Parameters for hand sequences, starts, and whether plans stop at goals."""
+    """Parameters: hand sequences, starts, and whether plans stop at goals."""
 
     stop: Literal[0, 1] = 0
-    """1 if the plan stops at each goal: velocities are 0 there, and for jerk also accelerations. 0
-    if it need not stop."""
+    """1 if the plan stops at each goal: the velocities at the goals are 0, and for jerk also the
+    accelerations. 0 if the plan need not stop."""
 
 
 class JerkParameters(SmoothParameters):
@@ -138,7 +138,7 @@ def cheapest_plan(
 
 
 class TrajectoryOptimisation(Method):
-    """Base of the methods that return the cheapest plan by one cost."""
+    """Base class of the methods that return the plan with the lowest value of one cost."""
 
     version = 2
     cost: ClassVar[Cost]
@@ -150,8 +150,8 @@ class TrajectoryOptimisation(Method):
     def solve(self, session: Session) -> Result:
         """Plan for each hand sequence, and return the movements of the cheapest plan.
 
-        The cheapest plan for path length is solved again in whole ticks. If that fails, it is
-        solved again with targets well inside the discs.
+        For the cost path length, the cheapest plan is solved again in whole ticks. If that fails,
+        the plan is solved again with targets well inside the discs.
 
         Raises MethodError if the solver finds no plan.
         """
@@ -214,8 +214,8 @@ class TrajectoryOptimisation(Method):
         The starts of a sequence are
 
         - its cheapest chain in each random graph that has one;
-        - with two hands, except for jerk of the hand, each of these chains with the idle arm moving
-          in equal steps;
+        - with two hands (except for jerk of the hand), copies of these chains in which the idle arm
+          moves in equal steps;
         - copies of the first start with noise.
 
         Parameters
@@ -226,7 +226,7 @@ class TrajectoryOptimisation(Method):
         Returns
         -------
         dict
-            List of starts, each of shape ``(G, dof)``, by hand sequence.
+            Maps each hand sequence to a list of starts, each of shape ``(G, dof)``.
 
         Raises
         ------
@@ -345,9 +345,9 @@ def path_movements(
 ) -> tuple[Movement, ...]:
     """Divide a path into movements of kind ``path``, one for each goal.
 
-    A movement ends where the hand enters its goal. The rest of its piece of the path begins the
-    next movement, in which the joints that ``instance`` holds do not move. A movement that misses
-    its goal is returned like the others.
+    A movement ends where the hand enters its goal. The next movement begins with the rest of the
+    piece of the path that belongs to this goal; the joints that ``instance`` holds do not move in
+    this rest. A movement that misses its goal is returned like the others.
 
     Parameters
     ----------
@@ -357,7 +357,8 @@ def path_movements(
     instance : Instance
         Hands and held joints.
     path : list of ndarray, shape (k, dof)
-        A piece for each goal: configurations after the end of the piece before.
+        A piece for each goal: its configurations, without the last configuration of the piece
+        before.
 
     Returns
     -------

@@ -7,8 +7,8 @@ The nonlinear programme is::
           Δ_gj = 0                           for joints j that are held on the way to goal g
 
 Here Δ_g is the change of the configuration on the way to goal g, q_g = q_0 + Δ_1 + ... + Δ_g is the
-configuration at goal g, h_g is the hand chosen for it, p_h is the position of hand h, c_g is the
-centre of the goal and r its radius. The cost f is one of::
+configuration at goal g, h_g is the hand chosen for goal g, p_h is the position of hand h, c_g is
+the centre of goal g, and r is the radius of the goals. The cost f is one of::
 
     path length          Σ_g l_g  with  |W Δ_g|² <= l_g²
     squared displacement Σ_g |Δ_g|²
@@ -16,21 +16,21 @@ centre of the goal and r its radius. The cost f is one of::
     jerk                 ∫ |d³q/dt³|² dt
     hand jerk            ∫ |d³p/dt³|² + w |d³q/dt³|² dt
 
-The l_g are bounds on the lengths of the segments, which are variables. W multiplies the base's
-coordinates by their weight in the motion model, and w is ``JOINT_WEIGHT``.
-The last three costs are integrals over a movement from rest to rest. The durations between goals
-are free, and their sum is constant.
+The l_g are variables, upper bounds of the lengths of the segments. W multiplies the base's
+coordinates by their weight in the motion model, and w is ``JOINT_WEIGHT``. The last three costs are
+integrals over a movement from rest to rest. The durations between goals are free, and their sum is
+constant.
 
 The integrals over joints are formulas in the rates (velocities and accelerations) at the goals
-(:func:`segment_cost`). The rates are variables, too. Jerk of the hand that is on its way to a goal
-is a sum over Gauss-Legendre nodes. Jerk of the hand does not determine motion in the null space of
-the hand; the joint jerk with its small weight w does.
+(:func:`segment_cost`). The rates are variables, too. The integral of the hand's jerk, for the hand
+that moves to the goal, is a sum over Gauss-Legendre nodes. The hand's jerk does not determine
+motion in the null space of the hand; the joint jerk, with its small weight w, determines it.
 
 A programme is compiled for each robot, set of hands, number of goals and cost. The start, the goals
-and the hand sequence are its parameters. A locked base coordinate or a held arm is a bound of
-variables. So one solver serves all hand sequences of a task. The solver is IPOPT (Wächter & Biegler
-2006) with exact derivatives from CasADi (Andersson et al. 2019). IPOPT's linear solver is not
-thread-safe: parallelise over processes.
+and the hand sequence are its parameters. Locked base coordinates and held arms are expressed by
+bounds of the variables. So the same compiled solver solves for all hand sequences of a task. The
+solver is IPOPT (Wächter & Biegler 2006) with exact derivatives from CasADi (Andersson et al. 2019).
+IPOPT's linear solver is not thread-safe: parallelise over processes.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ JOINT_WEIGHT = 0.1
 _ONE_AT_A_TIME = RLock()
 """Lock while CasADi builds a programme or IPOPT solves it: threads must not do so at once."""
 IPOPT = "wachter2006", "andersson2019"
-"""Works on the solver, as keys of ``references.bib``."""
+"""Works on the solver: their keys in ``references.bib``."""
 _RIM = 1e-7  # solutions stay this far inside the disc (in length units): IPOPT's tolerance
 # Least duration of a segment; the mean is 1. It binds where a smooth plan would hit two goals at
 # once. With a smaller value, jerk does not converge for many hand sequences of two-armed-2.
@@ -94,7 +94,7 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Instance:
-    """Parameters of a solve: start, goals, hand of each goal, and joints that cannot move."""
+    """Data of one problem: start, goals, hand of each goal, and joints that cannot move."""
 
     q0: Array
     """Starting configuration, shape ``(dof,)``, in length units and rad."""
@@ -117,7 +117,8 @@ class Instance:
         hands : tuple of str
             Hand of each goal.
         still : bool
-            True if the arm whose hand is not chosen for a goal cannot move on the way to it.
+            True if the idle arm (the arm whose hand is not chosen for a goal) cannot move on the
+            way to that goal.
         radius : float
             Largest distance of a hand from its goal's centre (in length units).
         """
@@ -126,9 +127,9 @@ class Instance:
 
 
 def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np.bool_]:
-    """Return which joints cannot move on the way to each goal.
+    """Return a mask of the joints that cannot move on the way to each goal.
 
-    These are locked base coordinates and the arms of hands that the task does not use.
+    These joints are the locked base coordinates and the arms of hands that the task does not use.
 
     Parameters
     ----------
@@ -136,7 +137,7 @@ def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np
     hands : sequence of str
         Hand of each goal.
     still : bool
-        True to add, for each goal, the arm whose hand is not chosen.
+        True to add, for each goal, the idle arm (the arm whose hand is not chosen).
 
     Returns
     -------
@@ -153,7 +154,7 @@ def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np
 
 @dataclass(frozen=True)
 class PathPlan:
-    """Plan that a solve returns, whether or not it converged."""
+    """Plan that the solver returned, converged or not."""
 
     instance: Instance
     """The instance that was solved."""
@@ -163,32 +164,35 @@ class PathPlan:
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
     cost: float
-    """Cost of the plan. If the solve asked for depth, the cost is minus the depth in the discs."""
+    """Cost of the plan. If the solver maximised the depth of the hands in the discs, the cost is
+    minus that depth."""
     durations: Array
     """Durations of the segments, shape ``(G,)``, with mean 1; all 1 for costs without rates."""
     rates: Array
     """Velocities, and for jerk also accelerations, at start and goals, shape
     ``(derivatives, G + 1, dof)``. Without rates ``derivatives`` is 0."""
     spent: dict[str, int] = field(default_factory=dict)
-    """Counters of the solver, as keywords for ``Session.spend``."""
+    """Counts of the solver's effort: keyword arguments of ``Session.spend``."""
     base_weight: float = 1.0
     """Weight of the base in the length of a movement (:class:`.MotionModel`)."""
 
     def lengths(self) -> Array:
-        """Return the straight joint-space distances from start to goal 1 and from goal to goal.
+        """Return the straight joint-space distance of each segment of the plan.
+
+        Segment 1 goes from the start to goal 1, segment g from goal g - 1 to goal g.
 
         Returns
         -------
         ndarray, shape (G,)
-            Distances with the weight of the base, in a mix of length units and rad. They are
-            straight even if the plan is curved.
+            Distances with the weight of the base, in a mix of length units and rad. Also for a
+            curved plan these are the straight distances.
         """
         model = MotionModel(base_weight=self.base_weight)
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]), model)
 
 
 class TrajectoryProblem:
-    """Compiled programme of a cost, for all tasks with one robot, hands and number of goals."""
+    """Compiled nonlinear programme for one robot, set of hands, number of goals and cost."""
 
     def __init__(
         self,
@@ -274,7 +278,7 @@ class TrajectoryProblem:
         stops: bool = False,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """Find a locally cheapest plan for an instance.
+        """Find a plan for an instance with locally minimal cost.
 
         Parameters
         ----------
@@ -288,15 +292,15 @@ class TrajectoryProblem:
         stops : bool
             True to make the rates at all goals 0. Only for costs with rates.
         deep : sequence of int
-            Goals, from 0. If there are any, the solver does not shorten the path. Instead it moves
-            the hands as deep into the discs of these goals as ``lengths`` allow: it maximises the
-            least depth. Only for path length.
+            Numbers of goals, from 0. If there are any, the solver does not minimise the path
+            length. Instead the solver maximises the smallest depth of the hands in the discs of
+            these goals, subject to ``lengths``. Only for path length.
 
         Returns
         -------
         PathPlan
-            The plan. It has converged if IPOPT says so and all constraints hold to within 1e-8. A
-            plan that has not converged is returned as well.
+            The plan. Its ``converged`` is True if IPOPT reports success and all constraints hold to
+            within 1e-8. A plan that has not converged is returned as well.
         """
         goals, at = self._goals, self._at
         steps = np.diff(np.vstack([instance.q0, start]), axis=0)
@@ -368,8 +372,9 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     """Return the least cost of a segment between two states of the joints.
 
     A cubic minimises ∫|q̈|² and a quintic minimises ∫|q⃛|² (Flash & Hogan 1985). Both integrals are
-    exact formulas in the end states. For jerk of the hand, the result is the cost of joint jerk,
-    without its weight. Path length is not a cost of this function.
+    exact formulas in the end states. For the cost ``hand-jerk``, this function returns only the
+    integral of the joint jerk, without the weight ``JOINT_WEIGHT``. The cost ``path-length`` is not
+    allowed.
 
     Parameters
     ----------
@@ -446,7 +451,7 @@ def _hand_jerks(
 def trajectory_problem(
     robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost, base_weight: float = 1.0
 ) -> TrajectoryProblem:
-    """Return the compiled problem; a process caches the 32 problems that it used last.
+    """Return the compiled problem, from an LRU cache of 32 problems.
 
     ``base_weight`` is the weight of the base in path length (:class:`.MotionModel`).
     """
@@ -455,7 +460,7 @@ def trajectory_problem(
 
 
 def spline(plan: PathPlan, samples: int) -> list[Array]:
-    """Sample the path of a plan with rates, at equal steps in time between goals.
+    """Sample the path of a plan that has rates, at equal time steps between goals.
 
     The path consists of Hermite cubics for plans with velocities only, and of quintics for plans
     with accelerations.
@@ -469,7 +474,8 @@ def spline(plan: PathPlan, samples: int) -> list[Array]:
     Returns
     -------
     list of ndarray, shape (samples, dof)
-        A piece for each goal, which ends at the goal. The start is left out.
+        A piece of the path for each goal. The last row of a piece is the configuration at the goal;
+        the start is not included.
     """
     from scipy.interpolate import BPoly  # slow to import, and most commands do not need it
 

@@ -1,8 +1,8 @@
-"""The learner's trials, for methods that get only rewards and the postures at the goals.
+"""Trials like the learner's, for methods that see only rewards and the postures at the goals.
 
 As in the learner, a trial moves towards a target configuration for each goal. The corrective
-process **A** corrects the movements that miss. After the trial the method knows its total reward
-and the configurations in which it hit the goals.
+process **A** corrects the movements that miss. After the trial the method knows the total reward of
+the trial and the configurations in which the trial hit the goals.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ class UninformedParameters(Parameters):
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Number of trials of a run."""
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
-    """Standard deviation of the perturbations (in CMA-ES, of the first ones), in length units
-    (base) and rad (joints)."""
+    """Standard deviation of the perturbations (in CMA-ES and policy gradient, of the first
+    generation), in length units (base) and rad (joints)."""
 
 
 class SequenceParameters(UninformedParameters):
-    """Parameters of methods that can be told the hands."""
+    """Parameters of methods to which the user can give the hand sequence."""
 
     sequence: str | None = None
     """Hand sequence of all trials, such as ``"RRLR"``, or ``"given"`` for the task's initial hands
     (:meth:`.Session.find_initial_hands`). By default the method finds the hands itself."""
 
     def told_hands(self, session: Session) -> str | None:
-        """Return the hand sequence that the method is told, such as ``"RRLR"``, or None."""
+        """Return the hand sequence of parameter ``sequence``, such as ``"RRLR"``, or None."""
         return session.find_initial_hands() if self.sequence == "given" else self.sequence
 
 
@@ -136,8 +136,8 @@ class Attempts:
         targets : ndarray, shape (N, G, dof)
             Targets, in length units and rad; NaN for joints that do not move. N is at least 1.
         until : ndarray, shape (N,), optional
-            A reward for each trial. The first trial whose reward exceeds its entry is the last
-            trial made.
+            Threshold of the reward for each trial. The first trial whose reward exceeds its
+            threshold is the last trial made.
 
         Returns
         -------
@@ -176,8 +176,8 @@ class Attempts:
     ) -> Result:
         """Return the movements of the best trial, with its number (from 0) and other details.
 
-        In noise, the movements that ``recommended`` returns take their place; it is called if a
-        trial has hit every goal. Raises MethodError if no trial has.
+        With motor noise, the result has the movements that ``recommended`` returns instead. Raises
+        MethodError if no trial has hit every goal; ``recommended`` is then not called.
         """
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)

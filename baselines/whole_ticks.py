@@ -1,9 +1,9 @@
-"""From a shortest path to movements in whole control ticks.
+"""Rounding of shortest paths to movements of whole control ticks.
 
-A movement lasts a whole number of steps of length m. So a plan loses up to a step at each segment
-whose length is not a multiple of m. This module rounds the segments, and solves for the path again
-with the rounded lengths. Each movement aims *through* the goal's rim: its target is beyond the goal
-on the same joint-space line, so that the movement ends when it hits the goal.
+A movement takes a whole number of steps of length m. So a plan loses up to a step at each segment
+whose length is not a multiple of m. This module rounds the lengths of the segments to multiples of
+m, and solves for the path again with the rounded lengths. The target of each movement lies beyond
+the goal on the same joint-space line, so that the movement ends when the hand enters the goal.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _BEYOND = tuple(1 << k for k in range(11))  # numbers of steps from the configur
 
 @dataclass(frozen=True)
 class TickPlan:
-    """A plan in whole steps."""
+    """A plan whose segments have a whole number of steps."""
 
     steps: tuple[int, ...]
     """Number of steps to each goal; 0 if the hand is in the goal when the goal becomes current."""
@@ -38,15 +38,16 @@ class TickPlan:
 
     @property
     def ticks(self) -> int:
-        """Number of ticks of all movements: k + 1 for a movement of k steps, 0 for no movement."""
+        """Number of ticks of all movements (k + 1 for k > 0 steps)."""
         return sum(steps + 1 for steps in self.steps if steps)
 
 
 class Rounding:
     """Round plans of one problem and instance to whole steps.
 
-    Parameters ``merged`` of the methods are the numbers, from 0, of goals that take no movement,
-    because the hand is inside the goal when its turn comes. The session counts the solver's effort.
+    In all methods, parameter ``merged`` has the numbers (from 0) of goals that take no movement,
+    because the hand is already inside the goal when the goal becomes current. The session counts
+    the solver's effort.
     """
 
     def __init__(self, session: Session, problem: TrajectoryProblem, instance: Instance) -> None:
@@ -56,8 +57,9 @@ class Rounding:
     def nearest(self, plan: PathPlan) -> TickPlan | None:
         """Round each segment to the nearest number of steps, and the last segment up.
 
-        The last segment is first made as short as the other segments allow. To first order all
-        roundings of a shortest path (:meth:`every`) take the same number of ticks.
+        Before the last segment is rounded, the solver makes it as short as the rounded lengths of
+        the other segments allow. To first order all roundings of a shortest path (:meth:`every`)
+        take the same number of ticks.
 
         Returns
         -------
@@ -68,11 +70,11 @@ class Rounding:
         return self.divide(plan, [round(length) for length in exact], ())
 
     def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
-        """Yield the nearest roundings of a plan to whole steps, the nearest first.
+        """Yield the 64 nearest roundings of a plan to whole steps, in the order of distance.
 
-        Each segment is rounded up or down, and the last segment up. Only the nearest 64 roundings
-        are tried, which are all of them for up to seven goals. Roundings that cannot be solved are
-        left out.
+        Each segment but the last is rounded up or down; the last segment is rounded up. A plan for
+        up to seven goals has at most 64 roundings, so that all are tried. Roundings for which the
+        solver fails are left out.
         """
         exact = plan.lengths()[:-1] / self._step
         choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
@@ -86,7 +88,7 @@ class Rounding:
                 yield rounded
 
     def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
-        """Return the ticks of a plan if only its total length is rounded up.
+        """Return the approximate lower bound of ticks: the total length of the plan, rounded up.
 
         Roundings of a shortest plan rarely take fewer ticks.
         """
@@ -97,10 +99,10 @@ class Rounding:
     def plans(
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
-        """Yield the shortest plan for choices of goals that take no movement.
+        """Yield the shortest plan for each set of goals that take no movement.
 
-        A goal can be chosen if its hand may be inside it before its turn. Choices for which no plan
-        is found are left out.
+        A breadth-first search over sets of goals. A goal can be in a set if the hand may already be
+        inside the goal when the goal becomes current. Sets for which no plan is found are left out.
 
         Parameters
         ----------
@@ -108,8 +110,9 @@ class Rounding:
             Shortest plan with a movement to each goal.
         task : Task
         worth : callable
-            Function that says whether a number of ticks is of interest. A choice is not extended
-            if, by :meth:`least`, none of its extensions can have such a number.
+            Function that returns whether a plan with a given number of ticks is of interest. A set
+            of goals is not extended if :meth:`least` shows that no larger set can have such a
+            number of ticks.
 
         Yields
         ------
@@ -143,13 +146,14 @@ class Rounding:
                     waiting.append((more, merger))
 
     def divide(self, plan: PathPlan, steps: list[int], merged: tuple[int, ...]) -> TickPlan | None:
-        """Round a plan to numbers of steps.
+        """Solve for the shortest plan whose segments have given numbers of steps.
 
         Parameters
         ----------
         plan : PathPlan
         steps : list of int
-            Number of steps to each goal except the last. The last goal gets the fewest steps found.
+            Number of steps to each goal except the last goal. The number of steps to the last goal
+            is the smallest that the solver finds.
         merged : tuple of int
             Goals, from 0, that take no movement.
 
@@ -182,7 +186,7 @@ class Rounding:
         *,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """Return a locally shortest plan, which may not have converged.
+        """Solve for a locally shortest plan around a start; the plan may not have converged.
 
         Parameters
         ----------
@@ -193,8 +197,8 @@ class Rounding:
         merged : tuple of int
             Goals, from 0, that take no movement.
         deep : sequence of int
-            Goals, from 0, into whose discs the hands move as deep as ``lengths`` allow. If there
-            are any, the path is not shortened.
+            Numbers of goals, from 0. If there are any, the solver does not minimise the path
+            length; it moves the hands as deep into the discs of these goals as ``lengths`` allow.
         """
         instance = self._instance
         if merged:
@@ -216,8 +220,8 @@ def movements(
 ) -> tuple[Movement, ...]:
     """Return a movement to each goal of an instance.
 
-    Joints that are held on the way to a goal stay where the movement before has left them, even if
-    that movement ended before its target.
+    Joints that ``instance`` holds on the way to a goal keep their values from the end of the
+    movement before, even if that movement ended before its target.
 
     Parameters
     ----------
@@ -228,10 +232,10 @@ def movements(
     configurations : ndarray, shape (G, dof)
         Configuration at each goal.
     steps : tuple of int, optional
-        Largest number of steps to each goal. The target of a movement is then beyond the
-        configuration, on the same line, so that the movement hits within these steps. If no such
-        target is found, the target is the configuration. With 0 steps the movement is corrective;
-        it is not made if the hand is already in the goal.
+        Largest number of steps to each goal. If it is given, the target of a movement lies beyond
+        the configuration on the same line, so that the movement hits the goal within these steps.
+        If no such target is found, the target is the configuration itself. For 0 steps the movement
+        is corrective, and takes no ticks if the hand is already in the goal.
 
     Returns
     -------

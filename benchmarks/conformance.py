@@ -116,7 +116,7 @@ def check_method(
 
 
 _Runs = dict[str, dict[str, Row]]
-"""Runs by kind, such as ``first``, and by the name of the task."""
+"""Dict that maps kinds of runs, such as ``first``, to dicts that map names of tasks to runs."""
 
 
 def _declaration(info: MethodInfo, _: _Runs) -> Iterator[str]:
@@ -193,10 +193,10 @@ def _noise(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 
 
 def _is_best_trial(run: Row) -> bool:
-    """Return whether the answer of a run in noise is its best trial, as far as can be seen.
+    """Return whether the answer of a noisy run seems to be its best trial.
 
-    The answer is executed under the draw that the best trial has met. If it is that trial, it takes
-    the same ticks; any other answer does so only by chance.
+    The answer is executed with the noise draw of the best trial. If the answer is the best trial,
+    the execution takes the same ticks; any other answer takes the same ticks only by chance.
     """
     rewards = [-inf if reward is None else reward for reward in run.rewards]
     if len({*rewards}) < 2:
@@ -264,8 +264,8 @@ CHECKS: dict[
     "failure": (_failure, _hopeless),
     _NOISE: (_noise, _luck),
 }
-"""Checks of a method by name. Each has a function that yields problems, and a function that returns
-a sentence on what was checked."""
+"""Dict that maps names of checks to two functions. The first yields problems of a method, the
+second returns a sentence on what was checked."""
 
 
 def _hopeless_task(like: Task) -> Task:

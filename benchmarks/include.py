@@ -3,10 +3,10 @@
 Folders can be joined if they have
 
 - the same suite, seed and trial budget;
-- the same task for each name of a task;
-- the same version or code of each method (runs of a method file that has changed since are not
+- for each name of a task, the same task;
+- for each method, the same version or code (runs of a method file that has changed since are not
   used, and a message names them);
-- the same parameters for each setting of a method.
+- for each setting of a method, the same parameters.
 
 Versions of coartic and of libraries, and machines, may differ. A folder may lack runs.
 """
@@ -42,7 +42,7 @@ def include_folders(
 ) -> list[Job]:
     """Copy the runs of other folders into a results folder, and join the plans.
 
-    The joined plan has the cells of ``plan``, and those cells of the folders of which run 0 is
+    The joined plan has the cells of ``plan``, and the cells of the folders for which run 0 is
     stored. The joined plan replaces the plan of ``out``. This function performs no missing runs;
     :func:`.perform` does.
 
@@ -58,8 +58,8 @@ def include_folders(
         Names of tasks. Cells of the folders on other tasks are left out. By default, the cells on
         all tasks are joined.
     methods : mapping of str to MethodInfo, optional
-        Methods that the command knows, by id; by default those of ``plan``. Runs of a method from
-        a file are only used if they were made by the code of the method here.
+        Maps ids to the methods that the command knows; by default the methods of ``plan``. Runs of
+        a method from a file are only used if they were made by the code of the method here.
 
     Returns
     -------
@@ -123,7 +123,7 @@ def _join(
     tasks: Collection[str] | None,
     known: Mapping[str, MethodInfo],
 ) -> list[Job]:
-    """Return the plan joined with the plans of ``sources``, which are stores by name.
+    """Join a plan with the plans of ``sources``, a dict that maps names to stores.
 
     - Cells of the sources on tasks that are not in ``tasks`` are left out, unless it is None.
     - Cells of method files with other code than in ``known`` are left out, with a warning.
@@ -189,8 +189,8 @@ def _warn_of_gaps(
     An additional cell is a stochastic cell that ``asked`` lacks. It has few runs if it has fewer
     than the largest number in ``asked``.
 
-    ``asked`` has the number of runs by the digest of a cell. ``plans`` has the plan by the name of
-    a source. ``jobs`` is the joined plan by the digest of a cell.
+    ``asked`` maps digests of cells to numbers of runs, ``plans`` maps names of sources to plans,
+    and ``jobs`` maps digests of cells to the jobs of the joined plan.
     """
     most_runs = max(asked.values())
     for name, part in plans.items():
@@ -226,9 +226,9 @@ def _named(jobs: Sequence[Job]) -> str:
 def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
     """Raise CoarticError if the parts of a plan contradict each other.
 
-    ``parts`` has jobs by their origin, such as a folder. Suite, seed and trial budget of a part are
-    those of its first job, or of ``default`` if the part has no jobs. The docstring of this module
-    lists what must be equal.
+    ``parts`` maps an origin, such as a folder, to its jobs. Suite, seed and trial budget of a part
+    are taken from its first job, or from ``default`` if the part has no jobs. The docstring of this
+    module lists what must be equal.
     """
     first_values: dict[str, tuple[str, object]] = {}
 
@@ -261,8 +261,8 @@ def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 def _check_same_results(stores: Mapping[str, Store]) -> None:
     """Raise CoarticError if two stores have different results of the same run.
 
-    ``stores`` has stores by the name of their folder. Rewards of trials that are missing in one of
-    the two stores are not compared.
+    ``stores`` maps names of folders to stores. Rewards of trials that are missing in one of two
+    stores are not compared.
     """
     first_results = dict[str, tuple[str, str]]()
     for name, store in stores.items():

@@ -76,8 +76,8 @@ class Request(FileData):
 
     tasks: tuple[Annotated[Any, PlainValidator(_task_or_name)], ...] = ()
     """Names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, task files, and tasks
-    (Task); by default all tasks of the suite. On an instance, or a task of your own, that the suite
-    lacks, all ``methods`` (by default those of the suite) are run that apply to it."""
+    (Task); by default all tasks of the suite. If the suite lacks an instance or a task of your own,
+    all ``methods`` (by default the methods of the suite) that apply to the task are run on it."""
     methods: tuple[str, ...] = ()
     """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite,
     which ``"*"`` names, too. Methods that the suite lacks are run on all tasks of the suite to
@@ -140,7 +140,7 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
         - a name is unknown, or belongs to something else already;
         - a number or a parameter is wrong;
         - ``trials``, ``runs`` (except 1) or a family file has no effect;
-        - ``trials`` would make one cell of two that differ only in their trials;
+        - two cells differ only in their trials, so that ``trials`` would make them equal;
         - a named task or method has no runs;
         - two blocks of the suite ask for different numbers of runs of the same cell;
         - a block without wildcards names a method that does not apply to all of its tasks.
@@ -209,9 +209,10 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 
 
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
-    """Return the ids of all methods in those user's files from which no method is named.
+    """Return the ids of all methods in the user's files that nothing refers to.
 
-    Methods are named by the request (``methods``) or by the suite.
+    A file is such a file if neither the request (``methods``) nor the suite names any of its
+    methods.
     """
     files = {
         registered[method].where
@@ -279,7 +280,7 @@ def _asked_tasks(
     dict
         Names of the tasks, as keys.
     dict
-        Tasks among them that the suite lacks (the user's tasks, and instances), by name.
+        Maps names to the tasks among them that the suite lacks (the user's tasks, and instances).
     callable
         Function that returns a task by its name.
 
@@ -334,10 +335,10 @@ def _world_of(request: Request) -> MotionModel:
 
 
 def _worlds_beside(jobs: Sequence[Job], request: Request) -> list[MotionModel]:
-    """Return the worlds of methods and tasks that no block names.
+    """Return the motion models for methods and tasks that the request adds to the suite.
 
-    That is the world of the request, by default the paper's; but if no block has the paper's world,
-    it is each world of the blocks.
+    If a block has the paper's model, this is the model of the request (by default the paper's).
+    Otherwise these are the models of all blocks.
     """
     worlds = {made.cell.world: PAPER._replace(**differences(made.cell.model)) for made in jobs}
     is_usual = request.model or not worlds or "" in worlds
@@ -426,10 +427,10 @@ def _why_nothing_runs(
     methods: Iterable[MethodInfo],
     jobs: Sequence[Job],
 ) -> str:
-    """Return a sentence on why methods have no runs.
+    """Return a sentence that explains why methods have no runs.
 
     ``idle`` has the tasks that a request names and for which the methods have no job. The sentence
-    is on the first of them. If there are none, it is on all tasks of ``jobs``.
+    explains the first of these tasks; if ``idle`` is empty, it explains all tasks of ``jobs``.
     """
     tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
     reasons = dict.fromkeys(

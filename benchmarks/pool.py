@@ -56,11 +56,11 @@ _REPEATED = (-signal.SIGKILL, 255)  # exit codes of a process that was killed or
 
 @contextlib.contextmanager
 def process_pool(processes: int, context: Any = PROGRAM_CONTEXT) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes that round as the workers of suites do.
+    """Open a pool of processes that round floating-point numbers like the workers of suites.
 
-    It is for programs that run methods or proofs themselves. The processes have the environment
-    variables of workers. With these variables, all x86-64 processors with AVX2 round alike. They
-    import the main program, so call this function behind ``if __name__ == "__main__":``.
+    Use the pool in programs that run methods or proofs themselves. The processes have the
+    environment variables of workers, with which all x86-64 processors with AVX2 round alike. The
+    processes import the main program, so call this function behind ``if __name__ == "__main__":``.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ class Local:
 
 @dataclass(eq=False)
 class _Group:
-    """Jobs that share processes: those of a method from a file, or of all built-in methods."""
+    """Jobs that share processes: the jobs of one method file, or of all built-in methods."""
 
     local: Local
     waiting: deque[tuple[int, Job]] = field(default_factory=deque)

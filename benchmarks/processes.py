@@ -1,4 +1,4 @@
-"""Start worker processes, which round alike and import nothing from the working folder."""
+"""Worker processes, which round alike and import nothing from the working folder."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from coartic.model import MODEL_VERSION
 from coartic.runs.method_info import BUILT_IN, MethodInfo, method_info
 
 _RESERVED = (METHOD_PREFIX, "optimum/")
-"""Beginnings of ids that are reserved for built-in methods, because tables give them a meaning."""
+"""Prefixes of ids that are reserved for built-in methods, because tables interpret them."""
 METHOD_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
 NAMES = ("CMA-ES", "learner", "optimum")
 """Names of built-in methods that the id of another method must not repeat."""
@@ -29,7 +29,7 @@ Registry = Mapping[str, MethodInfo]
 
 
 def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
-    """Return the declarations of all known methods by id.
+    """Return a dict that maps ids to the declarations of all known methods.
 
     Built-in methods come first, then the methods of ``method_files``. Raises CoarticError for a
     file that cannot be loaded or has no method, and for an id that is not allowed
@@ -47,7 +47,7 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
 
 @cache
 def built_in() -> Mapping[str, MethodInfo]:
-    """Return the declarations of the built-in methods by id.
+    """Return a mapping from ids to the declarations of the built-in methods.
 
     Each call returns the same mapping: do not change it.
     """

@@ -137,7 +137,7 @@ def perform_runs_again(runs: Sequence[Row], registered: Registry) -> Iterator[tu
 
 
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
-    """Select runs of a folder that can be performed here, evenly spaced over its plan.
+    """Select runs of a folder that can be performed here, spaced evenly over the plan.
 
     A run can be performed if its method has the same version or code in ``registered``.
 
@@ -179,14 +179,14 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
 def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int, list[str]]:
     """Execute solutions of a folder with motor noise again, and compare the mean ticks.
 
-    The noise of a run is that of its score (:func:`.with_noise`).
+    The noise of a run has the same seed as in the scoring of the run (:func:`.with_noise`).
 
     Parameters
     ----------
     folder : Path
         Results folder.
     every : bool
-        True for all solutions; otherwise for one of each cell, which is drawn by lot.
+        True to execute all solutions; otherwise one random solution of each cell is executed.
 
     Returns
     -------
@@ -215,8 +215,8 @@ def compare_runs(a: Row, b: Row) -> list[str]:
     """Compare the results of two runs.
 
     The function compares status, reason, details, counts, movements and rewards. If both runs have
-    the same id, it also compares the ticks with motor noise. If one of the runs did not store all
-    of its rewards, only the stored ones are compared.
+    the same id, it also compares the ticks with motor noise. If a run did not store all of its
+    rewards, only the stored rewards are compared.
 
     Returns
     -------

@@ -45,17 +45,17 @@ _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other 
 
 @dataclass
 class Progress:
-    """How far a plan is performed in a results folder: numbers of runs, warnings and times."""
+    """Progress of a plan in a results folder: numbers of runs, warnings and times."""
 
     folder: Path
     total: int
     """Runs of the plan."""
     present: int = 0
-    """Runs of the plan that the folder had before, without those that are performed again."""
+    """Runs of the plan that the folder had before, except runs that are performed again."""
     stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    """Numbers of runs in the folder that another version or code of their method made. A key has
-    the method, the version that made the runs, and the present version. These runs stay in the
-    folder, but reports do not show them."""
+    """Numbers of runs in the folder that another version or code of their method made. The keys are
+    triples: method, version that made the runs, and present version. The runs stay in the folder,
+    but reports do not show them."""
     done: int = 0
     """Runs performed by this call."""
     failed: int = 0
@@ -63,7 +63,7 @@ class Progress:
     crashed: int = 0
     """Runs of the plan that crashed."""
     marks: dict[str, list[str]] = field(default_factory=dict)
-    """Warnings about the runs of methods in the folder, by method (:meth:`Store.marks`)."""
+    """Dict that maps methods to warnings about their runs in the folder (:meth:`Store.marks`)."""
     others: int = 0
     """Runs in the folder that the plan does not ask for, without :attr:`stale` runs."""
     wall_s: float = 0.0
@@ -184,11 +184,11 @@ def perform(
     - Runs that fail are stored and counted. They do not raise an error. The next call performs
       crashed runs again, and runs that timed out under a lower limit.
     - Finished runs are stored even if the call is interrupted.
-    - Ticks with noise of stored runs that follow an older rule of noise are made again.
-    - An ok run that this call makes with each method from a file is made again in another process.
-      If the result differs, this call warns, and reports mark the method. It is the quickest of
-      those that were not the first of their process, if there are such runs: a method can keep
-      something from run to run.
+    - If the ticks with noise of stored runs follow an older rule of noise, they are computed again.
+    - For each method from a file, one ok run of this call is repeated in another process. If the
+      result differs, this call warns, and reports mark the method. A method could keep state from
+      run to run; so the repeated run is the quickest run that was not the first run of its process,
+      or, if there is no such run, the quickest run.
 
     Parameters
     ----------
@@ -312,10 +312,11 @@ def _repeat_runs(
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the runs of a plan that are to be performed, as a job for each cell.
+    """Return the runs of a plan that still have to be performed, as a job for each cell.
 
-    They are the runs that the store lacks, and, if the code of their method is available here, the
-    runs that crashed or timed out under a lower limit. All other runs are counted in ``progress``.
+    These are the runs that the store lacks. If the code of the method is available here, runs that
+    crashed, or timed out under a lower limit, are included. All other runs are counted in
+    ``progress``.
     Raises CoarticError if the code of a method with missing runs is not available here.
     """
     present: set[tuple[int, int]] = set()

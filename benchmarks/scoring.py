@@ -1,4 +1,4 @@
-"""Execute and score the solutions that workers return, in a process that imports no method file."""
+"""Execution and scoring of solutions, in a process that imports no method file."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Row]:
     """Execute the movements of a job's outcomes, and return the rows of its runs.
 
     Parts of an outcome (``solution``, ``initial``, ``replay``) that are too long or break the rules
-    of the task are not executed. Only runs with status ok have movements and a reward. In a world
-    with noise only the solution counts, which is what the method recommends: it is stored without
-    ticks, and corrections are left to the corrective process.
+    of the task are not executed. Only runs with status ok have movements and a reward. With motor
+    noise only the part ``solution`` is scored, that is, the movements that the method recommends.
+    They are stored without ticks, and corrective movements without targets.
 
     Parameters
     ----------
@@ -81,10 +81,10 @@ def with_noise(runs: Sequence[Row]) -> list[Row]:
 
     - In the paper's world, ``noisy_ticks`` is the mean number of ticks over executions with noise
       of 0.01, or None if an execution fails. The seed of the noise is made from the id of the run.
-    - In a world with noise, ``mean_ticks`` is the mean over executions in this world, and
-      ``failed_executions`` is how many failed. A failed execution counts as twice the ticks of the
-      corrective process with its best hands. The seed is that of the judge (:func:`.judge_seed`),
-      which is the same for all methods.
+    - In a world with motor noise, ``mean_ticks`` is the mean over executions in this world, and
+      ``failed_executions`` is the number of failed executions. A failed execution counts as twice
+      the ticks of the corrective process with its best hands. The seed of the noise is
+      :func:`.judge_seed`, the same for all methods.
     - In another world without noise nothing is executed.
     """
     solved = [run for run in runs if "solution" in run.movements]

@@ -88,12 +88,12 @@ Worlds = Annotated[tuple[MotionModel, ...], PlainValidator(_worlds)]
 
 
 class Move(FileData):
-    """Displacements of a goal, each of which makes a new task."""
+    """Displacements of a goal; each displacement makes a new task."""
 
     goal: _Number
     """Number of the goal, from 1."""
     by: Annotated[tuple[tuple[Finite, Finite], ...], _SOME]
-    """Displacements (x, y) of the goal, in length units. Each of them makes a new task."""
+    """Displacements (x, y) of the goal, in length units, one for each new task."""
 
 
 class _Block(FileData):
@@ -154,11 +154,11 @@ _TAKEN_BY = {
     "method file": "coartic check METHOD --method-file {}",
     "shipped family": "coartic list {}",
 }
-"""Command that takes a thing, by its kind."""
+"""Dict that maps kinds of names to the command that accepts such a name."""
 
 
 def kind_of(name: str) -> str:
-    """Return the kind of a thing that a user names.
+    """Return the kind of object that a user's name, file or folder stands for.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def check_kind(name: str, *kinds: str) -> None:
 
 
 def suites() -> dict[str, Suite]:
-    """Return a new dictionary of the shipped suites by name."""
+    """Return a new dict that maps names to the shipped suites."""
     return {path.stem: _read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 

@@ -10,11 +10,11 @@ from coartic import BudgetError, Objective, Optimiser
 class Mine(Optimiser):
     """Random steps from the best point, as a start for your own method.
 
-    The one-fifth rule sets their length: it grows after a batch with a point at least as good as
-    the best point before, and shrinks after any other batch. It stays as it is if this happens in
-    one batch of five. On the paper's tasks the gap is 6.3 [6.1, 6.5] %, smaller than that of the
-    paper's learner, 7.9 %. With motor noise the best cost was partly lucky, so the steps get too
-    short: begin there.
+    The length of the steps follows the one-fifth rule. The length grows after a batch with a point
+    at least as good as the best point before, and shrinks after any other batch; if one batch in
+    five has such a point, the length stays about the same. On the paper's tasks the gap is 6.3
+    [6.1, 6.5] %, and the gap of the paper's learner is 7.9 %. With motor noise the best cost was
+    partly lucky, so that the steps become too short: improve this first.
     """
 
     name = "NAME"  # id in commands and tables

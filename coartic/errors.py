@@ -1,7 +1,7 @@
-"""Errors meant for the person at the keyboard.
+"""Errors that a user can correct.
 
-Their messages say what is wrong and usually where, and what would be right. A command that fails
-with such an error prints its message and exits with code 2.
+The message of such an error says what is wrong, usually where, and what would be right. A command
+that fails with such an error prints the message and exits with code 2.
 """
 
 
@@ -18,11 +18,12 @@ class SolutionError(CoarticError):
 
 
 class NotApplicableError(CoarticError):
-    """A method, an exploration condition or a search for hands does not apply.
+    """A method, an exploration condition or a search for hands does not apply to a task.
 
-    For example, it does not fit the task or the first solution, or the search finds no hands.
+    For example, the condition does not fit the task or the first solution, or the search finds no
+    hands.
     """
 
 
 class MissingExtraError(CoarticError, ImportError):
-    """A package that comes with an extra, such as ``coartic[gym]``, is not installed."""
+    """A package of an extra, such as ``coartic[gym]``, is not installed."""

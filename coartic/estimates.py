@@ -1,4 +1,4 @@
-"""Means and differences of means with their intervals.
+"""Means and differences of means, with confidence intervals.
 
 Samples are rewards or other scores of independent runs. Intervals come from the BCa bootstrap;
 :func:`mean_of_means` lists the exceptions. All resampling here uses the same seed, :data:`SEED`.
@@ -54,7 +54,7 @@ NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimated number with its interval and p-value, which are NaN if not computed."""
+    """An estimate with its confidence interval and p-value; numbers not computed are NaN."""
 
     value: float
     """The estimate: a mean, a difference or another number."""
@@ -63,20 +63,20 @@ class Estimate:
     high: float = math.nan
     """Upper end of the interval."""
     p: float = math.nan
-    """P-value of the test of this number."""
+    """P-value of the test whose statistic is the estimate."""
     n: tuple[int, ...] = ()
     """Number of values in each sample."""
     resamples: int = 0
-    """Number of resamples from which p was counted; 0 for an exact test or no test."""
+    """Number of resamples of the test; 0 for an exact test or no test."""
     least_p: float = math.nan
     """Smallest p that the test can give for this number of values. For a bootstrap test this is
-    usually the smallest p of the sign test; the p of the bootstrap test can be smaller."""
+    usually the smallest p of the sign test; the bootstrap test itself can give a smaller p."""
 
     def columns(self, name: str) -> dict[str, float]:
-        """Return the estimate as three entries of a table's row.
+        """Return the estimate as a dict of three table columns.
 
-        The keys are ``name`` for the value, and ``name_low`` and ``name_high`` for the ends of the
-        interval.
+        The keys are ``name`` (the value), ``name_low`` and ``name_high`` (the ends of the
+        interval).
         """
         return {name: self.value, f"{name}_low": self.low, f"{name}_high": self.high}
 
@@ -103,16 +103,16 @@ def vector(values: ArrayLike) -> Array:
 
 
 def slices(count: int, size: int) -> Iterator[slice]:
-    """Yield slices of at most ``size`` indices that together cover 0 to ``count`` - 1."""
+    """Yield consecutive slices of at most ``size`` indices that cover ``range(count)``."""
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))
 
 
 def varies(values: Array) -> Array:
-    """Return whether values differ along the first axis by more than rounding.
+    """Return whether values differ along the first axis by more than rounding errors.
 
-    The result is a bool for each entry of the other axes. It is False if the values include NaN or
-    infinity. :data:`NEGLIGIBLE` says what counts as rounding.
+    The result has a bool for each entry of the other axes. The bool is False if the values include
+    NaN or infinity. :data:`NEGLIGIBLE` is the bound of rounding errors.
     """
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
@@ -191,16 +191,16 @@ def mean_of_means(
     Returns
     -------
     Estimate
-        The sum with its interval. The interval is the first of these that applies:
+        The sum with its interval. The interval is chosen by the first rule that applies:
 
-        - none, if a sample has fewer than :data:`FEWEST` values;
-        - the value itself, if no sample varies (which does not show that populations do not vary);
+        - no interval, if a sample has fewer than :data:`FEWEST` values;
+        - the value itself, if no sample varies (although the populations may vary);
         - the normal interval, if a sample has more than :data:`HUGE` values;
         - the percentile interval, if a sample has more than :data:`LARGE` values or BCa is not
           defined;
-        - the BCa interval.
+        - otherwise the BCa interval.
 
-    Raises
+            Raises
     ------
     ValueError
         There is no sample, the number of weights differs from the number of samples, or a sample
@@ -245,10 +245,10 @@ def mean_of_means(
 
 
 def resample_indices(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
-    """Yield the indices of the values drawn in batches of at most 1,000 resamples.
+    """Yield bootstrap indices in batches of at most 1,000 resamples.
 
-    A batch is a list with an array for each sample, shape ``(batch, size)``. ``sizes`` has the
-    number of values in each sample. Equal arguments give equal indices.
+    A batch is a list with an index array for each sample, shape ``(batch, size)``. ``sizes`` has
+    the number of values in each sample. Equal arguments give equal indices.
     """
     rng, batch = np.random.default_rng(SEED), 1_000
     if max(sizes) > LARGE:

@@ -54,13 +54,13 @@ except ImportError:
     raise MissingExtraError("coartic.gym needs Gymnasium: pip install 'coartic[gym]'") from None
 
 REACH = 0.5
-"""Half width of the box of targets, in length units (base) and rad (angles)."""
+"""Half width of the box of targets around a posture, in length units (base) and rad (angles)."""
 JUDGED = 100
-"""Number of draws of the motor noise by which :func:`score` judges in a world with noise."""
+"""Number of noise draws over which :func:`score` averages if the model has motor noise."""
 IDS: dict[str, dict[str, Any]] = {
     f"coartic/{name.title().replace('-', '')}-v2": {"task": name} for name in builtin_tasks()
 } | {"coartic/Task-v2": {}}
-"""Options with which the environments are registered, by id: ``coartic/Ascending-v2`` and so on."""
+"""Dict that maps ids, such as ``coartic/Ascending-v2``, to the options of the environments."""
 Policy = Callable[[NDArray[np.float32]], ArrayLike] | Method | Any
 _NEUTRAL = (
     *("OrderEnforcing", "PassiveEnvChecker", "SyncVectorEnv"),
@@ -74,27 +74,28 @@ class TaskEnv(gymnasium.Env):
 
     An episode is a trial. A step reaches for the next goal, so a trial has at most as many steps as
     there are goals. The reward of a step is minus the number of its ticks. If the corrective
-    process fails, the reward is -1,000,000 and the trial ends. Trials are never truncated. Nothing
-    is random except the draw of an instance of a family, and the motor noise of a model that has
-    it: ``reset(seed=n)`` begins draw 0 of the noise of seed n, ``reset()`` the next draw.
+    process fails, the reward is -1,000,000 and the trial ends. Trials are never truncated. Only two
+    things are random: the instance, if the task is a family, and the motor noise, if the model has
+    any. ``reset(seed=n)`` begins a trial with draw 0 of the noise of seed n; ``reset()`` begins a
+    trial with the next draw.
 
     Parameters
     ----------
     task : Task, str or Path
         A task, or a family: its name, such as ``"two-armed/v1"``, or the path of its file. Each
-        trial of a family has an instance of it.
+        trial of a family is on one of its instances.
     split : {"development", "test", "fresh"}, optional
         Instances of the family: ``"development"`` to train on (the default), ``"test"`` to report
-        on, or ``"fresh"`` for those of a ``year``.
+        on, or ``"fresh"`` for the instances of a ``year``.
     count : int, optional
         Number of instances of the split to use, starting with the first. The default is 1,000 for
         the development split, and 10 for the others.
     year : int, optional
         Year of the fresh instances, such as 2027.
     ahead : int
-        Number of goals in view after the next goal.
+        Number of goals after the next goal that an observation includes.
     model : MotionModel or dict
-        The world: constants of movement, or a dict of those that differ from the paper's, such as
+        The motion model, or a dict of the constants that differ from the paper's model, such as
         ``{"motor_noise": 0.01}``.
     render_mode : {"rgb_array"}, optional
         ``"rgb_array"`` to make :meth:`render` return pictures.
@@ -104,11 +105,9 @@ class TaskEnv(gymnasium.Env):
     ValueError, TypeError, TaskError
         An option is wrong, or the task or family is unknown.
 
-    Notes
-    -----
-    Joints are the base coordinates (in length units) and the angles of the arms (in rad) that can
-    move. The arms are in the order of the task's ``hands``. In a family each arm has the largest
-    number of links that an arm of the family can have.
+    Notes ----- Joints are the base coordinates (in length units) and the angles of the arms (in
+    rad) that can move. The arms are in the order of the task's ``hands``. In a family, observations
+    and actions have entries for the largest number of links that an arm of the family can have.
 
     An observation, float32 of shape ``(O,)``, has
 
@@ -126,8 +125,8 @@ class TaskEnv(gymnasium.Env):
       0.5 chooses the hand whose posture is nearer in joint space. An entry above 0.5 chooses the
       other hand.
     - The target of the movement is the posture of the chosen hand, plus :data:`REACH` times the
-      entries of the joints. If the corrective process fails, the target starts from the present
-      posture instead.
+      entries of the joints. If the corrective process fails, the present posture takes the place of
+      the posture of the chosen hand.
     - Entries of joints that a robot cannot move have no effect.
     """
 
@@ -187,11 +186,12 @@ class TaskEnv(gymnasium.Env):
         Parameters
         ----------
         seed : int, optional
-            Seed of the generator that draws instances, and of the motor noise, which begins with
-            draw 0. By default neither is seeded again, and the trial meets the next draw.
+            Seed of the generator that draws instances, and seed of the motor noise, which begins
+            with draw 0. By default neither is seeded again, and the trial has the next draw of the
+            noise.
         options : dict, optional
-            ``{"task": k}`` begins a trial of instance k of a family, from 0. By default the
-            instance is drawn.
+            ``{"task": k}`` begins a trial on instance k of a family, from 0. By default the
+            instance is drawn at random.
 
         Returns
         -------
@@ -348,8 +348,10 @@ class TaskEnv(gymnasium.Env):
         return reach_next(compiled, self.q[None], sides, targets, self.goal, worlds).goals[0, :, 0]
 
     def _reached_by(self, hands: range) -> list[Any]:
-        """Return the account of each hand if only the corrective process reaches for the next
-        goal, without noise."""
+        """Return the record of each hand if only the corrective process reaches for the next goal.
+
+        The process reaches without noise.
+        """
         return [self._reach(self._exact, hand, self._no_targets[:, :1])[0] for hand in hands]
 
     def _seen(self) -> NDArray[np.float32]:
@@ -369,9 +371,9 @@ class TaskEnv(gymnasium.Env):
 class SharesOfTicks(gymnasium.RewardWrapper):
     """Wrapper that divides rewards by the ticks of the corrective process.
 
-    The divisor is the number of ticks that the process takes for the whole task with the initial
-    hands, at least 1. If the process cannot complete the task, the divisor is 1,000,000. The result
-    is at least -2.
+    The divisor is the number of ticks that the corrective process on its own takes for the whole
+    task with the initial hands, but at least 1. If the process cannot complete the task, the
+    divisor is 1,000,000. A scaled reward below -2 becomes -2.
     """
 
     def __init__(self, env: gymnasium.Env) -> None:
@@ -379,7 +381,7 @@ class SharesOfTicks(gymnasium.RewardWrapper):
         self._ticks: dict[int, float] = {}
 
     def reward(self, reward: Any) -> float:
-        """Return a reward (in ticks) divided by the divisor, but at least -2."""
+        """Divide a reward (in ticks) by the divisor; a result below -2 becomes -2."""
         env: Any = self.unwrapped
         if env.number not in self._ticks:
             corrective = initial_reward(env.task, env.model)
@@ -402,8 +404,9 @@ def sb3(env: str, num_envs: int = 64, **options: Any) -> Any:
     Returns
     -------
     DummyVecEnv
-        Environments, made by Stable-Baselines3's ``make_vec_env``. Rewards are shares of ticks
-        (:class:`SharesOfTicks`). Entry ``episode`` of the infos has the reward of a trial in ticks.
+        Environments, made by Stable-Baselines3's ``make_vec_env``. Rewards are divided by the ticks
+        of the corrective process (:class:`SharesOfTicks`). Entry ``episode`` of the infos has the
+        unscaled reward of a trial, in ticks.
 
     Raises
     ------
@@ -431,17 +434,18 @@ def score(
     Parameters
     ----------
     env : str, Env, VectorEnv or VecEnv
-        Id, or environment of this module. For a family the instances of the test split are scored,
-        unless the options have another ``split``. An environment with wrappers that change
-        observations or actions keeps its wrappers and its own instances. Its rewards are still in
-        ticks, and wrappers that normalise do not learn from its trials.
+        Id, or environment of this module. For a family, the instances of the test split are scored,
+        unless the options have another ``split``. If an environment has wrappers that change
+        observations or actions, the trials are made in the wrapped environment, on its own
+        instances. The rewards in the table are nevertheless in ticks, and the statistics of
+        normalising wrappers are not updated.
     policy : callable, agent, Method or mapping, optional
         One of
 
         - a function that returns actions ``(N, A)`` for observations ``(N, O)``;
         - an agent with the ``predict`` of Stable-Baselines3, whose actions are deterministic;
         - a method of the benchmark, such as a planner, that solves each task;
-        - a mapping of any of these by name.
+        - a dict that maps names to any of these.
     episodes : int
         Number of trials of random actions on each task.
     seed : int
@@ -449,8 +453,8 @@ def score(
     vec_normalize : str, Path or VecNormalize, optional
         Normalisation of observations: the ``VecNormalize`` of an agent's training, or the file that
         its ``save`` has written (a pickle: open only files that you trust). The default is the
-        ``VecNormalize`` of ``env``, if that is its only wrapper, else that of the agent's own
-        environment.
+        ``VecNormalize`` of ``env`` if ``env`` has no other wrapper, and otherwise the
+        ``VecNormalize`` of the agent's own environment.
     **options
         Options of :class:`TaskEnv`, for an environment without wrappers.
 
@@ -460,9 +464,10 @@ def score(
         A row for each policy, for uniformly random actions, for the corrective process with the
         initial hands of each task, and for the best known solution. Columns:
 
-        - ``reward``: mean over tasks (in ticks), in a model with motor noise over 100 draws;
-        - ``gap``: difference from the best known reward as a share of it, mean over the tasks whose
-          best reward is known;
+        - ``reward``: mean reward over the tasks (in ticks), with motor noise also over 100 noise
+          draws;
+        - ``gap``: relative gap, that is, the difference from the best known reward divided by the
+          best known reward; mean over the tasks whose best reward is known;
         - ``gap_low``, ``gap_high``: 95 % interval of the gap (BCa bootstrap) over tasks, or over
           the trials of a single task;
         - ``completed``: share of trials that hit all goals in less than 1,000,000 ticks.
@@ -485,17 +490,16 @@ def score(
     OSError
         The file of ``vec_normalize`` cannot be read.
 
-    Notes
-    -----
-    In a model with motor noise each row is judged by the same 100 draws of each task, in which
-    nobody has practised, random actions included. Planners and the corrective process are executed
-    as :func:`coartic.execute_noisy` does. In models other than the paper's no best reward is known.
+    Notes ----- With motor noise, all rows, including random actions, are scored on the same 100
+    noise draws for each task. No method has used these draws before. Solutions of planners and of
+    the corrective process are executed as by :func:`coartic.execute_noisy`. Only for the paper's
+    model is a best reward known.
 
     Warns
     -----
     UserWarning
-        An agent was loaded without an environment, and its observations are not normalised. It may
-        have been trained in ``VecNormalize``.
+        An agent was loaded without an environment, and its observations are not normalised. The
+        agent may have been trained in ``VecNormalize``.
 
     Examples
     --------
@@ -717,8 +721,7 @@ def _wrapped_trial(
 
 @contextmanager
 def _not_learning(env: Any) -> Iterator[None]:
-    """In a ``with`` block, prevent wrappers from updating the statistics with which they
-    normalise."""
+    """Freeze the statistics of normalising wrappers in a ``with`` block."""
     learning = [
         (layer, name, getattr(layer, name))
         for layer in _layers(env)
@@ -735,7 +738,7 @@ def _not_learning(env: Any) -> Iterator[None]:
 
 
 def _rewards_of(method: Method, task: Task, seed: int, model: MotionModel) -> Any:
-    """Return the rewards of a method's solution of a task, one for each draw of the noise.
+    """Return the rewards of a method's solution, one for each draw of the noise.
 
     Without noise there is one reward. A reward is NaN if no valid solution is found, or if an
     execution fails.

@@ -14,8 +14,8 @@ PAPER_RADIUS = 0.1
 """θ^g of the paper's tasks (in length units)."""
 Norm = Literal["euclidean", "maximum"]
 WORLD = ("motor_noise", "norm", "base_weight")
-"""Constants of the *world*: what a movement costs, and how well it ends where it aims. The others
-belong to the rules of the paper's robot."""
+"""Names of the constants that define a *world*, that is, the cost of movements and their motor
+noise. The other constants of a motion model belong to the rules of the paper's robot."""
 
 
 class MotionModel(NamedTuple):
@@ -32,7 +32,8 @@ class MotionModel(NamedTuple):
     arrival_tolerance: float | None = None
     """θ^a: a hand has arrived if it is within this distance (in length units) of the position to
     which its target brings it. None stands for a tenth of the goals' radius, which is 0.01 in the
-    paper's tasks (inferred: the extracted text has 0.1, which does not give the published rewards).
+    paper's tasks (inferred: the extracted text of the paper has 0.1, which does not give the
+    published rewards).
     """
 
     gain: float = 0.05
@@ -46,11 +47,12 @@ class MotionModel(NamedTuple):
 
     max_iterations: int = 20_000
     """Largest number of iterations of the corrective process for a goal (our bound). A trial that
-    needs more fails."""
+    needs more iterations fails."""
 
     motor_noise: float = 0.0
     """s: standard deviation of the distance by which a movement misses its target, in length units
-    (base) and rad (joints). The paper's robot has none. ``docs/model.md`` has the rule."""
+    (base) and rad (joints). The paper's robot has no motor noise. ``docs/model.md`` has the
+    rule."""
 
     norm: Norm = "euclidean"
     """Norm of joint space in which a step has the length ``step``:
@@ -59,15 +61,14 @@ class MotionModel(NamedTuple):
     - ``"maximum"``: the coordinate that moves farthest moves by ``step``."""
 
     base_weight: float = 1.0
-    """w: a length unit of the base counts as much as w rad of a joint in the length of a movement.
-    Only the price of moving the base changes: exploration, corrective process and tolerances do
-    not."""
+    """w: in the length of a movement, a length unit of the base counts as much as w rad of a joint.
+    The weight changes only the cost of moving the base; exploration, corrective process and
+    tolerances do not depend on it."""
 
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
-        """Return a copy with the tolerances for goals of a given radius.
+        """Return a copy in which tolerances have numbers instead of None.
 
-        ``radius`` is in length units. In the copy a tenth of ``radius`` takes the place of a
-        tolerance of None.
+        None is replaced by a tenth of the goals' ``radius``. ``radius`` is in length units.
         """
         arrival, correction = self.tolerances(radius)
         return self._replace(arrival_tolerance=arrival, correction_tolerance=correction)
@@ -75,8 +76,8 @@ class MotionModel(NamedTuple):
     def tolerances(self, radius: float) -> tuple[float, float]:
         """Return the tolerances of arrival and of correction, in length units.
 
-        ``radius`` is that of the goals, in length units. Where the model's tolerance is None, a
-        tenth of ``radius`` is returned.
+        ``radius`` is the radius of the goals, in length units. For a tolerance of None, a tenth of
+        ``radius`` is returned.
         """
         tenth, arrival, correction = radius / 10, self.arrival_tolerance, self.correction_tolerance
         return (
@@ -85,15 +86,15 @@ class MotionModel(NamedTuple):
         )
 
     def without_noise(self) -> MotionModel:
-        """Return a copy in which movements end where they aim."""
+        """Return a copy without motor noise."""
         return self if self.motor_noise == 0.0 else self._replace(motor_noise=0.0)
 
     def stored(self, radius: float) -> dict[str, Any]:
-        """Return the constants for goals of ``radius`` (in length units) by name, as files have
-        them.
+        """Return a dict that maps names to constants, as stored in files.
 
-        Constants of the world are left out if they are the paper's, so that ids of runs do not
-        change when a constant is added.
+        Tolerances are those for goals of ``radius`` (in length units). A constant of
+        :data:`WORLD` is left out if it has the paper's value, so that the ids of runs do not change
+        when a new constant is added.
         """
         constants = self.for_radius(radius)._asdict()
         return {
@@ -171,10 +172,11 @@ def refuse_noise(model: MotionModel) -> None:
 
 
 def model_from(constants: MotionModel | Mapping[str, Any]) -> MotionModel:
-    """Return the model whose constants are the paper's, except those in a mapping by name.
+    """Return the paper's model with the constants of a mapping changed.
 
-    A MotionModel is checked and returned unchanged. Raises TypeError for another value, and
-    ValueError for an unknown constant or a value out of bounds.
+    The keys of the mapping are names of constants. A MotionModel is checked and returned unchanged.
+    Raises TypeError for another value, and ValueError for an unknown constant or a value out of
+    bounds.
     """
     if isinstance(constants, MotionModel) or not isinstance(constants, Mapping):
         return check_model(constants)
@@ -187,12 +189,12 @@ def model_from(constants: MotionModel | Mapping[str, Any]) -> MotionModel:
 
 
 def same_world(first: MotionModel, second: MotionModel, radius: float) -> bool:
-    """Return whether two models are the same for goals of a radius (in length units)."""
+    """Return whether two models are equal for goals of a given radius (in length units)."""
     return first.for_radius(radius) == second.for_radius(radius)
 
 
 def differences(model: MotionModel) -> dict[str, Any]:
-    """Return the constants of a model's world that are not the paper's, by name."""
+    """Return a dict of the constants in :data:`WORLD` that differ from the paper's values."""
     return {
         name: getattr(model, name) for name in WORLD if getattr(model, name) != getattr(PAPER, name)
     }

@@ -137,7 +137,8 @@ def test_intervals_of_ticks_saved_are_drawn_to_scale(shipped):
         low, high = (
             part[[n[:-4] + end for n in names]].to_numpy(float) for end in ("_low", "_high")
         )
-        segments = [path.vertices[:, 1] for each in axes.collections for path in each.get_paths()]
+        paths = [path.vertices for each in axes.collections for path in each.get_paths()]
+        segments = [y for x, y in (path.T for path in paths) if np.ptp(x) == 0]  # not a row's line
         lengths, due = (
             np.sort(ends[~np.isnan(ends)]) for ends in (np.ptp(segments, 1), high - low)
         )

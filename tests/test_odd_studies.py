@@ -91,7 +91,8 @@ def test_the_advice_on_the_search_keeps_all_methods(capsys):
     rows = behind([ONE], "hill-climbing", 1, 2) + behind([ONE], "mine", 3, 4)
     own = load_task(ONE).model_copy(update={"radius": 0.11})
     text = said(study_of(rows, [own]), capsys)
-    assert "--methods hill-climbing,mine,optimum/search" in text
+    assert "add `optimum/search` to the command's `--methods`" in text
+    assert "`--methods '*,optimum/search'` if it has none" in text
 
 
 def test_an_instance_beside_a_task_has_its_own_gap():

@@ -152,13 +152,14 @@ def test_a_study_of_one_parameter_is_answered_first(coartic, tmp_path, monkeypat
     seen = load(out)
     means = seen.runs.groupby("noise_sd").gap.mean()
     best, other, *_ = means.sort_values().index
-    rows = re.findall(r"^learner EC1 \(σ ([\d.]+)[^)]*\) ", printed, re.MULTILINE)
+    rows = re.findall(r"^learner EC1 \(noise_sd ([\d.]+)[^)]*\) ", printed, re.MULTILINE)
     assert [*map(float, rows)] == means.sort_values().index.tolist()
     answer = " ".join(finding(seen, SECTIONS[0])).replace("\xa0", " ")
-    assert f"(σ {best}" in answer.partition(f"(σ {other}")[0]
+    assert f"is noise_sd {best}:" in answer.partition(f"noise_sd {other} (")[0]
     assert f"{100 * means[best]:.1f} %" in answer
     plot = FIGURES["ranking"](seen)
-    assert plot.data.set_index("value").gap.to_dict() == pytest.approx(means.to_dict())
+    drawn = dict(zip(plot.data.value.astype(float), plot.data.gap, strict=True))
+    assert drawn == pytest.approx(means.to_dict())
     assert plot.figure.axes[0].get_xscale() == "linear"  # from 0.02 to 0.1
     write_report(seen, tmp_path / "report", for_paper=False)
     written = (tmp_path / "report" / "report.html").read_text("utf-8")

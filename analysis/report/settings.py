@@ -81,7 +81,9 @@ def _best_setting(study: Study, rows: pd.DataFrame) -> str:
     for parameter, values in table.groupby("parameter", sort=False):
         by_value = dict(zip(values.value, values.gap, strict=True))
         least = min(by_value, key=by_value.__getitem__)
-        if by_value.get(str(best_of[str(parameter)]), 0.0) > by_value[least]:
+        p = dict(zip(values.value, values.p_holm, strict=True)).get(str(best_of[str(parameter)]))
+        is_chance = p is not None and p >= LEVEL
+        if not is_chance and by_value.get(str(best_of[str(parameter)]), 0.0) > by_value[least]:
             worse.append(f"{parameter} is best at {least}")
     if worse:
         sentences.append(
@@ -104,15 +106,17 @@ def _effect_of(study: Study, parameter: str) -> str:
     subject = f"{parameter}, {_range_of([value.value for value in compared])}:"
     if rows.equal.all():
         return f"{subject} changes nothing; every run has the same reward at each value."
-    change = f"the gap by {_points(rows.gap)} points"
+    apart, on_average, at_best = f"{_points(rows.gap)} points", "", ""
     if others := [name for name in study.varied.columns if name != parameter]:
-        change += f" on average over {'the other parameters' if others[1:] else others[0]}"
+        on_average = f" on average over {'the other parameters' if others[1:] else others[0]}"
         if rows.at_best.notna().all():
             values = "their best values" if others[1:] else "its best value"
-            change += f", and by {_points(rows.at_best)} at {values}"
+            at_best = f"{_points(rows.at_best)} at {values}"
     alike, is_tested = rows.value[rows.p_holm >= LEVEL].tolist(), rows.p_holm.notna().any()
     if len(alike) == len(rows) - 1:
-        return f"{subject} no difference is shown; its values change {change}."
+        shown = f"{subject} no difference is shown{on_average} (gaps are {apart} apart"
+        return f"{shown}{f', and {at_best}' * bool(at_best)})."
+    change = f"the gap by {apart}{on_average}{f', and by {at_best}' * bool(at_best)}"
     labels = [label for value in compared for label in value.labels]
     few = not is_tested and has_few_runs(study, labels, ranked_tasks(study))
     least = f"it is smallest at {rows.value.iloc[int(rows.gap.argmin())]}"

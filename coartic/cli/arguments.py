@@ -78,18 +78,18 @@ def runs_named(text: str) -> Any:
 
 
 def names_in(texts: Sequence[str] | None) -> list[str]:
-    """Split the values of an option at commas, without the blanks around names.
+    """Split the values of an option at commas, and strip blanks.
 
-    None, for an option that was not given, has no names.
+    None (the option was not given) gives an empty list.
     """
     return [name.strip() for text in texts or () for name in text.split(",")]
 
 
 def constants_in(texts: Sequence[str]) -> dict[str, Any] | None:
-    """Return the constants of a world by name, from texts such as ``motor_noise=0.01``.
+    """Parse texts such as ``motor_noise=0.01``: a dict that maps constants to values.
 
-    None if there are no texts. Raises CoarticError for a text without ``=``; the plan checks names
-    and values.
+    Return None if there are no texts. Raises CoarticError for a text without ``=``; the plan checks
+    names and values.
     """
     constants = dict[str, Any]()
     for text in texts:
@@ -106,7 +106,7 @@ def constants_in(texts: Sequence[str]) -> dict[str, Any] | None:
 
 
 def method_titles(registered: Registry) -> dict[str, str]:
-    """Return the titles of methods by id; the title of a method without its own is empty."""
+    """Return a dict that maps ids of methods to titles; a missing title is ``""``."""
     from coartic.analysis.methods import title_of
 
     titles = {name: title_of(name) for name in registered}

@@ -1,4 +1,4 @@
 """The dual-process learner.
 
-This package imports tasks, motion and the base of methods, but no other method.
+This package imports tasks, motion and the base class of methods, but no other method.
 """

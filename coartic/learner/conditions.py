@@ -1,27 +1,33 @@
 """The paper's exploration conditions and ablations of the learner, as data.
 
-A condition says which hands the learner uses, which joints are perturbed (AModChosen: base and
-chosen arm; AModOther: the other arm), and how hands are explored (DASel).
+A condition defines
+
+- which hands the learner uses;
+- which joints it perturbs (AModChosen: base and chosen arm; AModOther: the other arm);
+- how it explores hands (DASel).
 
 Informed conditions combine informed and uninformed search, which the paper leaves to "future
-research" (section *Integrating Informed and Uninformed Search*). Exploration has the mean ::
+research" (section *Integrating Informed and Uninformed Search*). They change two things in the base
+and the chosen arm. The mean of exploration, which is t in the paper, becomes ::
 
     t + κ N(t) (p - t)
 
-and an iteration of the corrective process adds ::
+and each iteration of the corrective process adds the term ::
 
     β N(x) (p - x)
 
-to base and chosen arm, where
+where
 
-- p is the preferred posture, fixed when a goal becomes current;
-- t is the stored target and x the present configuration;
+- p is the preferred posture, which is chosen when a goal becomes current;
+- t is the stored target and x is the present configuration;
 - N = I − J⁺J projects onto the null space of the chosen hand's Jacobian; like the paper's distance,
   it mixes lengths and angles.
 
-Ablations go beyond the paper as well. In one, the corrective process does not correct movements to
-stored targets that miss. The other learns from the reward of each subtask instead of the overall
-reward, which the paper calls crucial.
+There are two ablations, which are not in the paper:
+
+- *uncorrected*: a movement to a stored target that misses its goal is not corrected;
+- *subtask*: the learner learns from the reward of each subtask. The paper calls it crucial that it
+  learns from the overall reward.
 """
 
 from __future__ import annotations
@@ -49,8 +55,7 @@ if TYPE_CHECKING:
     from coartic.tasks.task import Task
 
 METHOD_PREFIX = "dual-process/"
-"""Beginning of the name of each method that is the learner under a condition; the id of the
-condition follows."""
+"""Prefix of the names of the learner's methods; the id of the exploration condition follows."""
 MOST_NOISE = 100.0
 """Largest standard deviation of noise that is accepted, in length units and rad."""
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -60,8 +65,7 @@ Drift = Annotated[float, Field(ge=0, le=10)]
 def _one_or_many(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
     """Validate a drift: a number, or a tuple of numbers.
 
-    Raises one validation error for any other value, instead of one for a number and one for a
-    tuple.
+    For any other value, raises a single validation error instead of two errors (number, tuple).
     """
     try:
         return validate(value)
@@ -81,12 +85,12 @@ Drifts = Annotated[
 @in_sentences
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class ExplorationCondition:
-    """How the learner explores, and what it learns from (paper, section *Experiments*).
+    """Rules of the learner's exploration and learning (paper, section *Experiments*).
 
     ``CONDITIONS`` has the paper's four conditions, ``ABLATIONS`` has conditions that change a part
     of the learner, and ``INFORMED`` has conditions with more information. To change fields of a
-    condition, use ``dataclasses.replace``. Raises ValueError for fields that are out of range or
-    contradict each other.
+    condition, use ``dataclasses.replace``. Raises ValueError if a field is out of range, or if two
+    fields contradict each other.
     """
 
     id: str
@@ -97,12 +101,12 @@ class ExplorationCondition:
     """True if noise moves the targets of the free base and of the arm that is to hit
     (AModChosen)."""
     modify_other: bool
-    """True if noise moves the targets of the other arm (AModOther); False if this arm keeps
-    still."""
+    """True if noise moves the targets of the other arm (AModOther); False if the other arm does not
+    move."""
     hand_exploration: Literal["none", "closest", "random", "nearest-posture"]
-    """How the hand for a goal is explored:
+    """Exploration of the hand for a goal:
 
-    - ``"none"``: not at all;
+    - ``"none"``: none;
     - ``"closest"``: the hand closest to the goal;
     - ``"random"``: a random hand (DASel);
     - ``"nearest-posture"``: the hand whose corrective posture for the goal is nearest in joint
@@ -117,11 +121,12 @@ class ExplorationCondition:
     If False, such a trial fails, and **A** acts only in trial 0 and for states and hands without a
     stored target."""
     learned: Literal["best", "replay"] = "best"
-    """Solution of a run: its best trial (``"best"``), or the noiseless greedy trial after the last
-    one (``"replay"``)."""
+    """Solution of a run: its best trial (``"best"``), or a greedy trial without exploration after
+    the last trial (``"replay"``)."""
     credit: Literal["overall", "subtask"] = "overall"
-    """Meaning of Q(s, a) of a goal: the reward R of the whole trial (``"overall"``), or the return
-    of that goal (``"subtask"``, see ``discount``)."""
+    """Credit assignment, that is, the reward from which Q(s, a) is learned at a goal: the reward R
+    of the whole trial (``"overall"``), or the return of the goal (``"subtask"``, see
+    ``discount``)."""
     discount: Share = 0.0
     """γ: the return of goal g is Σ γ^|h − g| r_h, where r_h is the reward of the movements to goal
     h. With γ = 0 the return is the reward of the subtask itself. A value above 0 needs credit
@@ -131,18 +136,18 @@ class ExplorationCondition:
     """Goals h in the sum for the return of goal g: g and later goals (``"later"``), or all goals
     (``"all"``, which needs credit ``"subtask"``). With ``"all"`` and γ = 1 every return is R."""
     drift: Drifts = 0.0
-    """κ of informed exploration. The mean of exploration moves by this share of the path to the
-    preferred posture, in the null space of the hand. If κ is a tuple, each trial after trial 0
-    draws one of its numbers."""
+    """κ, gain of informed exploration: the fraction of the null-space distance to the preferred
+    posture by which the mean of exploration moves. If κ is a tuple, each trial after trial 0 draws
+    one number of the tuple."""
     pull: Share = 0.0
-    """β of informed correction. After trial 0, each iteration of the corrective process adds this
-    share of the path to the preferred posture, in the null space of the hand."""
+    """β, gain of informed correction: the fraction of the null-space distance to the preferred
+    posture that each iteration of the corrective process adds, after trial 0."""
     direction: Literal["next-goal", "stay", "start"] = "next-goal"
     """The preferred posture:
 
     - ``"next-goal"``: halfway to the stored target of the next goal, if there is one;
-    - ``"stay"``: where the robot is when the goal becomes current;
-    - ``"start"``: where the trial began, which is wrong information.
+    - ``"stay"``: the configuration of the robot when the goal becomes current;
+    - ``"start"``: the configuration at the start of the trial, as a control with wrong information.
     """
 
     def __post_init__(self) -> None:
@@ -175,17 +180,11 @@ class ExplorationCondition:
 
     @property
     def is_informed(self) -> bool:
-        """True if a preferred posture informs exploration or correction.
-
-        This is so if a drift or ``pull`` is not 0.
-        """
+        """True if ``drift`` or ``pull`` is not 0, so that a preferred posture is used."""
         return any(self.drifts) or self.pull > 0
 
     def why_not(self, task: Task | Outline) -> str | None:
-        """Return a sentence on why the condition does not apply to a task's hands.
-
-        Return None if the condition applies.
-        """
+        """Return why the condition does not apply to a task's hands; None if it applies."""
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:
             return (
@@ -215,7 +214,7 @@ VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     # A learner of subtasks must not choose its solution by the reward of the whole task.
     "subtask": ("subtask reward", {"credit": "subtask", "learned": "replay"}),
 }
-"""Words for the title, and changed fields, of each variant of EC1 and EC4."""
+"""Maps the name of each variant of EC1 and EC4 to words for its title and its changed fields."""
 ABLATIONS = {
     f"{base}-{name}": replace(CONDITIONS[base], id=f"{base}-{name}", **fields)
     for base in ("EC1", "EC4")
@@ -239,10 +238,10 @@ EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """Return an exploration condition by its id, such as ``"EC4"`` or ``"dual-process/EC4"``.
+    """Look up an exploration condition by its id, such as ``"EC4"`` or ``"dual-process/EC4"``.
 
-    A condition is returned unchanged. Raises CoarticError for an unknown id, and TypeError for an
-    object that is neither a string nor a condition.
+    If the argument is a condition already, it is returned unchanged. Raises CoarticError for an
+    unknown id, and TypeError for an object that is neither a string nor a condition.
     """
     if isinstance(condition, ExplorationCondition):
         return condition

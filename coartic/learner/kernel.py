@@ -2,20 +2,21 @@
 
 The module implements the paper's section *The Learning Process* and Figure 3. At each goal of a
 trial the learner chooses a hand, perturbs the stored target configuration and moves there. If the
-goal was missed, the corrective process **A** finishes (:mod:`coartic.motion.kernels.trial`). If the
-trial is better than any earlier trial that passed through the same state and hand, it replaces the
-value and the target that are stored for this state and hand. Trials are compared by their total
-reward or, in an ablation, by the return of the goal.
+goal was missed, the corrective process **A** finishes (:mod:`coartic.motion.kernels.trial`). The
+learner's table has a value and a target for each state and hand. A trial is compared with all
+earlier trials that passed through the same state and hand, by the total reward or, in an ablation,
+by the return of the goal. If the trial is better than all of them, its value and its configuration
+at the goal replace those in the table.
 
 One call of a compiled kernel, by :mod:`coartic.learner.learning`, makes many runs side by side,
 goal by goal and trial by trial. Each run draws from its own NumPy generator (``default_rng(seed)``,
 PCG64), in this order:
 
-1. if there are many drifts, at the beginning of each trial after trial 0: a uniform number that
-   picks one;
+1. if the condition has several drifts, at the beginning of each trial after trial 0: a uniform
+   number that chooses a drift;
 2. for each goal of each trial after trial 0, if hands are explored: a uniform number that is
    compared with ε;
-3. if that number is below ε and a hand is picked at random: a uniform number that picks it;
+3. if that number is below ε and a hand is chosen at random: a uniform number that chooses the hand;
 4. if a target is stored: a standard normal number per explored joint, in the order of ``q``.
 
 Runs share nothing, so that the result of a run depends neither on the other runs nor on their
@@ -98,10 +99,10 @@ class LearnerParameters(NamedTuple):
     hands: Hands
     """Hands that may be used, shape ``(1,)`` or ``(2,)``."""
     follows: Flags
-    """True if the current value of a joint becomes its target, shape ``(2, width)``, a row for each
+    """True for each joint whose target is its present value, shape ``(2, width)``, a row for each
     chosen hand."""
     explored: Flags
-    """True if a joint is perturbed, shape ``(2, width)``, a row for each chosen hand."""
+    """True for each joint that noise perturbs, shape ``(2, width)``, a row for each chosen hand."""
     exploration: int
     """Exploration of the hand: 0 none, 1 random, 2 closest, 3 nearest posture."""
     epsilon: float
@@ -111,15 +112,17 @@ class LearnerParameters(NamedTuple):
     corrects: bool
     """True if **A** corrects a goal that a movement to a stored target misses."""
     by_subtask: bool
-    """True if a goal is credited with its own return instead of the reward of the trial."""
+    """True if Q of a goal is learned from the return of the goal, not from the reward of the
+    trial."""
     discount: float
     """γ of the return of a goal."""
     counts_earlier: bool
-    """True if earlier goals count in the return of a goal as well."""
+    """True if the return of a goal includes the rewards of earlier goals."""
     drifts: Array
     """Values of κ, shape ``(K,)``; if K > 1, each trial draws one."""
     pull: float
-    """β: share of the path to the preferred posture that an iteration of **A** adds."""
+    """β: fraction of the null-space distance to the preferred posture that an iteration of **A**
+    adds."""
     direction: int
     """Preferred posture: 0 next goal, 1 stay, 2 start."""
 
@@ -140,12 +143,12 @@ class Results(NamedTuple):
     corrections: NDArray[np.int64]
     """Corrective movements in trial 0 and in each tenth of the later trials, shape ``(N, 11)``."""
     initial_accounts: NDArray[np.void]
-    """Accounts of the goals in trial 0, if it was completed, shape ``(N, G)``."""
+    """Per-goal records of trial 0, if it was completed, shape ``(N, G)``."""
     best_accounts: NDArray[np.void]
-    """Accounts of the goals in the best trial, if there is one, shape ``(N, G)``."""
+    """Per-goal records of the best trial, if there is one, shape ``(N, G)``."""
     last_accounts: NDArray[np.void]
-    """Accounts of the goals in the latest trial, which in the end is the replay, shape ``(N,
-    G)``."""
+    """Per-goal records of the latest trial, shape ``(N, G)``. After the last call this is the
+    replay."""
 
 
 class _Workspace(NamedTuple):
@@ -206,11 +209,11 @@ def learner_parameters(
 
 
 def empty_tables(runs: int, task: Task) -> NDArray[np.void]:
-    """Return tables in which nothing is learned, shape ``(runs, G, 3, 2)``.
+    """Return the learner's tables before learning, shape ``(runs, G, 3, 2)``.
 
     The axes are run, goal, previous hand (left, right, none) and hand. An entry is a record with
-    two fields: ``value`` is Q, here -inf; ``target`` is q*, here ``dof`` times NaN. Zeros fill
-    ``target`` up to the width of kernel records.
+    two fields. ``value`` is Q, initially -inf. ``target`` is q*, initially ``dof`` entries of NaN,
+    padded with zeros to the width of kernel records.
     """
     learned = record_type({"value": np.float64, "target": (np.float64, width_of(task.robot))})
     tables = np.zeros((runs, len(task.goals), 3, 2), learned)
@@ -251,10 +254,10 @@ def _nearest_posture(
 ) -> int:
     """Return the hand whose corrective posture for the goal is nearest to the present posture.
 
-    The posture of a hand is the one that the corrective process **A** finds for the goal of run
-    ``n``, and distances are in joint space. At a tie, and if **A** fails with all hands, the result
-    is the first hand. Iterations and evaluations are counted. The run does not move, but its
-    ``hand``, ``converged`` and ``iterations`` change in place.
+    The corrective posture of a hand is the posture that the corrective process **A** finds for the
+    goal of run ``n``. Distances are in joint space. At a tie, and if **A** fails with all hands,
+    the result is the first hand. Iterations and evaluations are counted. The run does not move, but
+    its ``hand``, ``converged`` and ``iterations`` change in place.
     """
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
@@ -323,13 +326,13 @@ def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) 
 
     - *stay*: the present posture q;
     - *start*: the posture at the start of the trial;
-    - *next goal*: (q + t') / 2, where t' is the target stored for the next goal and its hand with
-      the highest value. Without a next goal or a stored target, p is q. For joints that are not
-      explored with that hand, p is q as well.
+    - *next goal*: (q + t') / 2. Here t' is the target that is stored for the next goal and for the
+      hand with the highest value there. If there is no next goal or no stored target, p is q. In
+      the joints that are not explored with that hand, p is q as well.
 
-    ``number`` is the index of the goal, from 0. ``table`` has records of value and target, shape
-    ``(G, 3, 2)``: by goal, previous hand (0 left, 1 right, 2 none) and hand. Nothing changes if
-    drift and pull are 0.
+    ``number`` is the index of the goal, from 0. ``table`` is an array of records with the fields
+    ``value`` and ``target``, shape ``(G, 3, 2)``; its axes are goal, previous hand (0 left, 1
+    right, 2 none) and hand. If drift and pull are 0, the function changes nothing.
     """
     if run.drift == 0.0 and run.pull == 0.0:
         return
@@ -395,9 +398,10 @@ def aim(
 ) -> None:
     """Choose the hand for a goal and set its target: phase 2, *aim*.
 
-    The target is the stored target q*(s, a), except that an idle arm which the condition does not
-    modify keeps its posture. If no target is stored, the corrective process acts. If ``explore`` is
-    True, the hand is explored (:func:`choose_hand`), and drift and noise η are added to the target.
+    The target is the stored target q*(s, a), except that an idle arm keeps its posture if the
+    condition does not modify it. If no target is stored, the corrective process acts. If
+    ``explore`` is True, the hand is explored (:func:`choose_hand`), and drift and noise η are added
+    to the target.
 
     ``n`` is the index of the run in ``workspace.batch.runs``, ``number`` the index of the goal,
     ``previous`` the previous hand (0 left, 1 right, 2 none), and ``table`` as in :func:`prefer`.
@@ -429,9 +433,10 @@ def make_trial(
     seeds: Any,
     workspace: _Workspace,
 ) -> None:
-    """Make trial number ``trial``, from 0, in each of N runs. It ends at the first goal missed.
+    """Make trial number ``trial``, from 0, in each of N runs.
 
-    This function fills ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. Trial 0 has
+    A trial ends at the first goal that is missed. This function fills the per-goal records
+    ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. Trial 0 has
     the hands and targets of ``learner``. If ``explore`` is False, the trial is greedy, without
     drift and noise of exploration. Other arguments are as in :func:`learn_kernel`.
     """
@@ -489,7 +494,7 @@ def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
 
 @inlined
 def _copy_accounts(source: Any, destination: Any) -> None:
-    """Copy the accounts of a trial's goals, shape ``(G,)``, in place.
+    """Copy the per-goal records of a trial, shape ``(G,)``, in place.
 
     The function copies word by word, because LLVM would copy records byte by byte, which takes long
     to compile.
@@ -505,9 +510,9 @@ def _learn_from(
 ) -> None:
     """Add trial ``number`` (from 0) of each run to ``results``, and learn from completed trials.
 
-    In a run that completed the trial, each visited state and hand is credited with the reward of
-    the trial, or with the return of its goal. If the credit is above Q, it replaces Q in
-    ``tables``, and the configuration at the hit replaces q*.
+    In a run that completed the trial, the reward of the trial (or the return of the goal) is
+    compared with Q for each visited state and hand. If it is above Q, it replaces Q in ``tables``,
+    and the configuration at the hit replaces q*.
     """
     later_trials = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // later_trials
@@ -560,8 +565,8 @@ def learn_kernel(
     rngs
         The runs' own generators (:func:`addresses`).
     seeds
-        Seed of the world of each run (:func:`.world_seed`), shape ``(N,)``. Trial k meets the noise
-        of draw k, the replay that of the draw after the last trial.
+        Seed of the motor noise of each run (:func:`.world_seed`), shape ``(N,)``. Trial k has noise
+        draw k. The replay has the draw after that of the last trial.
     workspace
         From :func:`workspace_for`.
     """

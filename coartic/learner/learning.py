@@ -54,10 +54,10 @@ _MOST_IN_BATCH = 4_000_000  # trials of runs whose rewards fit into one answer o
 
 
 def runs_at_once(trials: int) -> int:
-    """Return the largest number of runs of ``trials`` trials for one job of a worker.
+    """Return the largest number of runs, of ``trials`` trials each, for one job of a worker.
 
-    The number is at most 72 and at least 1. Within these limits, the runs together make at most
-    4,000,000 trials.
+    The number is chosen so that the runs together make at most 4,000,000 trials; it is at least 1
+    and at most 72.
     """
     return max(1, min(SLOTS, _MOST_IN_BATCH // trials))
 
@@ -87,10 +87,10 @@ def learn(
         Number of trials, including trial 0.
     model : MotionModel
     start : sequence of Movement
-        A first solution, such as a planner's or an earlier run's. For each goal trial 0 uses the
-        first of its movements: it moves the hand of this movement straight to the target. The
-        corrective process acts if the hand misses the goal, or if there is no target. Without a
-        first solution only the corrective process acts in trial 0.
+        A first solution, such as a planner's or an earlier run's. In trial 0 the learner makes, for
+        each goal, the first movement of this solution: the robot moves straight to its target. If
+        the hand of the movement misses the goal, or if the movement has no target, the corrective
+        process acts. Without a first solution only the corrective process acts in trial 0.
 
     Returns
     -------
@@ -156,11 +156,11 @@ def learn_many(
     task : Task, str or pathlib.Path
     condition : str or ExplorationCondition
     seeds : iterable of int
-        A seed for each run, no two of them equal.
+        A seed for each run. No two seeds may be equal.
     trials : int
     model : MotionModel
     start : sequence of Movement
-        Arguments of :func:`learn`. They are the same for every run.
+        First solution (:func:`learn`). All arguments except the seed are the same for every run.
     jobs : int
         Largest number of threads; -1 for one per core.
 
@@ -237,9 +237,9 @@ def _learn_together(
 ) -> list[LearningRun]:
     """Run the learner side by side, once for each of at most 72 seeds, unchecked.
 
-    Return the runs in the order of seeds. ``initial`` has the movement of trial 0 for each goal; it
-    has no target if the corrective process is to act. With 0 trials the kernels are compiled, the
-    rewards are empty, and the replay is trial 0.
+    Return the runs in the order of seeds. ``initial`` has the movement of trial 0 for each goal; a
+    movement without a target stands for the corrective process. With 0 trials the kernels are
+    compiled, the rewards are empty, and the replay is trial 0.
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)

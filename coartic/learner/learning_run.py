@@ -50,12 +50,12 @@ class LearningRun:
     replay_reward: int | None
     """Total reward of the replay; None if it failed."""
     values: Array
-    """Q, shape ``(goals, 3, 2)``, by goal, previous hand (left, right, none) and hand. Q is the
-    highest total reward, or the highest return of the goal if the condition credits subtasks. It is
-    -inf if nothing was learned."""
+    """Q, shape ``(goals, 3, 2)``; the axes are goal, previous hand (left, right, none) and hand. Q
+    is the highest total reward, or the highest return of the goal if the condition has
+    ``credit="subtask"``. Q is -inf where nothing was learned."""
     targets: Array
-    """q*, shape ``(goals, 3, 2, dof)``, in length units (base) and rad (joints); NaN if Q is
-    -inf."""
+    """q*, the stored targets, shape ``(goals, 3, 2, dof)``, in length units (base) and rad
+    (joints); NaN where Q is -inf."""
     corrections: NDArray[np.int64]
     """Corrective movements in trial 0 and in each tenth of the later trials, shape ``(11,)``."""
     counters: Meter
@@ -77,8 +77,9 @@ class LearningRun:
     def learned(self) -> tuple[Movement, ...]:
         """Movements of the learned solution; empty if its trial did not hit every goal.
 
-        This is the best trial, or the replay if the condition has ``learned="replay"``. In a model
-        with motor noise it is :attr:`next_action`, because the best trial was partly lucky.
+        The learned solution is the best trial, or the replay if the condition has
+        ``learned="replay"``. With motor noise it is :attr:`next_action`, because the best trial was
+        partly lucky.
         """
         if self.model.motor_noise > 0.0:
             return self.next_action
@@ -90,11 +91,16 @@ class LearningRun:
     def next_action(self) -> tuple[Movement, ...]:
         """Movements that the learner would make next without exploration.
 
-        For each goal, in the state that the number of the goal and the hand for the goal before
-        make up, these are the hand with the highest Q and its stored posture q*. A movement has no
-        ticks. Joints of an idle arm that the condition does not move have NaN, with which they
-        stay. Where no posture is stored, the movement is corrective and has no target. The result
-        is empty if no trial was completed.
+        The state at a goal is the number of the goal and the hand for the goal before.
+
+        - The hand for a goal is the hand with the highest Q in this state; the target is the stored
+          posture q* of this hand.
+        - If no posture is stored, the movement is corrective and has no target.
+        - The target is NaN in the joints of an idle arm that the condition does not move; these
+          joints do not move.
+        - The movements have no ticks.
+
+        The result is empty if no trial was completed.
         """
         if self.best_trial is None:
             return ()

@@ -1,7 +1,7 @@
-"""The dual-process learner as methods: one per exploration condition, and one for any.
+"""The dual-process learner as methods: one for each exploration condition, and a general one.
 
-Variants that use more information than the paper's learner are separate methods. A method's
-declaration therefore holds under all its parameters.
+Variants that use more information than the paper's learner are separate methods. The information
+that a method declares is therefore right for all values of its parameters.
 """
 
 from __future__ import annotations
@@ -84,10 +84,7 @@ class DualProcess(Method):
         return _condition_of(self.condition, self.parameters)
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence on why the learner's condition does not apply to a task's hands.
-
-        Return None if the condition applies.
-        """
+        """Return why the condition does not apply to a task's hands; None if it applies."""
         return self.rules().why_not(task)
 
     def solve(self, session: Session) -> Result:
@@ -108,8 +105,8 @@ class DualProcess(Method):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        The number is at most 72 and at least 1. Within these limits, the sessions together make at
-        most 4,000,000 trials.
+        The number is chosen so that the sessions together make at most 4,000,000 trials; it is at
+        least 1 and at most 72.
         """
         return runs_at_once(self.parameters.trials)
 
@@ -212,10 +209,10 @@ _optional: Any = {name: (kind | None, None) for name, kind in _FIELDS.items()}
 
 
 class CustomDualProcess(DualProcess):
-    """The learner under any exploration condition, with all information that a condition may use.
+    """The learner under any exploration condition that the parameters define.
 
-    Its parameters are ``trials``, ``base`` and the fields of a condition except ``id`` and
-    ``hands``.
+    The parameters are ``trials``, ``base``, and all fields of a condition except ``id`` and
+    ``hands``. The method declares all information that any condition uses.
     """
 
     name = f"{METHOD_PREFIX}custom"
@@ -227,9 +224,9 @@ class CustomDualProcess(DualProcess):
     )
 
     def rules(self) -> ExplorationCondition:
-        """Return the paper's condition ``base`` with the changed fields.
+        """Return a copy of condition ``base`` with the fields that the parameters change.
 
-        Fields whose parameter is None are not changed. The id is for example ``EC4, changed,``.
+        Fields whose parameter is None keep their values. The id is, for example, ``EC4, changed,``.
         """
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
         return _condition_of(base, self.parameters)

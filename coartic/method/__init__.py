@@ -1,10 +1,10 @@
 """The base of methods, and the session through which a method works.
 
-A learner, planner or controller is a :class:`Method`. It declares its facts, its parameters and
-the **information** that it uses. Its method ``solve`` gets a :class:`Session` (one task, one seed,
-one meter) and returns a solution. The session is the only access to the robot: it counts trials and
-evaluations, and refuses a call that the method's declaration does not cover. The harness itself
-executes, scores and verifies the solution.
+A learner, planner or controller is a :class:`Method`. A method declares its facts, its parameters
+and the **information** that it uses. Its function ``solve`` gets a :class:`Session` (one task, one
+seed, one meter) and returns a solution. The session is the only access to the robot: the session
+counts trials and evaluations, and refuses a call that uses undeclared information. The harness
+itself executes, scores and verifies the solution.
 """
 
 from coartic.method.base import (

@@ -43,8 +43,8 @@ class Result:
     """A solution, and further data that a method returns with it."""
 
     solution: tuple[Movement, ...]
-    """Movements, at least one for each goal, in the order of the goals. In a world with motor noise
-    these are what the method recommends to do next (:func:`answer_of`)."""
+    """Movements, at least one for each goal, in the order of the goals. With motor noise they are
+    the movements that the method recommends to make next (:func:`answer_of`)."""
     details: dict[str, Any] = field(default_factory=dict)
     """Plain data to be stored with the solution, but never its score."""
     initial: tuple[Movement, ...] = ()
@@ -55,12 +55,13 @@ class Result:
 
 
 def answer_of(result: Result, model: MotionModel) -> Result:
-    """Return the result of a method as its answer in a world.
+    """Return the part of a method's result that is judged under a motion model.
 
-    Without motor noise this is the result itself. With noise the answer is the next action: the
-    movements of the solution have no ticks, corrective movements have no targets
-    (:func:`.next_action`), and there is neither a first trial nor a replay, which one draw of the
-    noise made what they were.
+    Without motor noise this is the result itself. With motor noise it is a copy of the result:
+
+    - The movements of the solution have no ticks, and corrective movements have no targets
+      (:func:`.next_action`), because both come from a single draw of the noise.
+    - The first trial and the replay are left out for the same reason.
 
     Examples
     --------
@@ -98,24 +99,21 @@ class Outline(NamedTuple):
 
     @property
     def too_many_sequences(self) -> str | None:
-        """A sentence if the task has more than 4096 hand sequences, which are too many to try.
-
-        Otherwise None.
-        """
+        """A sentence if the task has more than 4096 hand sequences, else None."""
         return too_many_sequences(self.name, self.goals_count, len(self.hands))
 
 
 def outline_of(task: Task) -> Outline:
-    """Return the properties of a task by which a method decides whether it applies."""
+    """Return the outline of a task, from which a method decides whether it applies."""
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
 @in_sentences
 @checked_dataclass(frozen=True)
 class Facts:
-    """What figures, tables and the bibliography say of a method besides its title.
+    """Citations and names of a method for figures, tables and the bibliography.
 
-    A wrong value raises ValueError.
+    Raises ValueError for a wrong value.
 
     Examples
     --------
@@ -129,8 +127,8 @@ class Facts:
     solvers: tuple[str, ...] = ()
     """Keys in ``analysis/references.bib`` of the works on the solvers that the method uses."""
     algorithm: str = ""
-    """Algorithm of which the method is a form, by default the method itself. A ranking counts
-    algorithms."""
+    """Name of the algorithm that the method implements; by default the method's own name. A ranking
+    counts algorithms."""
     short: Annotated[str, Field(max_length=22)] = ""
     """Name in figures of one column, at most 22 letters. By default it is the title of a built-in
     method, and the id of a method from a file."""
@@ -155,26 +153,28 @@ class Method(ABC):
     facts: ClassVar[Facts] = Facts()
     """Works, short name and algorithm of the method. A subclass does not inherit them."""
     citation: ClassVar[str] = ""
-    """Works from which the method comes that ``analysis/references.bib`` does not have, in
-    words."""
+    """Reference, as text, to works that are missing from ``analysis/references.bib``."""
     information: ClassVar[frozenset[Information]]
     """Information that the method uses."""
     tuned_on: ClassVar[str] = ""
     """Tasks on which the method's parameters were chosen, and among which values; empty if that is
-    not known. It tells readers whether results are of tasks that are new to the method. It is not a
-    part of the id of a run."""
+    not known. Readers can see from this attribute which tasks are new to the method. The attribute
+    is not a part of the id of a run."""
     adapts_to: ClassVar[frozenset[str] | None] = None
-    """Constants of the world (:data:`.WORLD`: ``motor_noise``, ``norm`` and ``base_weight``) that
-    may differ from the paper's. By default (None) these are all three, but only ``motor_noise`` if
-    the method declares the reward as a formula or the kinematic model: it may compute with the
-    paper's lengths itself."""
+    """Constants of the motion model (:data:`.WORLD`: ``motor_noise``, ``norm`` and ``base_weight``)
+    that may differ from the paper's when the method runs. None, the default, stands for
+
+    - only ``motor_noise``, if the method declares the reward formula or the kinematic model,
+      because such a method may itself compute lengths as in the paper;
+    - all three constants otherwise.
+    """
     stochastic: ClassVar[bool] = True
-    """True if the seed matters. If False, the method is run once."""
+    """True if the results depend on the seed. If False, the method is run once on each task."""
     Parameters: ClassVar[type[Parameters]] = Parameters
     """Class of the method's parameters. By default a method has none."""
     version: ClassVar[int] = 1
-    """Version of the method's results. Raise it whenever results change, also if a default changes.
-    Runs of different versions are not compared."""
+    """Version of the method's results. Increase the version whenever results change, also if a
+    default changes. Runs of different versions are not compared."""
     files: ClassVar[tuple[str, ...]] = ()
     """Names of data files in the folder of the method's file. These files count as a part of the
     method's code."""
@@ -189,7 +189,7 @@ class Method(ABC):
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
     def why_not(self, task: Outline) -> str | None:
-        """Return a sentence on why the method does not apply to a task, or None.
+        """Return why the method does not apply to a task; None if it applies.
 
         By default a method applies to every task.
         """
@@ -197,7 +197,7 @@ class Method(ABC):
 
     @classmethod
     def refuses(cls, model: MotionModel) -> str | None:
-        """Return a sentence on a constant of a world that the method cannot work with, or None."""
+        """Return why the method cannot run under a motion model; None if it can."""
         adapts_to = cls.adapts_to
         if adapts_to is None:
             knows = {Information.REWARD_FORMULA, Information.KINEMATIC_MODEL} & cls.information
@@ -218,15 +218,15 @@ class Method(ABC):
         Parameters
         ----------
         session : Session
-            One task, one seed and one budget. All calls go through it.
+            One task, one seed and one budget. The method makes all its calls through the session.
 
         Returns
         -------
         Result
             The solution, with at least one movement for each goal, and further data to be stored.
             With motor noise (``session.model.motor_noise`` above 0) the best trial was partly
-            lucky. The solution is then what the method recommends to do next, and it is judged by
-            noise in which the method has not practised.
+            lucky. The solution then has the movements that the method recommends to make next. They
+            are judged on draws of the noise that the method has not seen.
 
         Raises
         ------
@@ -241,7 +241,8 @@ class Method(ABC):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        A suite passes one session to methods from outside this project, whatever they return here.
+        For methods from outside this project, a suite ignores this number and passes one session at
+        a time.
         """
         return 1
 
@@ -274,15 +275,17 @@ MODULES = (
     "coartic.baselines.optimum",
     "coartic.baselines.policy_gradient",
 )
-"""Modules of the built-in methods, each with a list ``METHODS``, in the order of lists and figures.
-Add a new one at the end, so that the others keep their looks."""
+"""Modules of the built-in methods, in the order of lists and figures. Each module has a list
+``METHODS``. Add a new module at the end, so that the other methods keep their colours and
+markers."""
 
 
 @cache
 def built_in_methods() -> Mapping[str, type[Method]]:
-    """Import the built-in methods, and return their classes by id in the order of :data:`MODULES`.
+    """Return a mapping from the ids of the built-in methods to their classes.
 
-    Each call returns the same mapping: do not change it.
+    The methods are in the order of :data:`MODULES`, whose modules are imported. Each call returns
+    the same mapping: do not change it.
     """
     return {method.name: method for name in MODULES for method in import_module(name).METHODS}
 
@@ -293,8 +296,8 @@ def run_method(
     """Let a method solve a task in this process.
 
     There is no budget of trials, and the solution is not executed. Methods of this project may see
-    the task, and report their own counts. Any other method gets an UndeclaredError for information
-    that it uses and does not declare, if a session can see the use (:data:`METERED`).
+    the task, and report their own counts. In any other method, the use of undeclared information
+    raises UndeclaredError, if it is information whose use a session can detect (:data:`METERED`).
 
     Parameters
     ----------

@@ -64,10 +64,10 @@ NO_COPIES = (
 
 
 def explored_joints(session: Session) -> NDArray[np.bool_]:
-    """Return which entries of a configuration are explored by optimisers on the session's task.
+    """Return a mask of the entries of a configuration that optimisers explore.
 
-    The result is bool, shape ``(dof,)``. It is True for the coordinates of the base that are not
-    locked, and for the joints of the arms of all hands of the task.
+    The mask is a bool array, shape ``(dof,)``. It is True for the base coordinates that are not
+    locked, and for the joints of the arms whose hands the session's task uses.
     """
     mask = np.zeros(session.dof, dtype=np.bool_)
     mask[:2] = [coordinate not in session.locked_base for coordinate in "xy"]
@@ -79,9 +79,9 @@ def explored_joints(session: Session) -> NDArray[np.bool_]:
 def sequences_of(session: Session) -> list[str]:
     """List all hand sequences of the session's task, such as ``"RRLR"``, in alphabetical order.
 
-    If the task names a sequence, that sequence comes first. If there are more than 4096, the list
-    has only the initial hand sequence, from :meth:`Session.find_initial_hands`. Errors of that
-    method are raised.
+    If the task names a sequence, that sequence comes first. If there are more than 4096 sequences,
+    the list has only the initial hand sequence, from :meth:`Session.find_initial_hands`, whose
+    errors are raised.
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
@@ -105,22 +105,24 @@ class Objective:
     (:func:`explored_joints`), in length units (base) and rad (joints).
 
     - The cost of a point is minus the reward of its trial, or ``FAILED`` if the trial fails or
-      takes more ticks than that.
-    - The corrective process acts at goals that a movement misses, and its ticks count.
-    - If all entries of a goal are NaN, no movement is made to a target. Only the corrective process
-      acts, which costs nothing if the hand is in the goal already. A movement to a target always
-      takes at least one tick.
+      takes more than ``FAILED`` ticks.
+    - If a movement misses its goal, the corrective process acts, and the ticks of its movement
+      count.
+    - If all entries of a goal are NaN, there is no movement to a target: only the corrective
+      process acts. If the hand is in the goal already, this costs no ticks, whereas a movement to a
+      target takes at least one tick.
     - A trial fails if its point has an entry beyond 100,000.
-    - In a model with motor noise a point has another cost in each trial; :attr:`best_cost` is the
-      lowest, and therefore partly luck. Costs under the same draws compare points fairly
-      (:meth:`many`).
+    - With motor noise the cost of a point differs from trial to trial. :attr:`best_cost` is the
+      lowest of many noisy costs, and therefore partly luck. To compare points fairly, evaluate them
+      with the same noise draws (:meth:`many`).
 
-    The first trials are made when the objective is created. In them only the corrective process
-    acts, with ``hands`` or with as many sequences of :func:`sequences_of` as the budget allows. The
-    best sequence becomes the hands of all points for which no other hands are passed.
+    The constructor makes the first trials, in which only the corrective process acts: one trial
+    with ``hands``, or one trial with each sequence of :func:`sequences_of` until the budget is used
+    up. The best of these sequences becomes :attr:`hands`, the default hand sequence of all points.
 
-    Threads can share an objective, which answers their calls one after the other. Copies, and
-    trials in a forked process, raise CoarticError, because they would not count for the budget.
+    Threads can share an objective; their calls are executed one after the other. Copying an
+    objective, or using it in a forked process, raises CoarticError, because the budget would not
+    count those trials.
 
     Parameters
     ----------
@@ -208,7 +210,7 @@ class Objective:
 
     @property
     def hands(self) -> str:
-        """Hand sequence of points for which no other is passed, such as ``"RRLR"``."""
+        """Default hand sequence of points, such as ``"RRLR"``."""
         return self._hands
 
     # What is known about the task. Methods cannot use this.
@@ -233,11 +235,11 @@ class Objective:
         """Lowest known cost of any solution of the task (in ticks; a mean with motor noise).
 
         The solution may have any hand sequence, and may hit goals without a movement. The cost is
-        None if coartic comes with none, which is so for
+        None if no such cost is shipped with coartic, as for
 
         - most tasks of your own;
         - instances of families, except the first 40 test instances of shipped families;
-        - models other than the paper's, with or without motor noise 0.01.
+        - motion models other than the paper's model and the paper's model with motor noise 0.01.
 
         Raises UndeclaredError in a method, as :attr:`task` does.
         """
@@ -246,9 +248,9 @@ class Objective:
 
     @property
     def proven(self) -> bool:
-        """True if it is proven that no solution costs less than ``best_known``.
+        """True if a proof shows that no solution costs less than ``best_known``.
 
-        False if there is no such proof. Raises UndeclaredError in a method, as :attr:`task` does.
+        Raises UndeclaredError in a method, as :attr:`task` does.
         """
         optimum = self._optimum
         return optimum is not None and optimum.proven
@@ -268,8 +270,8 @@ class Objective:
     def evaluations(self) -> int:
         """Number of points evaluated.
 
-        The first trials, in which only the corrective process acts, are not included: one for each
-        hand sequence tried.
+        The first trials, one for each hand sequence tried, in which only the corrective process
+        acts, are not counted.
         """
         return self._evaluations
 
@@ -299,7 +301,7 @@ class Objective:
 
     @property
     def history(self) -> pd.DataFrame:
-        """Table with a row each time the best cost fell.
+        """Table with a row for each improvement of the best cost.
 
         The first row is the best trial in which only the corrective process acts. Column
         ``evaluations`` is the number of evaluations made until then (0 in the first row); column
@@ -310,7 +312,7 @@ class Objective:
         return pd.DataFrame(self._improvements, columns=["evaluations", "cost"])
 
     def evaluations_to(self, targets: ArrayLike) -> Any:
-        """Return the number of evaluations that were needed to reach costs.
+        """Return the number of evaluations until the best cost reached each target cost.
 
         Parameters
         ----------
@@ -343,8 +345,9 @@ class Objective:
     def x0(self) -> Array:
         """A starting point for a search, shape ``(dim,)``, in length units and rad.
 
-        Its entries are those of the configurations in which the corrective process on its own, with
-        :attr:`hands`, hits the goals. Each access returns a new array.
+        The corrective process on its own, with :attr:`hands`, hits the goals in certain
+        configurations; the starting point has the explored entries of these configurations. Each
+        access returns a new array.
         """
         return self.configurations[self.joints].copy()
 
@@ -361,8 +364,8 @@ class Objective:
     def solution(self) -> tuple[Movement, ...]:
         """Movements of the best trial so far, for :func:`coartic.execute`.
 
-        Until a point is better than the corrective process on its own, these are corrective
-        movements without targets.
+        Until a point is better than the corrective process on its own, the solution consists of
+        corrective movements without targets.
         """
         return movements_of(self.best_hands, self._best_targets)
 
@@ -383,15 +386,19 @@ class Objective:
         -------
         tuple of Movement
             A movement for each goal. A movement has no target if the entries of its goal are NaN.
-            Otherwise its target has all joints: a joint without an entry in the point keeps its
-            value. If the trial fails at a goal, such joints have their values at the start in the
-            targets of later goals. With motor noise such joints have NaN, with which they stay.
+            Otherwise the target has entries for all joints. A joint that the point does not include
+            keeps its value: its entry is
+
+            - its value when the movement begins;
+            - its value at the start of the trial, in the targets of goals after a goal at which the
+              trial fails;
+            - NaN with motor noise (a joint whose target is NaN does not move).
 
         Raises
         ------
         UndeclaredError
-            The call is made in a method, which can use :attr:`solution`. With motor noise methods
-            may call it as well.
+            A method made the call, and the model has no motor noise. A method can use
+            :attr:`solution` instead.
         ValueError
             ``x`` or ``hands`` does not fit.
         """
@@ -419,7 +426,7 @@ class Objective:
         ----------
         x : array_like, shape (dim,) or (dim, N)
             A point, or points as columns, as scipy passes them. Shape ``(dim, dim)`` is refused,
-            because points may be rows there: :meth:`many` takes rows.
+            because its points could be rows as well: pass rows to :meth:`many`.
         hands : str or sequence of str, optional
             As in :meth:`many`.
 
@@ -480,9 +487,9 @@ class Objective:
             One hand sequence for all points (``"RRLR"``), or a sequence for each; by default
             :attr:`hands`.
         draws : array_like of int, shape (N,), optional
-            Number of the draw of the motor noise that each point meets (:meth:`.Session.trials`).
-            Points with the same draw meet the same noise. A method declares
-            ``Information.NOISE_DRAWS`` to choose draws.
+            Number of the noise draw for each point (:meth:`.Session.trials`). Points with the same
+            draw have the same noise. To choose draws, a method has to declare
+            ``Information.NOISE_DRAWS``.
 
         Returns
         -------
@@ -492,10 +499,10 @@ class Objective:
         Raises
         ------
         UndeclaredError
-            A method chooses draws, and does not declare ``Information.NOISE_DRAWS``.
+            A method chooses draws without declaring ``Information.NOISE_DRAWS``.
         BudgetError
-            Fewer trials are left than there are points. The trials that are left are made first,
-            for the first points.
+            Fewer trials are left than there are points. Before the error is raised, the first
+            points are evaluated until no trial is left.
         ValueError
             An argument cannot be used:
 
@@ -562,10 +569,9 @@ class Objective:
         return accounts.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:
-        """Return the targets of points ``(N, dim)``, shape ``(N, G, dof)``, in length units and
-        rad.
+        """Return the targets of points ``(N, dim)``, shape ``(N, G, dof)``.
 
-        Targets are NaN for joints without an entry in a point.
+        Targets are in length units and rad, and NaN for joints without an entry in a point.
         """
         targets = np.repeat(self._targets, len(points), axis=0)
         targets.reshape(len(points), -1)[:, self._entries] = points
@@ -617,7 +623,7 @@ def objective(
     budget: int | None = None,
     seed: int = 0,
 ) -> Objective:
-    """Return the cost of a task's trial as a function for scipy and other libraries.
+    """Make an objective function for scipy and similar libraries: the cost of a trial.
 
     Parameters
     ----------
@@ -628,9 +634,9 @@ def objective(
     half_width : float
         Half the width of the bounds around ``x0``, in length units (base) and rad (joints).
     model : MotionModel
-        The world, such as ``MotionModel(motor_noise=0.01)``.
+        The motion model, such as ``MotionModel(motor_noise=0.01)``.
     budget : int, optional
-        Largest number of trials, including the trials by which hands are chosen. Further trials
+        Largest number of trials, including the trials that choose the hand sequence. Further trials
         raise BudgetError.
     seed : int
         Seed of the motor noise, from 0 to 2^128 - 1.
@@ -651,13 +657,13 @@ def objective(
         - ``half_width`` is not from 1e-9 to 100;
         - a constant of the model is out of bounds;
         - ``seed`` is out of bounds;
-        - ``budget`` is not from 1 to 10,000,000, or is less than the number of hand sequences to
-          choose among.
+        - ``budget`` is not from 1 to 10,000,000, or is smaller than the number of hand sequences to
+          try.
     TypeError
         The model is not a MotionModel, or the task is not a Task, a string or a path.
     MethodError
-        The corrective process completes none of the sequences tried, or there are more than 4096 to
-        try.
+        The corrective process completes none of the sequences tried, or there are more than 4096
+        sequences to try.
     """
     chosen = as_task(task)
     if budget is not None:
@@ -702,8 +708,8 @@ class Optimiser(Method):
     def solve(self, session: Session) -> Result:
         """Call :meth:`optimise` until it returns or no trial is left; return the best trial.
 
-        In a world with motor noise, return the movements of the point that :meth:`optimise`
-        recommends; if it recommends none, return the best trial, which was partly lucky.
+        With motor noise, return the movements of the point that :meth:`optimise` recommends. If it
+        recommends no point, return the best trial, which was partly lucky.
 
         Raises
         ------
@@ -713,8 +719,8 @@ class Optimiser(Method):
         NotApplicableError
             There are more than 4096 hand sequences, and no initial one is found.
         ValueError
-            Parameter ``hands`` does not fit the task. In noise: :meth:`optimise` returned what is
-            not a point.
+            Parameter ``hands`` does not fit the task. With motor noise: :meth:`optimise` returned
+            neither a point nor None.
         """
         parameters: OptimiserParameters = self.parameters
         try:
@@ -748,12 +754,13 @@ class Optimiser(Method):
 
     @abstractmethod
     def optimise(self, objective: Objective, rng: np.random.Generator) -> Any:
-        """Minimise ``objective``, which remembers its best trial.
+        """Minimise ``objective``, and return the recommended point.
 
         Parameters
         ----------
         objective : Objective
-            The cost. It raises BudgetError when no trial is left, which ends the run.
+            The cost function, which remembers its best trial. It raises BudgetError when no trial
+            is left, which ends the run.
         rng : numpy.random.Generator
             The session's random generator.
 
@@ -761,9 +768,10 @@ class Optimiser(Method):
         -------
         array_like, shape (dim,), or tuple, or None
             The point that the method recommends, such as the mean of an evolution strategy; or a
-            tuple of this point and its hand sequence, if it is not :attr:`Objective.hands`. It
-            counts only in a world with motor noise, where the best trial was partly lucky. Without
-            noise, and if None is returned, the best trial is the solution.
+            tuple of the point and its hand sequence, if the sequence is not
+            :attr:`Objective.hands`. The returned point is the solution only with motor noise,
+            because there the best trial was partly lucky. Without noise, or if None is returned,
+            the best trial is the solution.
 
         Notes
         -----

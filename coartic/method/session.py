@@ -1,4 +1,4 @@
-"""The session of a method: what the method may use, and what it has spent."""
+"""The session of a method: access to the task, and counts of trials and evaluations."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Information(StrEnum):
     KINEMATIC_MODEL = "kinematic model"
     """The kinematics as formulas, with all derivatives."""
     NOISE_DRAWS = "draws of the noise"
-    """Which draw of the motor noise a trial meets. By default trial k meets draw k."""
+    """The choice of the noise draw of each trial. By default trial k has draw k."""
     REWARD_FORMULA = "reward as a formula"
     """The rule that a movement costs reward in proportion to its path in joint space."""
     SECONDARY_OBJECTIVES = "secondary objectives"
@@ -80,7 +80,7 @@ METERED = frozenset(
         Information.NOISE_DRAWS,
     }
 )
-"""Information whose use a session can see. The use of other information is declared, but not
+"""Information whose use a session can detect. The use of other information is declared, but not
 checked."""
 
 
@@ -121,8 +121,9 @@ class Meter:
     trials: int = 0
     """Physical trials, including failed trials."""
     initial_trials: int = 0
-    """Trials of the search for the initial hands, if the task names a policy. They are not among
-    ``trials``, but their ticks, corrections and evaluations are in the counts below."""
+    """Trials of the search for the initial hands, if the task names a policy. These trials are not
+    counted in ``trials``, but their ticks, corrections and evaluations are included in the counts
+    below."""
     movement_ticks: int = 0
     """Control ticks of all trials."""
     forward_kinematics: int = 0
@@ -157,8 +158,8 @@ class Meter:
         "hessians",
         "solver_iterations",
     )
-    """Counters to which a method itself adds: the evaluations of its solver, or of a corrective
-    process that it runs itself, with one Jacobian per iteration."""
+    """Counters to which a method may add (:meth:`Session.spend`): the evaluations of its own solver
+    or of its own corrective process, with one Jacobian per iteration."""
 
     def add(self, **counts: int) -> None:
         """Add each count to the counter of that name, in place.
@@ -181,16 +182,16 @@ _OTHER_PROCESS = (
 
 
 def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
-    """Return rewards as an array of 8-byte integers, with :data:`NO_REWARD` in place of None."""
+    """Return rewards as an array of 8-byte integers; :data:`NO_REWARD` stands for None."""
     return array("q", [NO_REWARD if reward is None else reward for reward in rewards])
 
 
 class Session:
     """The task, the seed and the meter with which a method works.
 
-    The declaration is enforced: a call that uses information of :data:`METERED` which is not in
-    ``information`` raises UndeclaredError. Trials and evaluations are counted. A session is not a
-    sandbox. Threads can share a session: they make trials one after the other, from the same
+    The declaration is enforced: a call raises UndeclaredError if it uses information that is in
+    :data:`METERED` but not in ``information``. Trials and evaluations are counted. A session is not
+    a sandbox. Threads can share a session: they make trials one after the other, from the same
     budget. In a forked process a call that needs declared information raises CoarticError.
 
     Parameters
@@ -200,16 +201,16 @@ class Session:
     information : iterable of Information
         The information that the method declares.
     model : MotionModel
-        The world in which trials are made. The seed of its motor noise follows from ``seed``;
-        :attr:`rng` does not depend on the noise.
+        The motion model of the trials. The seed of its motor noise is derived from ``seed``; the
+        random numbers of :attr:`rng` are independent of the noise.
     trial_budget : int, optional
         Largest number of trials; None for no limit.
     trusted : bool
         True for methods of this project. They may also get the task for their compiled kernels, and
         set the counts themselves.
     of_run : bool
-        True for the session of a run. Trials that a process makes outside such sessions are counted
-        separately (:func:`coartic.motion.trials.trials_outside`).
+        True for the session of a run. Trials outside such sessions are counted separately for each
+        process (:func:`coartic.motion.trials.trials_outside`).
     """
 
     def __init__(
@@ -306,8 +307,8 @@ class Session:
     def robot(self) -> Robot:
         """The robot with the lengths of its links and the positions of its shoulders.
 
-        The method counts its evaluations itself (:meth:`spend`). Raises UndeclaredError without
-        ``Information.KINEMATIC_MODEL``.
+        The session does not count evaluations by this object: add them by :meth:`spend`. Raises
+        UndeclaredError without ``Information.KINEMATIC_MODEL``.
         """
         self._use(Information.KINEMATIC_MODEL)
         return self._task.robot
@@ -315,7 +316,7 @@ class Session:
     def symbolic_hand(self, q: Any, hand: Hand) -> Any:
         """Return the position of a hand as a CasADi expression.
 
-        The method counts its evaluations itself (:meth:`spend`).
+        The session does not count evaluations of the expression: add them by :meth:`spend`.
 
         Parameters
         ----------
@@ -339,12 +340,11 @@ class Session:
 
     @property
     def used(self) -> frozenset[Information]:
-        """The declared information that the method has used so far, as far as the session can
-        see."""
+        """Declared information whose use the session has detected so far."""
         return frozenset(self._used)
 
     def check_solution(self, solution: Sequence[Movement]) -> None:
-        """Check that a solution uses only declared information, and note what it uses.
+        """Check that a solution uses only declared information, and add its use to :attr:`used`.
 
         A corrective movement without a target uses the corrective process. Raises UndeclaredError
         if the method does not declare it, and SolutionError if the solution is not a sequence.
@@ -465,9 +465,9 @@ class Session:
     def trial(self, solution: Sequence[Movement]) -> Execution:
         """Make one physical trial of a solution, and count it.
 
-        Its ticks, evaluations, iterations and corrections are counted as well. The corrective
-        process acts if a goal is missed, and its ticks count. In a model with motor noise, trial k
-        meets draw k of the noise.
+        The ticks, evaluations, iterations and corrections of the trial are counted as well. If a
+        goal is missed, the corrective process acts, and its ticks count. With motor noise, trial k
+        has draw k of the noise.
 
         Parameters
         ----------
@@ -516,9 +516,9 @@ class Session:
     ) -> Trials:
         """Make N physical trials at once.
 
-        The corrective process acts if a goal is missed, and its ticks count. The counts are the
-        same as for N calls of :meth:`trial`, except that each call makes one or two more
-        evaluations of forward kinematics per goal tried.
+        If a goal is missed, the corrective process acts, and its ticks count. The counts are the
+        same as for N calls of :meth:`trial`, except that :meth:`trial` makes one or two more
+        evaluations of forward kinematics for each goal that is tried.
 
         Parameters
         ----------
@@ -526,16 +526,16 @@ class Session:
             One hand sequence for all trials (``"RRLR"``), or a sequence for each.
         targets : array_like, shape (N, G, dof)
             Targets, in length units (base) and rad (joints). A joint whose target is NaN keeps its
-            value. For a goal with only NaN there is no movement to a target: only the corrective
-            process acts, which the method has to declare. A trial with a target beyond 100,000
-            fails without a movement (:meth:`trial` refuses it).
+            value. If all targets of a goal are NaN, there is no movement to a target: only the
+            corrective process acts, and the method has to declare it. A trial with a target beyond
+            ±100,000 fails without a movement (:meth:`trial` raises an error instead).
         until : array_like, shape (N,), optional
-            A reward for each trial. The first trial whose reward exceeds its entry is the last one
-            that is counted and returned.
+            Threshold of the reward for each trial. The first trial whose reward exceeds its
+            threshold is the last trial that is counted and returned.
         draws : array_like of int, shape (N,), optional
-            Number of the draw of the motor noise that each trial meets, from 0 to 2^53. Trials with
-            the same draw meet the same noise (*common random numbers*). By default trial k of the
-            session meets draw k. Without noise draws have no effect.
+            Number of the noise draw for each trial, from 0 to 2^53. Trials with the same draw have
+            the same noise (*common random numbers*). By default trial k of the session has draw k.
+            Without motor noise the draws have no effect.
 
         Returns
         -------
@@ -547,9 +547,11 @@ class Session:
         Raises
         ------
         UndeclaredError
-            ``Information.REWARD_BY_TRIAL`` is not declared. Or a goal has no targets and
-            ``Information.CORRECTIVE_PROCESS`` is not declared. Or draws are chosen and
-            ``Information.NOISE_DRAWS`` is not declared.
+            Needed information is not declared:
+
+            - ``Information.REWARD_BY_TRIAL`` in any case;
+            - ``Information.CORRECTIVE_PROCESS`` if a goal has no targets;
+            - ``Information.NOISE_DRAWS`` if draws are chosen.
         BudgetError
             N is above 0, and the budget has no trial left.
         ValueError
@@ -599,10 +601,10 @@ class Session:
         return compiled_task(self._task, self.model)
 
     def hand_codes(self, hands: HandSequences, count: int) -> Hands:
-        """Return the hands of ``count`` trials, 0 left or 1 right, shape ``(count, G)``.
+        """Return hand sequences as integer codes (0 left, 1 right), shape ``(count, G)``.
 
-        ``hands`` is one hand sequence for all trials, or a sequence for each. Raises ValueError if
-        it does not fit the task or ``count``.
+        ``hands`` is one hand sequence for all trials, or one sequence for each trial. Raises
+        ValueError if ``hands`` does not fit the task, or has another number than ``count``.
         """
         return hand_codes(self._task, hands, count)
 
@@ -614,7 +616,7 @@ class Session:
         return worlds_of(world_seed(self.seed), numbers)
 
     def chosen_draws(self, draws: Any, count: int) -> NDArray[np.int64] | None:
-        """Return chosen draws as an array, shape ``(count,)``, or None for None.
+        """Return chosen draws as an array, shape ``(count,)``; return None if none are chosen.
 
         Raises UndeclaredError if ``Information.NOISE_DRAWS`` is not declared, and ValueError if
         ``draws`` is not an array of ``count`` integers from 0 to 2^53.
@@ -639,7 +641,7 @@ class Session:
         until: Array | None = None,
         draws: NDArray[np.int64] | None = None,
     ) -> Accounts:
-        """Make and count N trials, and return their accounts.
+        """Make and count N trials, and return their per-goal records.
 
         With ``until`` fewer trials may be counted and returned (:meth:`trials`). ``codes`` are the
         hands, 0 (left) or 1 (right), shape ``(N, G)``. The caller checks arguments and budget, and
@@ -660,12 +662,15 @@ class Session:
         """Find the hand sequence of the first trial, such as ``"RRRR"``.
 
         If the task names a sequence, that sequence is returned. If the task names a policy, the
-        result is the sequence for which the corrective process on its own gets the highest reward:
-        among sequences of one hand (``"best-single-hand"``), or among all (``"best-of-all"``).
+        session tries the corrective process on its own with each candidate sequence, and returns
+        the sequence with the highest reward. The candidates are
 
-        The trials of this search are counted as ``initial_trials``. They are not among the method's
-        trials and do not count for its budget. Their ticks and other counts are added to the
-        method's.
+        - ``"best-single-hand"``: the sequences of one hand;
+        - ``"best-of-all"``: all sequences.
+
+        The trials of this search are counted as ``initial_trials``: neither the number of trials of
+        the method nor its budget includes them. The ticks and other counts of these trials are
+        added to the counts of the method.
 
         Parameters
         ----------
@@ -675,11 +680,11 @@ class Session:
         Raises
         ------
         NotApplicableError
-            No sequence tried completes the task, or there are more than 4096 to try.
+            No sequence tried completes the task, or there are more than 4096 sequences to try.
         UndeclaredError
             ``Information.CORRECTIVE_PROCESS`` and ``REWARD_BY_TRIAL`` are not both declared.
         ValueError
-            ``hands`` is empty, or names a hand that is not the task's.
+            ``hands`` is empty, or names a hand that the task does not have.
         """
         self._use(Information.CORRECTIVE_PROCESS, Information.REWARD_BY_TRIAL)
         sequence, counts = search_initial_hands(self._task, hands, model=self.model)
@@ -739,9 +744,9 @@ class Session:
     # Counts that the method adds itself.
 
     def spend(self, **counts: int) -> None:
-        """Add counts to the counters with these names.
+        """Add counts to the counters of the meter, which are passed as keyword arguments.
 
-        A method may name counters of :attr:`Meter.SOLVER`, a trusted method all of
+        A method may add to the counters :attr:`Meter.SOLVER`, a trusted method to all of
         :attr:`Meter.COUNTS`. Raises ValueError for another counter, for a count that is not an
         integer from 0, and for a sum above 2^63 - 1.
         """
@@ -775,9 +780,9 @@ class Session:
     def reveal(self, *information: Information) -> Task:
         """Return the task itself, for methods of this project.
 
-        A method that calls this counts its own evaluations, with :meth:`spend`. ``information`` has
-        at least one item, which is noted as used. Raises UndeclaredError if the method is not of
-        this project, if no item is passed, or if the method does not declare an item.
+        The caller has to count its evaluations by :meth:`spend`. ``information`` has at least one
+        item, and all items are added to :attr:`used`. Raises UndeclaredError if the method is not
+        of this project, if no item is passed, or if the method does not declare an item.
         """
         self._needs_trust("reveal")
         if not information:
@@ -786,10 +791,11 @@ class Session:
         return self._task
 
     def record(self, rewards: Iterable[int | None], solve_s: float) -> None:
-        """Add rewards and time of trials that a compiled method of this project made.
+        """Record trials that a compiled method of this project made outside the session's calls.
 
-        ``rewards`` has None for a failed trial. ``solve_s`` (in s) is added to the counter of this
-        name; no other count changes. Raises UndeclaredError if the method is not of this project.
+        ``rewards`` has an entry for each trial, None for a failed trial. ``solve_s`` (in s) is
+        added to the counter ``solve_s``. No other counter changes. Raises UndeclaredError if the
+        method is not of this project.
         """
         self._needs_trust("record")
         self._rewards.extend(_pack_rewards(rewards))

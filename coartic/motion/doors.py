@@ -1,4 +1,4 @@
-"""Single movements and corrections, and the points of movements: doors to the kernels.
+"""Python functions for single movements and corrections, which call the compiled kernels.
 
 A movement is straight in joint space, or follows a path. Its length is measured in the norm of the
 motion model, in which a length unit of the base counts as much as ``base_weight`` rad of a joint.
@@ -74,10 +74,12 @@ def move(
     radius : float
         Radius of the goal (in length units).
     stop_on_arrival : bool
-        If True, the movement also ends when the hand is near the position to which the target
-        brings it. If False, as in a corrective movement, it ends only on a hit or at its target.
+        If True, the movement also ends when the hand is within ``arrival_tolerance`` of the
+        position that the hand has at the target. If False, as in a corrective movement, the
+        movement ends only on a hit or at its target.
     model : MotionModel
-        The constants; ``gain``, ``correction_tolerance`` and ``max_iterations`` are not used.
+        The motion model, of which ``gain``, ``correction_tolerance`` and ``max_iterations`` are not
+        used.
 
     Returns
     -------
@@ -165,11 +167,11 @@ def follow(
 
 
 def scale_base(changes: Array, model: MotionModel) -> Array:
-    """Return changes of configurations with the base's coordinates times the weight of the base.
+    """Multiply the base coordinates of configuration changes by the model's weight of the base.
 
-    ``changes`` has shape ``(..., dof)``. The Euclidean norm of the result is the length of a
-    straight movement in the Euclidean norm of ``model``. With a weight of 1 the result is
-    ``changes`` itself.
+    ``changes`` and the result have shape ``(..., dof)``. For a model with the Euclidean norm, the
+    norm of a row of the result is the length of a straight movement by that change. If the weight
+    is 1, ``changes`` itself is returned.
     """
     if model.base_weight == 1.0:
         return changes
@@ -179,10 +181,11 @@ def scale_base(changes: Array, model: MotionModel) -> Array:
 
 
 def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
-    """Return the configurations at the n steps of a straight movement, with both ends.
+    """Return the n + 1 configurations of a straight movement of n steps, including both ends.
 
-    ``q`` and ``target`` have shape ``(dof,)``, the result ``(n + 1, dof)``, in length units and
-    rad. Entries of ``target`` that are NaN stay. The results are rounded as in the kernels.
+    ``q`` and ``target`` have shape ``(dof,)``, and the result ``(n + 1, dof)``, in length units and
+    rad. An entry does not move if its target is NaN. The result is equal to that of the kernels,
+    bit for bit.
     """
     target = np.where(np.isnan(target), q, target)
     difference, square = target - q, 0.0
@@ -206,12 +209,12 @@ def segment_lengths(configurations: ArrayLike, model: MotionModel = PAPER) -> Ar
 
 
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
-    """Return the points of the n steps of a path through waypoints in joint space.
+    """Return points on a path through waypoints in joint space, spaced by ``model.step``.
 
-    The path goes from ``q``, shape ``(dof,)``, straight to each of the W > 0 ``waypoints`` in turn,
-    shape ``(W, dof)``. The result has shape ``(n + 1, dof)``, in length units and rad. Point k < n
-    lies k times ``model.step`` along the path; point n is the last waypoint. Raises ValueError for
-    a wrong shape, and for a number that is not finite or beyond 100,000.
+    The path begins at ``q``, shape ``(dof,)``, and is straight from each of the W > 0
+    ``waypoints``, shape ``(W, dof)``, to the next. The result has shape ``(n + 1, dof)``, in length
+    units and rad. Point k < n lies at arc length ``k * model.step``; point n is the last waypoint.
+    Raises ValueError for a wrong shape, and for a number that is not finite or beyond 100,000.
     """
     shape = (len(waypoints), robot.dof)
     corners = np.vstack([configuration(robot, q), finite_array("waypoints", waypoints, shape)])
@@ -234,7 +237,7 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     """Return numbers as a new contiguous array of float64.
 
     Raises ValueError for a shape other than ``shape``, and for a number that is not finite or
-    beyond ±100,000. ``name`` is what the error calls the value.
+    beyond ±100,000. ``name`` is the name of the value in the error message.
     """
     array = np.array(real_array(name, value), order="C")
     if array.shape != shape:
@@ -250,10 +253,10 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
 
 
 def one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
-    """Return a batch of one run whose configuration and target are ``q``.
+    """Return a batch with one run; its configuration and its target are ``q``.
 
-    ``radius`` is only checked. Raises TypeError if ``robot`` is not a Robot, and ValueError for any
-    other argument that does not fit.
+    ``radius`` is checked, but not used. Raises TypeError if ``robot`` is not a Robot, and
+    ValueError for any other argument that does not fit.
     """
     if not isinstance(robot, Robot):
         raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
@@ -285,10 +288,10 @@ def correct(
     locked_base: Collection[str] = (),
     model: MotionModel = PAPER,
 ) -> Correction:
-    """Find a configuration with a hand at a goal by Jacobian-transpose inverse kinematics.
+    """Find a configuration that puts a hand at a goal, by Jacobian-transpose inverse kinematics.
 
-    This is the paper's corrective process, which descends from ``q`` on the distance to the goal.
-    The other arm does not move.
+    This is the paper's corrective process: gradient descent, from ``q``, on the distance of the
+    hand from the goal. The other arm does not move.
 
     Parameters
     ----------

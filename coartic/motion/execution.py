@@ -1,8 +1,9 @@
 """Execute solutions: the one function that makes and scores the movements of a solution.
 
 A solution is executed from the task's start by the rule of :mod:`coartic.motion.kernels.trial`, and
-every tick counts. The corrective process finishes any goal that the movements miss. Whatever a
-method says about its own solution, the score is the reward of this execution.
+every tick counts. If the movements miss a goal, the corrective process moves the hand into the
+goal. The score of a solution is the reward of this execution; what a method itself reports does not
+count.
 
 :func:`execute` executes without noise, :func:`execute_noisy` many times with motor noise.
 """
@@ -58,12 +59,12 @@ _AT_ONCE = 4096  # noisy executions, which limits the memory
 
 @dataclass(frozen=True, eq=False)
 class Execution:
-    """An executed solution (:func:`execute`)."""
+    """Result of executing a solution: movements made, ticks and reward (:func:`execute`)."""
 
     movements: tuple[Movement, ...]
-    """The movements that were made, in order, with targets and ticks. A target is the one that was
-    asked for, without noise. Several corrections of a goal, which only noise makes necessary, are
-    one movement: its target is that of the last correction, and its ticks are their sum."""
+    """The movements that were made, in order, with targets and ticks. Targets are the intended
+    targets, without noise. With noise a goal can need several corrections; they are combined into
+    one movement with the target of the last correction and the sum of all ticks."""
     configurations: Array
     """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, in length units
     and rad."""
@@ -74,8 +75,9 @@ class Execution:
     iterations: int = 0
     """Iterations of the corrective process, with one Jacobian each."""
     evaluations: int = 0
-    """Forward-kinematics evaluations. A correction takes one more than its iterations. Each goal
-    that is tried takes one more if its first movement is corrective, and otherwise two more."""
+    """Forward-kinematics evaluations. A correction makes one evaluation more than it makes
+    iterations. Each goal that is tried adds one evaluation if its first movement is corrective, and
+    two otherwise."""
     reason: str = ""
     """Sentence on why the task was not completed; empty if it was completed."""
     __eq__ = equal_contents
@@ -104,7 +106,7 @@ class Execution:
 
 
 Refused = SolutionError | ValueError | TypeError | OverflowError
-"""Errors of a solution that cannot be executed."""
+"""Types of the errors for a solution that cannot be executed."""
 
 
 def execute(
@@ -112,8 +114,8 @@ def execute(
 ) -> Execution:
     """Execute a solution from the task's start and score it.
 
-    If a goal is still missed after its movements, the corrective process finds a correction from
-    where the robot stands. The ticks of this movement count.
+    If the movements for a goal miss it, the corrective process starts from the robot's present
+    configuration and makes a corrective movement, whose ticks count.
 
     Parameters
     ----------
@@ -161,11 +163,11 @@ def execute_many(
     solutions: Iterable[Iterable[Movement]],
     worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> list[Execution | Refused]:
-    """Execute and score many solutions of one task, and return a list in their order.
+    """Execute many solutions of one task, and return a list of executions in the same order.
 
-    For a solution that cannot be executed, the list has the error that :func:`execute` would raise.
-    Solutions are executed side by side. If the model of ``compiled`` has noise, ``worlds`` says
-    which (:func:`.worlds_of`).
+    For a solution that cannot be executed, the entry is the error that :func:`execute` would raise;
+    the error is not raised. If the model of ``compiled`` has motor noise, ``worlds`` has the seed
+    and the draw of the noise for each solution (:func:`.worlds_of`).
     """
     executions: list[Plan | Refused] = []
     for solution in solutions:
@@ -179,14 +181,15 @@ def execute_many(
 
 
 class Requested(NamedTuple):
-    """Plans of K solutions, each with G goals and at most M movements for a goal, as arrays."""
+    """Requested movements of K solutions as arrays: G goals, at most M movements for each."""
 
     hands: Hands
     """Shape ``(K, G)``, 0 left or 1 right."""
     targets: Configs
     """Shape ``(K, G, M, dof)``, in length units and rad."""
     movements: NDArray[np.int64]
-    """How they are made, shape ``(K, G, M, 3)`` (:attr:`.Requests.movements`)."""
+    """Action of each movement, and its range of waypoints, shape ``(K, G, M, 3)``
+    (:attr:`.Requests.movements`)."""
     waypoints: Configs
     """Waypoints of all paths, shape ``(W, dof)``."""
 
@@ -250,19 +253,19 @@ def _execute_plans(
 def movements_in(
     accounts: NDArray[np.void], dof: int, requested: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
-    """Return the movements that were made in N trials, up to the first goal missed.
+    """Return the movements made in N trials, up to the first goal that was missed.
 
-    A goal that is hit without a movement has a corrective movement of 0 ticks.
+    A goal that was hit without a movement gets a corrective movement of 0 ticks.
 
     Parameters
     ----------
     accounts : ndarray, shape (N, G, M)
-        Accounts of the goals.
-    dof : int
+        Per-goal records of the trials.
+            dof : int
         Length of a configuration.
     requested : iterable of iterable of sequence of Movement or None
-        For each trial and goal the movements that were to be made (:func:`_with_targets`). The
-        kinds of the result come from these movements.
+        For each trial and goal, the movements that were requested (:func:`_with_targets`). The
+        kinds of the returned movements are copied from the requested movements.
 
     Returns
     -------
@@ -301,10 +304,10 @@ def movements_in(
 def _execution_of(
     compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
 ) -> Execution:
-    """Return the execution of a plan from the movements and accounts of its trial.
+    """Return the execution of a plan from the movements and the per-goal records of its trial.
 
-    ``movements`` are those that were made, up to the first goal missed; ``goals`` are the accounts,
-    shape ``(G,)``.
+    ``movements`` are the movements made, up to the first goal that was missed; ``goals`` are the
+    per-goal records, shape ``(G,)``.
     """
     hits = sum(goals["hit"].tolist())
     # The hand is evaluated before the first movement and, unless it is corrective, at its end.
@@ -324,9 +327,9 @@ def _execution_of(
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
     """Compute the joint travel of the idle arm, summed over the goals (in rad).
 
-    For each goal, the travel is the Euclidean distance between two vectors of joint angles of the
-    arm that does not hit the goal: those at this hit and those at the hit before (for goal 1, at
-    the start).
+    The idle arm of a goal is the arm that does not hit the goal. Its travel for the goal is the
+    Euclidean distance between its joint angles at the hit of this goal and its joint angles at the
+    hit of the goal before (for goal 1, at the start).
 
     Parameters
     ----------
@@ -353,9 +356,10 @@ def sample_execution(
 ) -> Array:
     """Return the configuration at every control tick of an execution without noise.
 
-    ``movements`` are those of the execution, with targets and ticks. The result has shape ``(ticks,
-    dof)``, in length units and rad. The first row is the start. A movement of k steps has k + 1
-    rows, so that its last row is repeated as the first row of the next movement.
+    ``movements`` are the movements of the execution (:attr:`Execution.movements`), with targets and
+    ticks. The result has shape ``(ticks, dof)``, in length units and rad. The first row is the
+    start. A movement of k steps has k + 1 rows, so that its last row is repeated as the first row
+    of the next movement.
     """
     q, rows = np.array(task.q0), [np.empty((0, task.robot.dof))]
     for movement in movements:
@@ -385,9 +389,9 @@ def execute_noisy(
 ) -> Array:
     """Execute solutions of a task many times with motor noise, and count the ticks.
 
-    Each movement misses its target at random. If a goal is missed, the corrective process corrects
-    it until it is hit; corrections have noise as well. All other rules are as in
-    :func:`coartic.execute`.
+    Gaussian noise displaces the target of each movement. If a goal is missed, the corrective
+    process makes corrective movements, which are noisy as well, until the hand hits the goal. All
+    other rules are as in :func:`coartic.execute`.
 
     Parameters
     ----------
@@ -400,11 +404,11 @@ def execute_noisy(
     repeats : int
         Number R of executions of each solution.
     seed : int or iterable of int
-        Seed of the noise, from 0 to 2^128 - 1: one for all solutions, which then meet the same
-        noise in their r-th execution (*common random numbers*), or one for each. The ticks of a
-        solution depend neither on the other solutions nor on ``repeats``.
+        Seed of the noise, from 0 to 2^128 - 1: one seed for all solutions, or one for each. With
+        one seed, the r-th executions of all solutions have the same noise (*common random
+        numbers*). The ticks of a solution depend neither on the other solutions nor on ``repeats``.
     model : MotionModel
-        The world of the executions. It has no motor noise of its own.
+        The motion model of the executions. Its own ``motor_noise`` must be 0.
     signal_dependent : bool
         True if the noise of aimed movements grows with their length. The noise of corrections
         always does.
@@ -412,18 +416,19 @@ def execute_noisy(
     Returns
     -------
     ndarray, shape (K, R)
-        Control ticks of each execution; NaN if it failed, because the corrective process did not
-        converge or the goal was still missed after 50 corrections. If a solution has failures,
-        report their number as well, because the mean over its other executions is too low.
+        Control ticks of each execution; NaN if the execution failed. An execution fails if the
+        corrective process does not converge, or if a goal is still missed after 50 corrections. If
+        a solution has failures, report their number as well, because the mean over its other
+        executions is too low.
 
     Raises
     ------
     TaskError, TypeError
         The task cannot be used, or an argument has another type.
     SolutionError
-        A solution breaks the task's rules, as in :func:`coartic.execute`. Or its movements have
-        other ticks than they take on this task with this model, for example because the solution is
-        of another task.
+        A solution breaks the task's rules, as in :func:`coartic.execute`. Or the ticks stored in
+        its movements differ from the ticks on this task with this model, for example because the
+        solution belongs to another task.
     ValueError
         ``motor_noise``, ``repeats``, ``seed`` or a constant of the model is out of bounds, the
         model has motor noise, or the number of seeds is not the number of solutions.
@@ -440,16 +445,16 @@ def execute_noisy(
       to w_K and one z; it is not steered while it is made (open loop).
     - A coordinate *moves* if the target is a number, or any waypoint, that differs by more than
       1e-9 from where the robot stands now. A locked base does not move.
-    - A *correction* has as target the configuration a that the corrective process finds from q,
-      even if the solution has a corrective movement with a target. L is the Euclidean distance from
-      q to a. A locked base coordinate keeps a_c.
-    - With ``signal_dependent`` all three rows have s min(1, L) instead of s. L is the Euclidean
-      distance from q to the target without noise, for a path to its last waypoint.
+    - The target of a *correction* is the configuration a that the corrective process finds from q.
+      If the solution has a corrective movement with a target, that target is not used. L is the
+      Euclidean distance from q to a. A locked base coordinate keeps a_c.
+    - With ``signal_dependent`` all three rows have s min(1, L) instead of s. L is then the
+      Euclidean distance from q to the target without noise (for a path, to its last waypoint).
     - The noisy target counts as the target everywhere: for the hit, for the arrival of an aimed
-      movement, and for the tick that this costs.
-    - A corrective movement is an aimed movement that ends on a hit or at its target if, in the
-      execution without noise, its target differs by more than 1e-9 from the target of the
-      corrective process.
+      movement, and for the tick that the arrival costs.
+    - A corrective movement of the solution is compared with the corrective process in the execution
+      without noise. If their targets differ by more than 1e-9, the movement counts as an aimed
+      movement, which ends on a hit or at its target.
     - z is a function of the seed, the number of the execution, the goal, the number of the movement
       made for this goal and the coordinate (:mod:`coartic.motion.kernels.noise`).
 
@@ -554,9 +559,10 @@ def _execute_exactly(
 
 
 def _is_found(goal: np.void, target: Array) -> bool:
-    """Return whether a corrective movement to ``target`` is one of the corrective process.
+    """Return whether the corrective process itself finds ``target``.
 
-    ``goal`` is the account of its goal, if the process acts in its place. The result is also True
+    ``goal`` is the record of the goal in an execution in which the process acts in place of the
+    corrective movement to ``target``. The result is also True
     if the movement is not made, because the goal is hit already.
     """
     if goal["corrections"] == 0:
@@ -593,9 +599,9 @@ def _check_ticks(task: Task, number: int, plan: Plan, ticks: float) -> None:
 
 
 def _seeds(seed: Any, count: int) -> list[int]:
-    """Return the seed of the noise of each of ``count`` solutions.
+    """Return a list with the noise seed of each of ``count`` solutions.
 
-    ``seed`` is a seed for each solution, or one seed for all. Raises ValueError for other seeds.
+    ``seed`` is one seed for all solutions, or a seed for each. Raises ValueError for other seeds.
     """
     seeds = [*seed] if isinstance(seed, Iterable) else [seed] * count
     if len(seeds) != count:
@@ -675,9 +681,12 @@ def initial_hands(
 ) -> str:
     """Find the hand sequence of a task's first trial.
 
-    If the task names a sequence, that sequence is returned. If the task names a policy, the result
-    is the sequence for which the corrective process on its own gets the highest reward: among
-    sequences of one hand (``"best-single-hand"``), or among all (``"best-of-all"``).
+    If the task names a sequence, that sequence is returned. If the task names a policy, the
+    corrective process on its own is tried with each candidate sequence, and the sequence with the
+    highest reward is returned. The candidates are
+
+    - ``"best-single-hand"``: the sequences of one hand;
+    - ``"best-of-all"``: all sequences.
 
     Parameters
     ----------
@@ -685,9 +694,9 @@ def initial_hands(
     hands : tuple of {"left", "right"}, optional
         The hands among which a policy chooses; the task's by default.
     model : MotionModel
-        The search is made without its motor noise.
+        The motion model; its motor noise is ignored in the search.
 
-    Returns
+            Returns
     -------
     str
         The hand for each goal, such as ``"RRRR"``.
@@ -697,10 +706,10 @@ def initial_hands(
     TaskError, TypeError
         The task cannot be used, or ``task`` or ``model`` has another type.
     NotApplicableError
-        No sequence that was tried completes the task, or there are more than 4096.
+        No sequence that was tried completes the task, or there are more than 4096 sequences to try.
     ValueError
-        ``hands`` is empty or names a hand that is not the task's, or a constant of the model is out
-        of bounds.
+        ``hands`` is empty or names a hand that the task does not have, or a constant of the model
+        is out of bounds.
 
     Notes
     -----
@@ -713,8 +722,8 @@ def initial_hands(
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
     """Return the reward of the corrective process on its own with a task's initial hands.
 
-    The process is executed without the motor noise of ``model``. Return None if the trial fails,
-    or if a policy is to find the hands and finds none (:func:`initial_hands`).
+    The process is executed without the motor noise of ``model``. Return None if the trial fails, or
+    if the task names a policy that finds no hands (:func:`initial_hands`).
     """
     try:
         hands = initial_hands(task, model=model)

@@ -1,4 +1,4 @@
-"""Initial hands: the hand sequence of trial 0, and trials with only the corrective process."""
+"""Search for the hand sequence of trial 0, by trials with only the corrective process."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MOST_SEQUENCES = 4096  # largest number of hand sequences that are all tried
 def ranked_sequences(
     task: Task, sequences: Collection[str], *, model: MotionModel = PAPER
 ) -> list[tuple[str, int | None, str, dict[str, int]]]:
-    """Make a trial with only the corrective process for each hand sequence, and rank them.
+    """Rank hand sequences by the reward of the corrective process on its own.
 
     Parameters
     ----------
@@ -37,15 +37,15 @@ def ranked_sequences(
     sequences : collection of str
         Hand sequences, such as ``"RRLR"``.
     model : MotionModel
-        The trials are made without its motor noise.
+        The motion model; its motor noise is ignored.
 
     Returns
     -------
     list of tuple
         An entry ``(sequence, reward, reason, counts)`` for each sequence. ``reward`` is None if the
-        trial failed, and ``reason`` says why (otherwise it is empty). ``counts`` has the counts of
-        the trial by name (:data:`COUNTED`); as in :func:`coartic.execute`, each goal that is tried
-        adds an evaluation. The order is
+        trial failed, and ``reason`` says why (otherwise it is empty). ``counts`` maps the names
+        :data:`COUNTED` to the counts of the trial; as in :func:`coartic.execute`, each goal that is
+        tried adds an evaluation. The order is
 
         - by reward, the highest first and failed trials last;
         - then by the number of changes of hand, the fewest first;
@@ -90,11 +90,11 @@ def _best_of_all(task_json: str, model: MotionModel) -> tuple[str, int] | None:
 
 
 def best_hands(task: Task, model: MotionModel = PAPER) -> tuple[str, int] | None:
-    """Return the hands with which the corrective process on its own is quickest, and its ticks.
+    """Return the hand sequence with the fewest ticks of the corrective process, and these ticks.
 
-    The process acts without the motor noise of ``model``. For a task with more than 4096 hand
-    sequences these are its initial hands. The result is None if the process does not complete the
-    task. It is cached, and its trials are not counted.
+    The corrective process acts on its own, without the motor noise of ``model``. For a task with
+    more than 4096 hand sequences, the result is its initial sequence. The result is None if the
+    process completes the task with no sequence. Results are cached; the trials are not counted.
     """
     return _best_of_all(task.model_dump_json(), model.without_noise())
 
@@ -107,8 +107,8 @@ def changes_of_hand(sequence: str) -> int:
 def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
     """List all sequences of ``hands`` for a number of goals in alphabetical order.
 
-    The sequences are strings such as ``"LRLR"``. Raises NotApplicableError, which names ``task``,
-    if there are more than 4096.
+    The sequences are strings such as ``"LRLR"``. Raises NotApplicableError, with the name ``task``
+    in the message, if there are more than 4096 sequences.
     """
     ordered = [hand for hand in HANDS if hand in hands]
     if reason := too_many_sequences(task, goals, len(ordered)):
@@ -119,7 +119,8 @@ def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
 def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
     """Return a sentence if a task has more than 4096 hand sequences, otherwise None.
 
-    ``task`` is its name, ``goals`` and ``hands`` are numbers of goals and hands.
+    ``task`` is the name of the task, ``goals`` the number of its goals, and ``hands`` the number of
+    its hands.
     """
     count = hands**goals
     if count <= MOST_SEQUENCES:
@@ -152,12 +153,11 @@ def search_initial_hands(
     """Find the hand sequence of trial 0, and count the trials of the search.
 
     If the task names a sequence, that sequence is returned with no counts. If the task names a
-    policy, trials with only the corrective process are made: for sequences of one hand with
-    ``"best-single-hand"``, otherwise for all sequences. The best of :func:`ranked_sequences` is
-    returned.
+    policy, the first sequence of :func:`ranked_sequences` is returned. The candidates are the
+    sequences of one hand with ``"best-single-hand"``, and all sequences otherwise.
 
-    These trials are counted (:func:`count_trials`), even if the result comes from the cache, but
-    not if the search fails.
+    The trials of the search are counted by :func:`count_trials`, even if the result comes from the
+    cache. If the search fails, they are not counted.
 
     Parameters
     ----------
@@ -165,20 +165,20 @@ def search_initial_hands(
     hands : tuple of {"left", "right"}, optional
         Hands among which a policy chooses; the task's by default.
     model : MotionModel
-        The search is made without its motor noise.
+        The motion model; its motor noise is ignored.
 
     Returns
     -------
     sequence : str
         The hand sequence, such as ``"RRRR"``.
     counts : mapping
-        Counts by the names of :class:`~coartic.method.Meter`. The counts are cached: do not change
-        them.
+        Maps names of counters of :class:`~coartic.method.Meter` to counts. The mapping is cached:
+        do not change it.
 
     Raises
     ------
     NotApplicableError
-        No sequence tried completes the task, or there are more than 4096 to try.
+        No sequence tried completes the task, or there are more than 4096 sequences to try.
     ValueError
         ``hands`` is empty or names a hand that the task does not have.
     """
@@ -196,10 +196,10 @@ def search_initial_hands(
 def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
-    """Search the initial hands of a task with a policy.
+    """Search for the hands of trial 0 by the task's policy.
 
-    The last 64 results are cached. The task is passed as JSON, and ``hands`` as an ordered tuple,
-    so that they can be keys of the cache. The caller counts the trials. The result is as in
+    An LRU cache stores 64 results. The task is passed as JSON, and ``hands`` as an ordered tuple,
+    so that both are hashable. The caller counts the trials. The result is as in
     :func:`search_initial_hands`.
     """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)

@@ -53,12 +53,12 @@ class Movement:
     """
     target: Array | None = None
     """Target configuration q^t, shape ``(dof,)``, in length units and rad; for a path its last
-    waypoint. An entry that is NaN stays where it is, but for a path. If a corrective movement has
-    None, the corrective process finds the target during execution."""
+    waypoint. A joint whose entry is NaN does not move (a path must not have NaN). If a corrective
+    movement has None, the corrective process finds the target during execution."""
     ticks: int | None = None
     """Control ticks of the movement; None before the movement is executed."""
     waypoints: Array | None = None
-    """Configurations through which a path passes in turn, shape ``(k, dof)``, in length units and
+    """Configurations through which a path passes, in order, shape ``(k, dof)``, in length units and
     rad; None for the other kinds."""
     __eq__ = equal_contents
 
@@ -85,10 +85,10 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 
 
 def next_action(movements: Iterable[Movement]) -> tuple[Movement, ...]:
-    """Return movements as they are to be made again in a world with noise.
+    """Return copies of movements without the results of one noisy execution.
 
-    Ticks, and targets of corrective movements, are what happened in one execution; the next one
-    takes other ticks, and is corrected where it misses. They are left out.
+    Ticks and the targets of corrective movements depend on the noise of one execution. In the
+    copies they are None, so that the movements can be executed again with other noise.
     """
     return tuple(
         replace(movement, ticks=None, target=None)
@@ -99,14 +99,14 @@ def next_action(movements: Iterable[Movement]) -> tuple[Movement, ...]:
 
 
 Plan = list[list[Movement]]
-"""The movements of a solution, goal by goal. (The plan of a suite is something else.)"""
+"""List of the movements for each goal, in the order of the goals (not the plan of a suite)."""
 
 
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
     """Check a solution, and return a list of the movements for each goal.
 
-    A path gets its last waypoint as target, and locked base coordinates their values at the start.
-    Raises SolutionError if the solution breaks the task's rules.
+    In the result the target of a path is its last waypoint, and locked base coordinates have their
+    values at the start. Raises SolutionError if the solution breaks the task's rules.
     """
     if not isinstance(solution, Iterable):
         raise SolutionError(
@@ -175,7 +175,7 @@ def _check_movement(task: Task, movement: Movement) -> Movement:
 
 
 def _check_point(task: Task, point: Any, kind: Kind = "path") -> Array:
-    """Check a target of a movement, or a waypoint of a path, and return it as an array ``(dof,)``.
+    """Check a target or a waypoint, and return it as an array, shape ``(dof,)``.
 
     The result is the array that was passed, or a new array if locked base coordinates have to be
     set to their values at the start. Entries of a target may be NaN. Raises ValueError if ``point``
@@ -221,7 +221,7 @@ def _hold_base(task: Task, points: Array) -> Array:
 
 
 def check_targets(task: Task, targets: Any) -> Configs:
-    """Check targets, and return a copy with locked base coordinates as at the start.
+    """Check targets, and return a copy in which locked base coordinates equal the start.
 
     The shape is ``(N, G, dof)``, in length units and rad; NaN is allowed. Raises ValueError for
     another shape, for infinite entries, and for targets that move a locked base by more than 1e-6.
@@ -247,8 +247,8 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
     hands : str
         The hand for each goal, such as ``"RRLR"``.
     targets : array_like, shape (G, dof)
-        The configuration to move to for each goal, in length units (base) and rad (joints). An
-        entry that is NaN stays. For a row of NaN only the corrective process acts.
+        The configuration to move to for each goal, in length units (base) and rad (joints). A joint
+        whose entry is NaN does not move. For a row of NaN only the corrective process acts.
 
     Returns
     -------

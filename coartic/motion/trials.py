@@ -1,6 +1,7 @@
-"""Trials with given targets: many robots make them side by side, by the compiled kernels.
+"""Trials with given targets, made by the compiled kernels and counted.
 
-A session, an objective, an execution and an environment make their trials here, and count them.
+Sessions, objectives, executions and environments make their trials by this module. The kernels
+make many trials side by side.
 """
 
 from __future__ import annotations
@@ -38,12 +39,13 @@ from coartic.tasks.task import Task, check_hands, hands_of
 
 
 class Accounts(NamedTuple):
-    """Accounts of N trials with G goals."""
+    """Per-goal records, counts and rewards of N trials with G goals."""
 
     goals: NDArray[np.void]
-    """Accounts of the goals, shape ``(N, G, M)``: records (:func:`account_type`)."""
+    """What happened at each goal, a structured array of shape ``(N, G, M)`` (:func:`account_type`).
+    M is the number of requested movements for each goal."""
     counts: NDArray[np.int64]
-    """Counts of the trials, by :data:`COUNTED`, shape ``(N, 5)``."""
+    """Counts of the trials, shape ``(N, 5)``, columns in the order of :data:`COUNTED`."""
     rewards: NDArray[np.int64]
     """Total rewards, shape ``(N,)``; :data:`NO_REWARD` where a trial failed."""
 
@@ -51,14 +53,14 @@ class Accounts(NamedTuple):
 SHARE = 14 * SLOTS
 """Smallest number of arms for a thread. Starting a thread takes as long as a hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
-"""Batches that no thread uses, by :attr:`Robot.max_links`."""
+"""Dict that maps :attr:`Robot.max_links` to a list of batches that no thread uses."""
 
 
 def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
-    """Return new accounts of ``count`` trials.
+    """Allocate the records of ``count`` trials with ``goals`` goals.
 
-    The accounts have ``goals`` goals, and ``moves`` movements to targets for each goal. The counts
-    of the trials are 0; the caller fills in everything else.
+    There are ``moves`` movements to targets for each goal. The counts of the trials are 0; the
+    caller fills in everything else.
     """
     return Accounts(
         np.empty((count, goals, moves), account_type(width_of(robot))),
@@ -68,37 +70,38 @@ def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Acco
 
 
 ALL_MOVE = np.empty((0, 0, 0, 3), dtype=np.int64)
-"""Value of :attr:`Requests.movements` with which all movements end on arrival as well."""
+"""Value of :attr:`Requests.movements` for movements that all end on a hit or on arrival."""
 NO_WAYPOINTS = np.empty((0, 0))
 NO_NOISE = np.zeros((1, 2), dtype=np.uint64)
 """Value of :attr:`Requests.worlds` for trials without noise."""
 PRACTICE, JUDGE = 0x70726163, 0x6A756467
-"""Keys of the worlds among the children of a seed: where a method practises, and where its solution
-is judged. So nobody is judged by the noise in which it has practised."""
+"""Keys by which two noise seeds are derived from a seed: ``PRACTICE`` for the trials of a method,
+``JUDGE`` for scoring its solution. So no solution is scored on the noise of the trials."""
 
 
 @lru_cache(maxsize=4096)
 def world_seed(seed: int, world: int = PRACTICE) -> int:
-    """Return the seed of the noise that belongs to a seed, from 0 to 2^64 - 1.
+    """Derive the seed of the motor noise from the seed of a run.
 
-    It is a child of the seed (``numpy.random.SeedSequence``), so that ``default_rng(seed)`` has
-    nothing to do with the noise. ``seed`` is from 0 to 2^128 - 1, ``world`` is :data:`PRACTICE` or
-    :data:`JUDGE`.
+    The noise seed is from 0 to 2^64 - 1. It is a child of ``seed`` (``numpy.random.SeedSequence``),
+    so that the noise is independent of ``default_rng(seed)``. ``seed`` is from 0 to 2^128 - 1, and
+    the key ``world`` is :data:`PRACTICE` or :data:`JUDGE`.
     """
     return int(np.random.SeedSequence(seed, spawn_key=(world,)).generate_state(1, np.uint64)[0])
 
 
 def worlds_of(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
-    """Return the worlds of N trials (:attr:`Requests.worlds`), shape ``(N, 2)``.
+    """Return the noise seed and the noise draw of N trials, shape ``(N, 2)``.
 
-    ``seeds`` comes from :func:`world_seed`; it and ``draws`` are numbers or have shape ``(N,)``.
+    The result is a value for :attr:`Requests.worlds`. ``seeds`` (from :func:`world_seed`) and
+    ``draws`` are integers or have shape ``(N,)``.
     """
     pairs = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64))
     return np.stack(np.atleast_1d(*pairs), axis=1)
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
-    """Let N arms reach for G goals each, in turn, and return their accounts.
+    """Let N arms reach for G goals in order, and return the records.
 
     An arm that misses a goal makes no movement for later goals. A trial with a target beyond
     :data:`LARGEST_ENTRY` fails without a movement; nothing else is checked. ``parameters`` come
@@ -176,8 +179,8 @@ def reach_goals(
         Targets of the first movements. An entry that is NaN keeps its value. An arm whose row is
         NaN has no target: only the corrective process acts. By default no arm has a target.
     checks : bool
-        True if an arm without a target stays when its hand is in its goal already; False if the
-        corrective process begins at once.
+        True if an arm without a target does not move when its hand is in its goal already; False if
+        the corrective process begins at once.
     locked_base : sequence of {"x", "y"}
         Coordinates of the base that the corrective process does not change.
     model : MotionModel
@@ -239,8 +242,8 @@ class CompiledTask(NamedTuple):
     """Parameters of the robot (:func:`coartic.motion.kernels.slots.robot_parameters`)."""
     model: MotionModel
     options: tuple[bool, bool]
-    """Whether an arm without a target stays if its hand is in the goal, and whether the noise of
-    aimed movements grows with their length."""
+    """Two options: whether an arm without a target stays where it is if its hand is in the goal,
+    and whether the noise of aimed movements grows with their length."""
 
 
 _last_compiled: CompiledTask | None = None
@@ -251,9 +254,9 @@ def compiled_task(
 ) -> CompiledTask:
     """Return a task with a model as arrays for the kernels.
 
-    The arrays are cached: do not change them. Without ``checks`` the corrective process begins at
-    once where an arm has no target. With ``grows`` the noise of aimed movements grows with their
-    length.
+    The arrays are cached: do not change them. If ``checks`` is False, the corrective process begins
+    at once when an arm has no target. If ``grows`` is True, the noise of aimed movements grows with
+    their length.
 
     Raises
     ------
@@ -316,9 +319,10 @@ def make_trials(
     waypoints: Configs = NO_WAYPOINTS,
     worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> Accounts:
-    """Make N trials of a task, count them (:func:`count_trials`), and return their accounts.
+    """Make N trials of a task, count the trials, and return their records.
 
-    All arguments are as in :class:`Requests`. Without noise the worlds have no effect.
+    The trials are counted by :func:`count_trials`. All arguments are as in :class:`Requests`.
+    Without motor noise ``worlds`` has no effect.
     """
     count_trials(len(targets))
     arms = Requests(
@@ -335,10 +339,11 @@ def reach_next(
     first: int,
     worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> Accounts:
-    """Let a robot reach for the next goals of a task, from goal ``first`` on (from 0).
+    """Let a robot reach for goals ``first`` (from 0), ``first`` + 1, ... of a task.
 
-    ``q``, shape ``(1, dof)``, is where it stands; the other arguments are as in :class:`Requests`,
-    for as many goals as there are ``targets``. The trial is not counted.
+    ``q``, shape ``(1, dof)``, is the robot's present configuration. The other arguments are as in
+    :class:`Requests`; the number of ``targets`` is the number of goals for which the robot reaches.
+    The trial is not counted.
     """
     goals = compiled.goals[:, first : first + targets.shape[1]]
     arms = Requests(q, hands, targets, ALL_MOVE, NO_WAYPOINTS, goals, first, worlds)
@@ -348,7 +353,7 @@ def reach_next(
 def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
     """Return a sentence on the first goal that a trial missed, or an empty string.
 
-    ``goals`` are the accounts of the trial's goals, shape ``(G,)``.
+    ``goals`` are the per-goal records of the trial, shape ``(G,)``.
     """
     if goals["hit"][-1]:
         return ""
@@ -393,12 +398,12 @@ class Trials(NamedTuple):
 
 
 def trials_of(accounts: Accounts, dof: int) -> Trials:
-    """Return the results of trials from their accounts.
+    """Return the results of trials from their records.
 
     ``dof`` is the number of entries of a configuration. The arrays of the result, except
     ``completed``, are views of ``accounts``. This function changes ``accounts``: it sets
     ``accounts.goals["q"]`` to NaN at goals that were not hit. If there are several movements for a
-    goal, only the first account of the goal is used.
+    goal, only the first record of the goal is used.
     """
     goals, counts = accounts.goals[..., 0], accounts.counts
     reached = goals["q"][..., :dof]
@@ -420,10 +425,10 @@ HandSequences = str | Sequence[str]
 
 
 def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
-    """Return the hand for each goal of ``count`` trials, 0 left or 1 right.
+    """Return hand sequences as integer codes (0 left, 1 right), shape ``(count, G)``.
 
-    The shape is ``(count, G)``. Raises ValueError if the sequences do not fit the task, or if a
-    list does not have ``count`` of them.
+    Raises ValueError if a sequence does not fit the task, or if a list has another number of
+    sequences than ``count``.
     """
     is_list = isinstance(hands, Iterable) and not isinstance(hands, str)
     sequences: list[Any] = list(hands) if is_list else [hands]

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 RATE = 12.5
 """Frames per second. GIF needs an integer number of hundredths of a second for a frame."""
 LONGEST = 125
-"""Largest number of frames of a film without pauses; in longer movements a frame stands for many
-ticks."""
+"""Largest number of frames of a film, without pauses. In longer movements each frame stands for
+several ticks."""
 PAUSE, HOLD = 6, 30
 """Number of frames for which the film stops when a goal is hit, and at the end."""
 COLOURS = "#0072b2", "#c04a00"
@@ -46,7 +46,7 @@ def write_film(
     width: int = 800,
     replace: bool = False,
 ) -> tuple[int, float]:
-    """Write a film of movements side by side. All begin at their first tick.
+    """Write a film that shows movements side by side, all from their first tick.
 
     Parameters
     ----------

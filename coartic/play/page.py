@@ -22,7 +22,7 @@ UP_OR_DOWN = ("ascending", "descending")
 def play_page(task: Task | None = None) -> str:
     """Return the page of ``coartic play``, one HTML file that needs no other.
 
-    It offers all shipped tasks and begins with ``task``, by default with :func:`up_or_down`.
+    The page offers all shipped tasks. It begins with ``task``, by default with :func:`up_or_down`.
     """
     presets = [preset_of(shipped) for shipped in shipped_tasks().values()]
     if task is None:
@@ -75,7 +75,7 @@ def player_figure(presets: Sequence[dict[str, Any]], **options: Any) -> str:
 
 
 def preset_of(task: Task) -> dict[str, Any]:
-    """Return a task in the form in which the figure offers it.
+    """Return a task as a dict for the interactive figure.
 
     The keys are
 

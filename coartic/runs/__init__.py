@@ -1,4 +1,4 @@
 """Runs as they are planned and stored.
 
-Modules here know a method by its name, version and parameters, not how it works.
+Modules of this package use a method's name, version and parameters, but not its code.
 """

@@ -1,4 +1,4 @@
-"""MethodInfo: what a method declares, and where its code is."""
+"""MethodInfo: the declaration of a method, and the location of its code."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ ALWAYS_IN_IDS = frozenset(
 parameter is a part of the id only if its value is not the default. Therefore a new parameter of a
 method, or a new field of an exploration condition, does not change the ids of existing runs."""
 VERSION = re.compile(r"\d+\.\d+")
-"""Pattern of the code of a built-in method: versions of model and method."""
+"""Pattern of the field ``code`` of a built-in method: versions of model and method."""
 
 
 @dataclass(frozen=True)
@@ -54,16 +54,16 @@ class MethodInfo:
     information: tuple[str, ...]
     """Information that the method declares."""
     stochastic: bool
-    """True if the seed matters; other methods are run once on a task."""
+    """True if the results depend on the seed; other methods are run once on a task."""
     defaults: dict[str, Any]
-    """Default of each parameter, by name; None for a parameter without a default."""
+    """Dict that maps each parameter to its default; None for a parameter without a default."""
     origin: str
     """``built in``, or the path of a method file, as a printable line."""
     code: str
     """Versions of model and method, such as ``1.2``. For a method file it is a hash of the code
     (:mod:`coartic.benchmarks.method_files`)."""
     packages: dict[str, str] = field(default_factory=dict, compare=False)
-    """Versions of the installed packages that the method file imports, by name."""
+    """Dict that maps each installed package that the method file imports to its version."""
     facts: Facts = field(default_factory=Facts, compare=False)
     """Works, short name and algorithm. Folders of 6.0.0 do not have them."""
     tuned_on: str = field(default="", compare=False)
@@ -98,15 +98,15 @@ class MethodInfo:
         return method(method.Parameters(**parameters))
 
     def complete(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the parameters that identify a run, by name, as plain data.
+        """Return a dict of the parameters that identify a run, as plain data.
 
-        These are the parameters of :data:`ALWAYS_IN_IDS`, and all that differ from their defaults.
-        Raises CoarticError for a wrong parameter.
+        The dict has the parameters of :data:`ALWAYS_IN_IDS`, and all parameters that differ from
+        their defaults. Raises CoarticError for a wrong parameter.
         """
         return dict(self._ask("complete", parameters))
 
     def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
-        """Return why the method with parameters does not apply to a task; None if it applies.
+        """Return why the method, with given parameters, does not apply to a task; else None.
 
         Parameters that are not passed have their defaults. Raises CoarticError for a wrong
         parameter, or if the method cannot say whether it applies.
@@ -115,12 +115,12 @@ class MethodInfo:
         return None if reason is None else plain(str(reason))
 
     def refuses(self, model: MotionModel) -> str | None:
-        """Return a sentence on a constant of a world that the method cannot work with, or None."""
+        """Return why the method cannot run under a motion model; None if it can."""
         reason = self._ask("refuses", *model) if differences(model) else None
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:
-        """Return settings of the method that its check needs.
+        """Return the settings of the method that its conformance check needs.
 
         Returns
         -------
@@ -140,8 +140,8 @@ class MethodInfo:
 
 
 READERS: dict[str, Callable[..., Any]] = {}
-"""Functions that ask the process which has imported a method file, by the path of the file. For
-these files this process does not import the file itself."""
+"""Dict that maps the path of a method file to a function that asks the process of this file. This
+process itself does not import these files."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
@@ -154,9 +154,12 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     question : {"complete", "why_not", "refuses", "rules"}
         Name of the function of :class:`MethodInfo` whose result is returned.
     *arguments
-        None for ``"rules"``, and the constants of a model for ``"refuses"``. For the other
-        questions the parameters of the method, and for
-        ``"why_not"`` also the entries of an :class:`Outline`.
+        Arguments of the question:
+
+        - ``"rules"``: none;
+        - ``"refuses"``: the constants of a motion model;
+        - ``"complete"``: the parameters of the method;
+        - ``"why_not"``: the parameters of the method, then the entries of an :class:`Outline`.
 
     Raises
     ------
@@ -215,7 +218,7 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return the defaults of parameters as plain data, by name; None if there is no default.
+    """Return a dict that maps parameters to defaults as plain data; None for no default.
 
     Raises CoarticError for a default that is infinite or NaN.
     """
@@ -227,7 +230,7 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 
 
 def _plain_parameters(method: type[Method], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of parameters as plain data, by name.
+    """Return a dict that maps parameters to their values as plain data.
 
     Raises CoarticError for a value with infinity or NaN, which JSON does not have.
     """
@@ -273,8 +276,8 @@ def load_method(where: str, name: str, code: str = "") -> type[Method]:
 def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Method]]:
     """Return the classes of methods that a module defines itself, not those that it imports.
 
-    With ``abstract`` it returns the classes that lack a function, such as ``solve``; otherwise the
-    complete classes.
+    If ``abstract`` is True, only the classes that lack a function, such as ``solve``, are returned;
+    otherwise only the complete classes.
     """
     return [
         value
@@ -288,9 +291,9 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 @cache
 def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
-    """Import a method file, and return its module and the names of loaded modules.
+    """Import a method file; return its module and the names of the modules that it loaded.
 
-    The names are those of the other modules that the import has loaded. A process imports the file
+    The names do not include the module itself. A process imports the file
     once for each ``code``, a hash. The file and the user's modules are compiled from their source
     (:func:`.import_from`). Errors of the file are raised as they are.
     """

@@ -27,20 +27,19 @@ class Cell:
     task: Task
     method: MethodInfo
     parameters: dict[str, Any]
-    """Parameters of the method, by name (:meth:`.MethodInfo.complete`)."""
+    """Dict that maps parameters of the method to values (:meth:`.MethodInfo.complete`)."""
     trial_budget: int | None = None
     """Largest number of trials of a run, without the search for initial hands; None for no
     limit."""
     model: MotionModel = PAPER
-    """The world in which the method practises and is judged, with the tolerances for the task."""
+    """Motion model of the trials and of the scoring, with the tolerances for the task."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "model", self.model.for_radius(self.task.radius))
 
     @cached_property
     def world(self) -> str:
-        """Constants of the model that are not the paper's, such as ``motor_noise=0.01``; empty for
-        the paper's world."""
+        """Constants that differ from the paper's model, such as ``motor_noise=0.01``, or ``""``."""
         return in_words(differences(self.model))
 
     @property
@@ -57,7 +56,7 @@ class Cell:
 
     @property
     def trials(self) -> int | None:
-        """Trials that are asked for: parameter ``trials``, at most :attr:`trial_budget`."""
+        """Requested number of trials: parameter ``trials``, but at most :attr:`trial_budget`."""
         trials = trials_in(self.parameters)
         return min(trials, self.trial_budget or trials) or None
 
@@ -80,7 +79,7 @@ class Cell:
     def digest(self) -> str:
         """Hash of task, method, parameters, model and trial budget: 64 hex digits.
 
-        The code of the method and the time limit do not count.
+        The code of the method and the time limit are not part of the hash.
         """
         return hash_of(self.content | {"method": self.method.name})
 
@@ -101,21 +100,21 @@ class Cell:
 
 @dataclass(frozen=True)
 class Job:
-    """Runs of one cell, which a process performs side by side."""
+    """Runs of one cell that a worker process performs together."""
 
     cell: Cell
     seed: int
     """Seed of the suite."""
     numbers: Sequence[int]
-    """Numbers of the runs, from 0 in each cell. In a plan the numbers are a range. The plan of a
-    results folder stores a job of runs 50 to 99 as a job of runs 0 to 99."""
+    """Numbers of the runs; in each cell they count from 0. In a plan the numbers are a range. The
+    plan of a results folder stores a job of runs 50 to 99 as a job of runs 0 to 99."""
     time_limit_s: float | None = None
-    """Limit of the CPU time of all runs of the job together (in s); None for no limit."""
+    """Limit of the total CPU time of all runs of the job (in s); None for no limit."""
     suite: str = ""
     """Name of the suite that asks for the runs."""
     trials: int | None = None
-    """Number of trials of a run that the command asks for, or else the suite's file; at most the
-    trial budget."""
+    """Number of trials of a run that the command asks for, or, if the command does not set it, the
+    suite's file; at most the trial budget."""
     question: tuple[str, str] | None = None
     """Title and description of a suite of the user's own on its own tasks; otherwise None."""
 
@@ -135,7 +134,7 @@ class Job:
         return run_seed(self.seed, self.cell.task.name, number)
 
     def judge_seed(self, number: int) -> int:
-        """Return the seed of the noise by which run ``number`` is judged (:func:`judge_seed`)."""
+        """Return the seed of the noise for scoring run ``number`` (:func:`judge_seed`)."""
         return judge_seed(self.seed, self.cell.task.name, number)
 
 
@@ -178,7 +177,7 @@ def cell_of(
 
 
 def tasks_by_name(tasks: Iterable[Task]) -> dict[str, Task]:
-    """Return tasks by name.
+    """Return a dict that maps names to tasks.
 
     Raises CoarticError if two different tasks have the same name.
     """
@@ -201,18 +200,18 @@ def run_seed(suite_seed: int, task: str, number: int) -> int:
 
 
 def judge_seed(suite_seed: int, task: str, number: int) -> int:
-    """Return the seed of the noise by which run ``number`` of a task is judged.
+    """Return the seed of the noise for scoring run ``number`` of a task.
 
-    It is equal for all methods, and no seed of practice: a hash of the suite's seed, the task's
-    name, the run's number and the word *judge*.
+    The seed is a hash of the suite's seed, the task's name, the run's number and the word *judge*.
+    All methods have the same seed, and no method sees noise with this seed in its own trials.
     """
     return _seed_of(suite_seed, f"{task} judge", number)
 
 
 def reference_seed(suite_seed: int, task: str) -> int:
-    """Return the seed of the noise by which best known solutions of a task are judged.
+    """Return the seed of the noise for scoring the best known solutions of a task.
 
-    No run is practised or judged with this seed.
+    No run uses this seed, neither for its trials nor for its score.
     """
     return _seed_of(suite_seed, f"{task} reference", 0)
 
@@ -236,8 +235,10 @@ def in_words(parameters: Mapping[str, Any]) -> str:
 
 
 def world_title(world: str) -> str:
-    """Return the name of a world for readers, from :attr:`Cell.world`: ``the paper's world`` or
-    ``the world motor_noise=0.01``."""
+    """Return a readable name of a world from the text of :attr:`Cell.world`.
+
+    Examples are ``the paper's world`` and ``the world motor_noise=0.01``.
+    """
     return f"the world {world}" if world else "the paper's world"
 
 

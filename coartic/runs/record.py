@@ -1,4 +1,4 @@
-"""The record of a run: what a worker returns, and the row in which it is stored."""
+"""The result of a run: the outcome that a worker returns, and the stored row."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ from coartic.tasks.task import Task, hands_of
 Status = Literal["ok", "infeasible", "solver-failed", "timeout", "crashed"]
 """Status of a run."""
 PREFIXES = {"solution": "", "initial": "initial_", "replay": "replay_"}
-"""Prefixes of columns by part of a run. The parts are ``solution``, ``initial`` (the first trial of
-a learner) and ``replay`` (a greedy trial without noise after learning)."""
+"""Dict that maps each part of a run to the prefix of its columns. The parts are ``solution``,
+``initial`` (the first trial of a learner) and ``replay`` (a greedy trial after learning)."""
 PARTS = tuple(PREFIXES)
 MOTOR_NOISE = 0.01
-"""Standard deviation of the motor noise with which each solution is executed when it is scored, in
-length units and rad (:func:`coartic.execute_noisy`)."""
+"""Standard deviation of the motor noise in the scoring of solutions, in length units and rad
+(:func:`coartic.execute_noisy`)."""
 NOISY_EXECUTIONS = 100
 """Number of executions of each solution with motor noise."""
 NOISE_RULE = 2
-"""Version of the rule of motor noise. Ticks of another version are shown as missing until they are
-made again, so that two rules never stand in one column. Raise it with a change of
+"""Version of the rule of motor noise. Ticks that follow another version are shown as missing until
+they are computed again, so that a column never mixes two rules. Raise it with a change of
 :mod:`coartic.motion.kernels.noise` or of the judge's seeds."""
 OF_NOISE = ("noisy_ticks", "mean_ticks", "failed_executions")
-"""Columns of ticks with noise, which depend on the rule of noise."""
+"""Names of the columns that depend on the rule of motor noise."""
 UNREPEATED = "made_again"
 """Key in the details of a run. Its value is the difference that was found when the run was made
 again."""
@@ -53,8 +53,8 @@ _MOST_MOVEMENTS = 10_000
 _MOST_NUMBERS = 400_000
 """Largest number of entries in the start, the targets and the waypoints of a solution."""
 MOST_STEPS = 1_000_000
-"""Largest number of movement steps on the straight path from the start through all targets and
-waypoints."""
+"""Largest number of steps of the movements of a solution. The steps are counted on the straight
+path from the start through all targets and waypoints."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Times:
     warm: bool | None = None
     """True if the process had run the method before; None if unknown."""
     together: int = 1
-    """Number of runs of the job. They were made side by side."""
+    """Number of runs of the job, which were made together."""
     process_peak_mb: float | None = None
     """Largest memory of the worker so far, including earlier runs (in MiB); None if unknown."""
 
@@ -82,7 +82,8 @@ class Outcome:
     reason: str = ""
     """Why the run is not ok; empty if it is ok."""
     parts: dict[str, list[InstanceOf[Movement]]] = field(default_factory=dict)
-    """Movements by part (``solution``, ``initial``, ``replay``), not yet executed."""
+    """Dict that maps parts (``solution``, ``initial``, ``replay``) to movements, before
+    execution."""
     details: dict[str, Any] = field(default_factory=dict)
     """Further data from the method or the process, by name."""
     used: tuple[str, ...] = ()
@@ -106,9 +107,9 @@ class Row:
     values: dict[str, Any]
     """Values of the columns of table ``results``, by name (:data:`COLUMNS`): ``row["reward"]``."""
     movements: dict[str, list[list[Any]]]
-    """Movements by part (``solution``, ``initial``, ``replay``), as lists (:func:`movement_data`);
-    empty if the run is not ok. They are those that were executed. In a world with noise the
-    solution is what the method recommends, without ticks."""
+    """Dict that maps parts (``solution``, ``initial``, ``replay``) to the executed movements, as
+    lists (:func:`movement_data`); empty if the run is not ok. With motor noise the solution has the
+    movements that the method recommends, without ticks."""
     rewards: list[int | None]
     """Reward of each trial; None if the trial failed or its reward is not stored."""
     details: dict[str, Any]
@@ -136,14 +137,14 @@ class Row:
         return [*map(movement_from, self.movements.get(name, []))]
 
     def with_values(self, **values: Any) -> Row:
-        """Return a copy of the row with other values of columns."""
+        """Return a copy of the row in which the values of the named columns are changed."""
         return replace(self, values=self.values | values)
 
     def downsample(self) -> Row:
         """Return a copy of the row with fewer rewards.
 
-        The copy has the rewards of the best trial and of each trial that was better than all
-        earlier ones. Other rewards are None.
+        The copy keeps the rewards of the best trial and of each trial that was better than all
+        earlier trials. All other rewards are None.
         """
         best, solved, rewards = -math.inf, self["best_trial"], list[int | None]()
         for trial, reward in enumerate(self.rewards):
@@ -161,7 +162,8 @@ _NOTHING = SimpleNamespace(reward=None, hands=None, corrections=None, other_arm_
 def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date: str = "") -> Row:
     """Return the row of a run from its outcome and the executions of its parts.
 
-    Ticks with noise are missing (:func:`coartic.benchmarks.scoring.with_noise`).
+    The columns of ticks with noise are empty; :func:`coartic.benchmarks.scoring.with_noise` fills
+    them.
 
     Parameters
     ----------
@@ -170,7 +172,7 @@ def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date
     outcome : Outcome
         The outcome, with its final status.
     executions : mapping of str to Execution
-        Executions by part, without noise; empty if the run is not ok.
+        Maps parts to executions without noise; empty if the run is not ok.
     date : str
         Date and time, UTC.
     """
@@ -393,7 +395,7 @@ def reward_bytes(rewards: Sequence[int | None]) -> bytes:
 def execute_all(
     task: Task, solutions: Sequence[Sequence[Movement]], model: MotionModel = PAPER
 ) -> list[Execution | Exception]:
-    """Execute solutions of a task in a world without its motor noise.
+    """Execute solutions of a task without motor noise.
 
     Parameters
     ----------
@@ -401,13 +403,13 @@ def execute_all(
     solutions : sequence of sequence of Movement
         Solutions, whose targets and waypoints are arrays of floats.
     model : MotionModel
-        The world.
+        The motion model; its motor noise is ignored.
 
-    Returns
-    -------
-    list of Execution or Exception
-        Execution of each solution, in order. A solution that breaks the rules of the task or is too
-        long (:func:`too_long`) has the error instead, which is not raised.
+            Returns
+            -------
+            list of Execution or Exception
+                Execution of each solution, in order. For a solution that breaks the rules of the
+                task or is too long (:func:`too_long`), the entry is the error, which is not raised.
     """
     exact = model.without_noise()
     errors = [too_long(task, solution, exact) for solution in solutions]
@@ -423,18 +425,18 @@ def judge(
     seeds: Sequence[int],
     executions: int = NOISY_EXECUTIONS,
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Execute answers of a task many times in a world with noise, and return their mean ticks.
+    """Compute the mean ticks of recommended solutions over many executions with motor noise.
 
-    A failed execution counts as twice the ticks of the corrective process with its best hands, in
-    this world without noise.
+    A failed execution counts as twice the ticks that the corrective process with its best hands
+    takes without noise.
 
     Parameters
     ----------
     task : Task
     answers : sequence of sequence of Movement
-        K answers (:func:`.next_action`).
+        K solutions that methods recommend (:func:`.next_action`).
     model : MotionModel
-        The world, with its motor noise.
+        The motion model, with motor noise.
     seeds : sequence of int
         Seed of the noise of each answer.
     executions : int
@@ -458,7 +460,7 @@ def judge(
 def too_long(
     task: Task, solution: Sequence[Movement], model: MotionModel = PAPER
 ) -> SolutionError | None:
-    """Return the error of a solution that is too long in a world; None for any other solution.
+    """Return the error of a solution that is too long; None for any other solution.
 
     A solution is too long if it has
 

@@ -44,13 +44,15 @@ def open_shipped(suite: str) -> AbstractContextManager[Store]:
 
 
 def open_results(folder: Path) -> AbstractContextManager[Store]:
-    """Open a results folder for reading; ``shipped`` opens the shipped results of the
-    comparison."""
+    """Open a results folder for reading.
+
+    The name ``shipped`` opens the shipped results of the suite ``comparison``.
+    """
     return open_shipped("comparison") if str(folder) == SHIPPED else open_store(folder)
 
 
 def shipped_hashes() -> dict[str, str]:
-    """Return the SHA-256 of the compressed files by suite, from file ``SHA256SUMS``."""
+    """Read ``SHA256SUMS``: a dict that maps suites to the hashes of their compressed files."""
     lines = (SHIPPED_FOLDER / HASHES).read_text(encoding="ascii").splitlines()
     pairs = (line.split() for line in lines)
     return {name.removesuffix(PACKED): digits for digits, name in pairs}

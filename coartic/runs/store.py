@@ -1,9 +1,10 @@
 """The runs of a results folder, in the SQLite file ``runs.sqlite``.
 
-Table ``cells`` has a row for each cell that a command has asked for. Its columns ``position`` and
-``runs`` are set only for the cells of the last ``coartic run``, which are the plan of the folder.
-Table ``results`` has a row for each run, with its movements and the rewards of its trials. The
-views ``runs`` and ``solutions`` show the runs of the plan; docs/results.md lists their columns.
+Table ``cells`` has a row for each cell that a command has asked for. The *plan* of the folder
+consists of the cells of the last ``coartic run``; only these cells have values in columns
+``position`` and ``runs``. Table ``results`` has a row for each run, with its movements and the
+rewards of its trials. The views ``runs`` and ``solutions`` show the runs of the plan;
+docs/results.md lists their columns.
 
 Only one process writes at a time. It writes finished runs in batches. After any interruption a
 batch is stored completely or not at all.
@@ -52,8 +53,8 @@ RUNS_FILE = "runs.sqlite"
 FORMAT = 8
 """Number of the format. A change of a table or a view must increase it."""
 OLDEST = 7
-"""Oldest format that is read, that of version 6.0.0. It lacks columns, which are shown as missing;
-``coartic run`` adds them to the folder into which it writes."""
+"""Oldest format that can be read, the format of version 6.0.0. Columns that this format lacks are
+shown as missing values; ``coartic run`` adds these columns to the folder into which it writes."""
 _APPLICATION = 0x636F6172  # "coar"
 
 _KINDS = {"TEXT": "string", "INTEGER": "Int64", "REAL": "Float64", "BOOLEAN": "boolean"}
@@ -213,10 +214,10 @@ class Store:
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
     def stale(self) -> Counter[tuple[str, str, str]]:
-        """Count the runs of the plan that another version or code of their method made.
+        """Count the planned runs that an older or other version of the method made.
 
-        The keys are triples: id of the method, the version or code that made the runs, and the one
-        in the plan.
+        The keys are triples: id of the method, version (or code) that made the runs, and version in
+        the plan.
         """
         query = """SELECT now.method, old.code, now.code, count(*) FROM suite
             JOIN cells AS now ON now.runs IS NOT NULL
@@ -226,9 +227,9 @@ class Store:
         return Counter({(name, old, now): count for name, old, now, count in self._rows(query)})
 
     def marks(self) -> dict[str, list[str]]:
-        """Return warnings about the runs of the plan, as sentences by id of the method.
+        """Return a dict that maps ids of methods to warnings about their runs in the plan.
 
-        The warnings are that
+        A warning is a sentence which says that
 
         - a run had another result when it was made again;
         - runs were made with other versions of packages that the method's file imports.
@@ -252,9 +253,9 @@ class Store:
         return dict(warnings_by_method)
 
     def imports(self) -> dict[str, list[str]]:
-        """Return the packages that the files of methods import, by id of the method.
+        """Return a dict that maps ids of methods to the packages that their files import.
 
-        The packages are names with versions, over all runs of the plan.
+        A package is a name with a version. All runs of the plan are considered.
         """
         by_method = defaultdict[str, dict[str, None]](dict)
         for method, made, _ in self._packages():
@@ -285,8 +286,10 @@ class Store:
             yield method, *versions
 
     def others(self) -> int:
-        """Return the number of runs in the folder that the plan does not ask for, stale ones
-        too."""
+        """Return the number of runs in the folder that do not belong to the plan.
+
+        Runs of other versions of a method (:meth:`stale`) are included.
+        """
         query = "SELECT (SELECT count(*) FROM results) - (SELECT count(*) FROM asked)"
         return int(self._rows(query)[0][0])
 
@@ -296,14 +299,14 @@ class Store:
         return [run_id for (run_id,) in self._rows(query, len(prefix), prefix)]
 
     def solved(self) -> dict[str, list[str]]:
-        """Return the ids of all runs in the folder with status ``ok``, by the id of their cell."""
+        """Return a dict that maps ids of cells to ids of runs with status ``ok``."""
         by_cell = defaultdict[str, list[str]](list)
         for cell, run_id in self._rows("SELECT cell, run_id FROM results WHERE status = 'ok'"):
             by_cell[cell].append(run_id)
         return dict(by_cell)
 
     def results(self) -> dict[str, str]:
-        """Return the hash of the outcome of each run in the folder, by id of the run."""
+        """Return a dict that maps ids of all stored runs to hashes of their outcomes."""
         return dict(self._rows("SELECT run_id, result FROM results"))
 
     # Writing and reading runs.
@@ -427,14 +430,15 @@ class Store:
         return self._frame(_SOLUTIONS)
 
     def movements(self, part: str, most: int) -> dict[str, tuple[Movement, ...]]:
-        """Return the movements of a part of runs, by id of the run.
+        """Return a dict that maps ids of runs to the movements of one part.
 
         Parameters
         ----------
         part : {"solution", "initial", "replay"}
             Runs without this part are left out.
         most : int
-            Largest number of runs for each cell of the plan: its first runs with status ``ok``.
+            Largest number of runs for each cell of the plan. The first runs of the cell with status
+            ``ok`` are returned.
         """
         query = """SELECT run_id, json_extract(movements, ?) FROM
             (SELECT run_id, movements, position, run,
@@ -448,7 +452,7 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the rewards of trials for each run of the plan that has any.
+        """Yield the rewards of the trials of each run of the plan, if rewards are stored.
 
         Yields
         ------
@@ -464,9 +468,10 @@ class Store:
                 yield run_id, _unpack(blob)
 
     def outdated_noise(self) -> list[list[str]]:
-        """Return the ids of solved runs of the plan whose ticks in noise follow another rule.
+        """Return the ids of the solved runs whose ticks follow an older rule of motor noise.
 
-        The result has a list for each cell with such runs.
+        Only runs of the plan are considered. The result has a list of ids for each cell with such
+        runs.
         """
         rule = "noise_rule" if "noise_rule" in self._columns("asked") else "NULL"
         query = f"""SELECT position, run_id FROM asked WHERE status = 'ok'

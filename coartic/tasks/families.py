@@ -1,21 +1,21 @@
 """Families of random tasks: distributions as data, and instances that never change.
 
-A family is a file, ``families/NAME.vN.toml``. It says how many goals there are, where they are, for
-which hands, arms and base, and from which start. A family that was released is not changed; a
-change is a new version.
+A family is a file, ``families/NAME.vN.toml``. The file has the distributions of the number and the
+positions of the goals, of the hands, the arms and the base, and of the start. The file of a
+released family does not change; a changed family is a new version.
 
-An instance is a task with a name such as ``two-armed/v1/i017``. It depends only on the file and the
-name: numbers come from a counter-based generator (:mod:`coartic.tasks.philox`). The key of the
-generator is a hash of family, version and stream, and its counter has the number of the instance.
-Streams are ``d`` (development, to tune on), ``i`` (test, to report on) and years (``2027-``, fresh
-instances).
+An instance is a task with a name such as ``two-armed/v1/i017``. An instance depends only on the
+file and the name, because its numbers come from a counter-based generator
+(:mod:`coartic.tasks.philox`). The key of the generator is a hash of family, version and stream, and
+its counter contains the number of the instance. Streams are ``d`` (development, to tune on), ``i``
+(test, to report on) and years (``2027-``, fresh instances).
 
-The structure is drawn once: how many goals and links, the base, the kind of start. Positions and
-angles are drawn again until they break no rule (:func:`broken_rule`). Rejection therefore does not
-change the shares of structures. Positions and angles are drawn as integers, in thousandths.
-Geometric rules compare integers; the other rules use the compiled kernels, which need only IEEE
-arithmetic (:mod:`coartic.motion.kernels.trigonometry`). No rejection depends on a machine's
-library.
+An instance is drawn in two stages. The *structure* (number of goals and links, base, kind of start)
+is drawn once. Positions and angles are drawn again until they break no rule (rejection sampling,
+:func:`broken_rule`). Rejection therefore does not change the frequencies of the structures.
+Positions and angles are drawn as integers, in thousandths. Geometric rules compare integers; the
+other rules use the compiled kernels, which need only IEEE arithmetic
+(:mod:`coartic.motion.kernels.trigonometry`). No rejection depends on a machine's library.
 """
 
 from __future__ import annotations
@@ -119,20 +119,21 @@ class _Region(FileData):
     y: Range
     """Lowest and highest y (in length units)."""
     scale: Annotated[Range, AfterValidator(_as_share)] = (_PARTS, _PARTS)
-    """Smallest and largest share of the region's sides that the sides of an instance's own box
-    have."""
+    """Smallest and largest ratio of the sides of an instance's own box to the sides of the
+    region."""
 
 
 class _Alignment(FileData):
     """Goals on a horizontal or vertical line.
 
-    If there are three or more, one goal is off the line, neither the first nor the last.
+    If there are three or more goals, one goal, which is neither the first nor the last, is off the
+    line.
     """
 
     steps: Range
     """Smallest and largest distance from goal to goal along the line (in length units)."""
     off: Range
-    """Smallest and largest distance by which that goal is off the line, to either side (in length
+    """Smallest and largest distance of that goal from the line, to either side (in length
     units)."""
 
 
@@ -195,24 +196,24 @@ class Family(FileData):
     start: Annotated[tuple[Postures, ...], Field(min_length=1)]
     """Starting postures. Each instance has one of them: tables ``[[start]]``."""
     initial_hands: InitialPolicy = INITIAL_POLICIES[0]
-    """Policy that finds the hands of trial 0, ``"best-single-hand"`` or ``"best-of-all"``. An
-    instance has the hands that the policy found for it."""
+    """Policy that finds the hands of trial 0, ``"best-single-hand"`` or ``"best-of-all"``. The
+    ``initial_hands`` of an instance are the hands that the policy found."""
     apart: Thousandths = 300
     """Smallest distance between the centres of two goals (in length units)."""
     clear: Thousandths = 200
     """Smallest distance of a hand at the start from the rim of a goal (in length units)."""
     within: Thousandths = 950
-    """Largest distance of a goal from a shoulder, as a share of the reach. The distance is measured
-    along the base coordinates that are locked."""
+    """Largest distance of a goal from a shoulder, as a share of the reach. Only displacements in
+    locked base coordinates count in the distance."""
     bent: Thousandths = 200
     """Angle (in rad). At the start each arm with one of ``hands`` has a joint after its first that
     is bent by at least this angle."""
 
 
 def draft(family: Family, address: Address, attempt: int) -> Task:
-    """Return the task drawn for an instance in one attempt, unchecked.
+    """Draw the task of an instance in one attempt, without checks.
 
-    No rule of the family is checked (:func:`broken_rule`), and goals may be out of reach.
+    The task may break rules of the family (:func:`broken_rule`), and goals may be out of reach.
     ``initial_hands`` of the task is still a policy instead of a hand sequence. Equal arguments give
     equal tasks.
 
@@ -255,8 +256,9 @@ def draw_goals(draws: Draws, family: Family, count: int, vertical: bool) -> list
     """Draw goals, and return their x and y in thousandths of a length unit.
 
     If the family has no line, the goals are in a box whose sides are a drawn share of the region's
-    sides. Otherwise they are on a line, possibly outside the region. If there are more than two
-    goals, one of them, neither the first nor the last, is moved off the line by ``off``.
+    sides. Otherwise the goals are on a line, possibly outside the region. If there are more than
+    two goals, one goal, which is neither the first nor the last, is moved off the line by the
+    distance ``off``.
 
     Parameters
     ----------
@@ -300,7 +302,7 @@ def broken_rule(family: Family, task: Task) -> str | None:
     - ``corrective``: the corrective process on its own does not complete the task, with the base of
       the draft or of a restriction; or there are more than 4096 hand sequences to try.
 
-    The last four rules only look at hands of the family.
+          The last four rules consider only the hands of the family.
     """
     goals = [(_in_thousandths(x), _in_thousandths(y)) for x, y in task.goals]
     (left, right), (low, high) = family.region.x, family.region.y
@@ -341,9 +343,9 @@ def broken_rule(family: Family, task: Task) -> str | None:
 def instance_of(family: Family, address: Address) -> Task:
     """Return the instance at an address: the first draft that breaks no rule.
 
-    Unlike a draft, the returned task has a title, a description, a provenance, and as
-    ``initial_hands`` a hand sequence with which the corrective process completes it. Raises
-    TaskError if each of the first 10,000 drafts breaks a rule of the family.
+    Unlike a draft, the returned task has a title, a description and a provenance, and its
+    ``initial_hands`` are a hand sequence with which the corrective process completes the task.
+    Raises TaskError if each of the first 10,000 drafts breaks a rule of the family.
     """
     broken = Counter[str]()
     for attempt in range(MOST_ATTEMPTS):
@@ -402,11 +404,12 @@ def is_file(family: str) -> bool:
 
 
 def named_by(text: str) -> list[str]:
-    """List the names of the instances of a range such as ``two-armed/v1/i000..i039``.
+    """List the names of the instances in a range such as ``two-armed/v1/i000..i039``.
 
-    Both ends are included. If ``text`` is not a range, it is the only entry, unchecked; it may be a
-    task's name or file. Raises TaskError for a range that is malformed, goes backwards or has more
-    than 10,000 instances. Whether a shipped family exists is not checked.
+    Both ends are included. If ``text`` is not a range, such as a task's name or file, the list has
+    ``text`` as its only entry, without a check. Raises TaskError for a range that is malformed,
+    goes backwards or has more than 10,000 instances. Whether a shipped family exists is not
+    checked.
     """
     if "/" not in text or ".." not in text.rpartition("/")[2] or text.endswith(".toml"):
         return [text]
@@ -429,16 +432,16 @@ def named_by(text: str) -> list[str]:
 
 
 def shipped_families() -> dict[str, Family]:
-    """Return a new dictionary of the shipped families by name, such as ``two-armed/v1``."""
+    """Return a new dict that maps names, such as ``two-armed/v1``, to the shipped families."""
     families = map(read_family, sorted(FAMILY_FOLDER.glob("*.v*.toml")))
     return {family.name: family for family in families}
 
 
 def own_families(paths: Iterable[Path]) -> dict[str, Family]:
-    """Read families from files, and return them by name.
+    """Read families from files, and return a dict that maps their names to the families.
 
-    Raises TaskError for a file that cannot be used, and for a name that another of the files or a
-    shipped family has.
+    Raises TaskError for a file that cannot be used, and for a name that belongs to another of the
+    files or to a shipped family.
     """
     families: dict[str, Family] = {}
     for path in paths:
@@ -477,9 +480,10 @@ def is_family(name: str) -> bool:
 
 @cache
 def read_family(path: Path) -> Family:
-    """Read a family from its TOML file, and cache it.
+    """Read a family from its TOML file, and cache the family.
 
-    The file names the family: ``two-armed.v1.toml`` has family ``two-armed/v1``. Raises TaskError
+    The name of the family comes from the name of the file: ``two-armed.v1.toml`` is family
+    ``two-armed/v1``. Raises TaskError
     if the file is not a family.
     """
     content, name = read_toml(path, error=TaskError), "/".join(path.stem.rsplit(".", 1))

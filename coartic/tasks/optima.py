@@ -1,8 +1,8 @@
-"""The best known rewards that come with the package, and what is proven about them.
+"""The best known rewards that come with the package, and proven bounds on rewards.
 
 ``optima.json`` has the best reward that any method found for each of the paper's tasks, with run
 ids and solutions. ``best_known.csv`` has the best reward for test instances of families, and
-``best_in_noise.csv`` the fewest mean ticks in a world with motor noise. The study
+``best_in_noise.csv`` the fewest mean ticks known for tasks with motor noise. The study
 ``studies/optima`` copies better rewards from results folders, and proves the bounds.
 """
 
@@ -20,8 +20,8 @@ from coartic.model import PAPER, MotionModel, same_world
 from coartic.tasks.task import Task
 
 BASE = "task"
-"""Value of ``base`` (:func:`entries`) in the entry of a task whose base is locked as in the task
-itself. Rewards are compared with this entry."""
+"""Value of ``base`` (:func:`entries`) in an entry without additional locks of the base. Rewards are
+compared with this entry."""
 DATA = Path(__file__).with_name("optima.json")
 """Entries of the paper's tasks (:func:`entries`)."""
 BEST_KNOWN = Path(__file__).with_name("best_known.csv")
@@ -37,11 +37,11 @@ HASHED_FIELDS = ("start", "radius", "hands", "locked_base", "robot")
 
 @dataclass(frozen=True)
 class KnownOptimum:
-    """The best known reward of a task in a world, with both arms free."""
+    """The best known reward of a task under a motion model, and its proven bound."""
 
     reward: int | float
-    """Total reward: minus the ticks, an integer; in a world with motor noise minus the mean ticks
-    of 1,000 executions."""
+    """Total reward: minus the ticks, an integer; with motor noise, minus the mean ticks of 1,000
+    executions. Both arms may move."""
     bound: int | None
     """Reward that no solution exceeds; None if nothing is proven."""
     hands: str = ""
@@ -49,7 +49,7 @@ class KnownOptimum:
 
     @property
     def proven(self) -> bool:
-        """True if it is proven that no solution has a better reward."""
+        """True if a proof shows that no solution has a better reward."""
         return self.bound == self.reward
 
 
@@ -65,12 +65,15 @@ def task_hash(task: Task) -> str:
 
 
 def best_shipped(task: Task, model: MotionModel = PAPER) -> KnownOptimum | None:
-    """Return the best known reward of a task in a world, and its bound, from the shipped files.
+    """Look up the best known reward of a task and motion model in the shipped files.
 
-    The task is recognised by :func:`task_hash`, whatever its name. Return None if the files do not
-    have the task in this world. They have the paper's world, and the paper's world with motor noise
-    0.01. Of a shipped family they have only the first 40 instances of the test split, and with
-    motor noise only those of families with up to eight goals.
+    The task is identified by :func:`task_hash`; its name does not matter. The shipped files have
+
+    - the paper's model, and the paper's model with motor noise 0.01, but no other models;
+    - the paper's tasks, and the first 40 test instances of each shipped family (with motor noise
+      only of families with up to eight goals).
+
+    Return None for any other task or model.
     """
     if not same_world(model.without_noise(), PAPER, task.radius):
         return None
@@ -100,13 +103,14 @@ def _by_task_hash() -> dict[tuple[str, float], KnownOptimum]:
 def entries() -> list[dict[str, Any]]:
     """Read ``optima.json``, and return a new list of its entries.
 
-    There is an entry for each task of the paper and each restriction of base and other arm. (A task
-    that locks y itself has no entry for ``y``.) An entry is a dictionary with the keys
+    There is an entry for each combination of a task of the paper, a restriction of the base, and a
+    restriction of the idle arm. (A task that locks y itself has no entry for ``y``.) An entry is a
+    dict with the keys
 
     - ``task``: name of the task;
     - ``essence``: :func:`task_hash`, without the restriction;
-    - ``base``: coordinates that are locked, ``y`` or ``xy``, or ``task`` for those that the task
-      locks;
+    - ``base``: coordinates that are locked, ``y`` or ``xy``; ``task`` for the coordinates that the
+      task itself locks;
     - ``other_arm``: whether the idle arm is ``free`` or ``still``;
     - ``run_ids``: ids of the runs;
     - ``made_by``: versions and the date.
@@ -119,7 +123,7 @@ def entries() -> list[dict[str, Any]]:
     - ``solution``: a list ``[goal, hand, kind, target, waypoints]`` for each movement;
     - ``nodes``, in one entry: number of nodes of the search that proved the bound.
 
-    Otherwise the entry has the key ``infeasible``, the reason why no search has a solution.
+    Otherwise the entry has the key ``infeasible``: the reason why no search found a solution.
     """
     content: dict[str, list[dict[str, Any]]] = json.loads(DATA.read_text(encoding="utf-8"))
     return content["optima"]

@@ -1,4 +1,4 @@
-"""Random numbers that stay the same: a counter-based generator that uses only integers.
+"""A counter-based random number generator whose numbers are the same on every machine.
 
 Philox4x32-10 (Salmon, Moraes, Dror & Shaw 2011, *Parallel random numbers: as easy as 1, 2, 3*)
 turns a counter of four words and a key of two words into four random words. No state is carried
@@ -49,10 +49,10 @@ def hash_key(name: str) -> tuple[int, int]:
 
 
 class Draws:
-    """Integers drawn one after the other; equal keys and counters give equal integers.
+    """Stream of random integers; equal keys and counters give equal streams.
 
-    ``counter`` has the last three words of the generator's counter. Its first word counts the
-    blocks of four random words that were used.
+    The generator's counter has four words. The first word counts the blocks of four random words
+    that were used; ``counter`` has the other three words.
     """
 
     def __init__(self, key: tuple[int, int], *counter: int) -> None:

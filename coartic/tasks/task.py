@@ -1,4 +1,4 @@
-"""Tasks: a start, a sequence of goals, and where their numbers come from.
+"""Tasks: a start, a sequence of goals, and the sources of their numbers.
 
 A task is read from a TOML file. The shipped files are in ``paper``; users' files have the same
 form.
@@ -99,10 +99,10 @@ class Address(NamedTuple):
 
 
 def address_of(name: str) -> Address | None:
-    """Return the address that a task's name stands for, or None for another form.
+    """Parse the name of an instance; return None if the name has another form.
 
-    ``two-armed/v1/i017`` is family ``two-armed/v1``, stream ``i``, number 17; ``i0017`` has another
-    form. Whether the family exists is not checked.
+    ``two-armed/v1/i017`` is family ``two-armed/v1``, stream ``i``, number 17; ``i0017`` does not
+    have the form. The function does not check whether the family exists.
     """
     parts = _ADDRESS.fullmatch(name)
     if parts is None:
@@ -112,7 +112,7 @@ def address_of(name: str) -> Address | None:
 
 
 class Provenance(FileData):
-    """Source of a number of a task: the entry of a key in ``Task.provenance``."""
+    """Source of a number of a task: a value of the dict ``Task.provenance``."""
 
     status: Literal["published", "inferred", "chosen"]
     """Whether the number is published in the paper, inferred from the paper, or chosen by the
@@ -122,7 +122,7 @@ class Provenance(FileData):
 
 
 class Start(FileData):
-    """The starting configuration q_0 as a task file has it; ``Task.q0`` is the array."""
+    """The starting configuration q_0 in the form of a task file; ``Task.q0`` is the array."""
 
     base: Point = (0.0, 0.0)
     """Centre of the base (in length units)."""
@@ -134,14 +134,14 @@ class Start(FileData):
 
 
 class Task(FileData):
-    """A sequence of goals to hit in turn, each with a hand of the robot.
+    """A sequence of goals to hit in order, each with one hand of the robot.
 
     :func:`load_task` reads a task from a file, or finds it by its name. Fields cannot be changed.
     In Python a configuration ``q0=``, shape ``(dof,)``, can be passed instead of ``start``:
     ``Task(goals=[(3, 2), (4.5, 2)], q0=np.zeros(10))``.
 
-    Source of the shipped tasks: paper, section *Experiments*. ``provenance`` says where each number
-    comes from.
+    Source of the shipped tasks: paper, section *Experiments*. ``provenance`` has the source of each
+    number.
     """
 
     name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)] = "unnamed"
@@ -185,7 +185,7 @@ class Task(FileData):
         return goals
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Task:
-        """Return a copy in which the fields in ``update`` are changed, without a check.
+        """Return a copy with the changed fields of ``update``, without a check.
 
         With ``deep`` the result is a deep copy. The arrays ``q0`` and ``goal_array`` of the copy
         follow from the changed fields.
@@ -207,10 +207,7 @@ class Task(FileData):
 
     @property
     def family(self) -> str | None:
-        """Name of the family with its version, if the task has the name of an instance.
-
-        Otherwise None.
-        """
+        """Name of the family with its version if the task is an instance; otherwise None."""
         address = address_of(self.name)
         return address and address.family
 
@@ -232,11 +229,11 @@ class Task(FileData):
     @model_validator(mode="before")
     @classmethod
     def _with_start(cls, content: Any) -> Any:
-        """Return the content of a task with a ``start``.
+        """Return the content of a task with the key ``start``.
 
-        - Content that has a ``start`` or is not a dictionary is returned unchanged.
-        - If it has ``q0``, shape ``(dof,)``, ``start`` is made of it.
-        - Otherwise the base is at (0, 0), and both arms are straight along +x.
+        - Content that has the key ``start``, or is not a dict, is returned unchanged.
+        - If the content has the key ``q0``, shape ``(dof,)``, ``start`` is computed from ``q0``.
+        - Otherwise ``start`` has the base at (0, 0), and both arms straight along +x.
 
         Raises a validation error if the content has both keys or if ``q0`` is wrong.
         """
@@ -388,10 +385,10 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
 
 
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
-    """Return by how much a goal is out of a hand's reach (in length units).
+    """Return the distance by which a goal is out of a hand's reach (in length units).
 
-    The result is how far the goal's centre lies outside the range of distances that a hand can have
-    from its shoulder, minus ``tolerance``. It is above 0 if the goal is out of reach, otherwise at
+    A hand can have a range of distances from its shoulder. The result is the distance of the goal's
+    centre from that range, minus ``tolerance``: above 0 if the goal is out of reach, otherwise at
     most 0. Base coordinates that are not locked can take any value.
     """
     arm = task.robot.arm(hand)
@@ -408,8 +405,8 @@ def check_task(task: Task) -> Task:
     """Check that all goals of a task can be reached, and return the task.
 
     The paper's corrective process ends within a tenth of the radius from a goal's centre. Raises
-    TaskError if no hand of the task can come as near to a goal, or if the hand that
-    ``initial_hands`` names for it cannot.
+    TaskError if no hand of the task can come that near to a goal, or if the hand that
+    ``initial_hands`` names for a goal cannot.
     """
     _, tolerance = PAPER.tolerances(task.radius)
     if (problem := _out_of_reach(task, tolerance)) is not None:
@@ -428,9 +425,9 @@ def read_task(path: Path) -> Task:
 
 @cache
 def shipped_tasks() -> dict[str, Task]:
-    """Return the tasks that come with the package by name, in the paper's order.
+    """Return a dict that maps names to the tasks that come with the package.
 
-    The dictionary is cached: do not change it.
+    The tasks are in the paper's order. The dict is cached: do not change it.
     """
     return {task.name: task for task in map(read_task, sorted(TASK_FOLDER.glob("*.toml")))}
 

@@ -1,1 +1,1 @@
-"""What studies share: verdicts on claims, and the files of a study."""
+"""Code that studies share: verdicts on claims, and the files of a study."""

@@ -67,7 +67,7 @@ def level_of(values: ArrayLike) -> float:
 
 @dataclass(frozen=True)
 class Finding:
-    """Hold the evidence and the tests of one claim, before any correction."""
+    """Evidence and tests of one claim, before correction for multiple tests."""
 
     holds: bool | None
     """True if the runs show the claim; None if the runs are too few."""
@@ -235,8 +235,8 @@ def judge(claims: Mapping[str, tuple[str, str, Finding]]) -> pd.DataFrame:
     Parameters
     ----------
     claims : mapping of str to (str, str, Finding)
-        By the id of each claim: its statement, its test in words, and its finding. A claim without
-        a p-value still counts in the correction.
+        Maps the id of each claim to its statement, its test in words, and its finding. A claim
+        without a p-value still counts in the correction.
 
     Returns
     -------
@@ -294,9 +294,9 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
         in words, and ``means`` a list of tables. Each table has a ``sentence`` and one bound: the
         mean is claimed to lie ``above`` it, ``below`` it, or ``within`` plus and minus it.
     values : mapping
-        By the id of each claim, a list with one entry for each of its means. An entry has one value
-        for each task, or such values by group of tasks. With groups the mean of each group must lie
-        beyond the bound, and the sentence may contain ``{group}``.
+        Maps the id of each claim to a list with one entry for each of its means. An entry has one
+        value for each task, or is a dict that maps groups of tasks to such values. With groups the
+        mean of each group must lie beyond the bound, and the sentence may contain ``{group}``.
 
     Returns
     -------

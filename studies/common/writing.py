@@ -1,4 +1,4 @@
-"""Write the tables and the page of a study, and a suite of the controls that it lacks."""
+"""Write the tables and the page of a study, and a suite of its missing control runs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _OF_RUN = [
 
 
 def tabulate_runs(study: Study) -> pd.DataFrame:
-    """Return the runs of a study with their signatures of coarticulation, by ``run_id``.
+    """Return a table of a study's runs and their signatures of coarticulation.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def fill_page(template: str | Path, **values: Any) -> str:
 
 
 def expect(holds: bool, what: str) -> str:
-    """Return an empty string if ``holds``, a condition of a sentence of the page, is true.
+    """Return an empty string if the condition ``holds`` of a sentence of the page is true.
 
     Raises ValueError with the words ``what`` if it is false.
     """

@@ -1,2 +1,1 @@
-"""Compiled kernels of motion. Only doors of ``coartic.motion``, the learner's kernel and posture-
-based planning read them."""
+"""Compiled kernels of motion, used by ``coartic.motion``, the learner and posture planning."""

@@ -14,7 +14,6 @@ import ctypes
 import fcntl
 import hashlib
 import logging
-import multiprocessing
 import os
 import re
 import shutil
@@ -23,6 +22,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, cached_property, partial, update_wrapper
+from multiprocessing import parent_process
 from pathlib import Path
 from threading import Lock
 from types import SimpleNamespace
@@ -58,9 +58,9 @@ KERNEL_FILES = [
     PACKAGE / "robot.py",
     *(path for path in python_files("motion", "learner") if _DECORATED.search(path.read_bytes())),
 ]
-"""Files of which kernels consist: those in ``motion`` and ``learner`` that define kernels, and
-``robot.py``, whose formulas become kernels. A kernel elsewhere may use these files and its own, at
-which Numba looks itself."""
+"""Files that contain code of kernels: the files in ``motion`` and ``learner`` that define kernels,
+and ``robot.py``, whose formulas are compiled as well. A kernel in any other file may call only
+these kernels and kernels of its own file; Numba itself notices changes of its own file."""
 FINGERPRINT = hash_of_files(KERNEL_FILES)
 """Hash of the files of the kernels when this module was imported."""
 
@@ -113,10 +113,10 @@ inner = _decorator("inner")
 shared = _decorator("shared")
 """An inner kernel that several entries call; its machine code is stored on disk as well."""
 inlined = _decorator("inlined")
-"""An inner kernel that becomes a part of its callers and has their error model. Calls with whole
-tables would take time, and loops over a known shape are unrolled."""
+"""An inner kernel that is inlined into its callers and has their error model. Inlining avoids the
+cost of passing large records, and lets the compiler unroll loops over a known shape."""
 scalar = _decorator("scalar")
-"""A kernel of numbers that Python, and functions compiled elsewhere, may call as well."""
+"""A kernel with scalar arguments, which Python and other compiled functions may also call."""
 intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
 """A function that gives the type of a call in a kernel and builds its machine code."""
 
@@ -125,16 +125,16 @@ intrinsic: Callable[[Any], Any] = _decorator("intrinsic")
 
 
 def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
-    """Return the NumPy type of an aligned record for kernels.
+    """Return the NumPy dtype of an aligned record for kernels.
 
-    ``fields`` has the types of its fields by name, in order.
+    ``fields`` maps the names of the fields, in order, to their types.
     """
     return np.dtype(list(fields.items()), align=True)
 
 
 @inlined
 def fill_row(row: Any, values: Any) -> None:
-    """Copy the first numbers of ``values`` into ``row``, in place, as many as both have."""
+    """Copy the first n numbers of ``values`` into ``row``, in place; n is the smaller length."""
     for j in range(min(len(row), len(values))):
         row[j] = values[j]
 
@@ -349,7 +349,7 @@ def _remove_old(root: Path, current: Path) -> None:
 @cache
 def _command_id() -> int:
     """Return the id of the process that started this one as a worker, or else of this one."""
-    parent = multiprocessing.parent_process()
+    parent = parent_process()
     return (parent.pid if parent else None) or os.getpid()
 
 
@@ -359,10 +359,11 @@ def _log_once(message: str) -> None:
 
 
 class _MachineCode:
-    """Machine code of a function on disk, as Numba's dispatchers ask for it.
+    """Cache of a function's machine code on disk, with the interface of Numba's caches.
 
-    If several processes need the same code, one compiles it and the others wait, at most 120 s,
-    provided that files can be locked. Code that is damaged or cannot be stored is compiled again.
+    If several processes need the same code, one process compiles the code and the other processes
+    wait, at most 120 s, provided that files can be locked. Code that is damaged or cannot be stored
+    is compiled again.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:

@@ -82,9 +82,9 @@ def largest_square(length: float) -> float:
 
 @inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
-    """Return a number of steps for which the hand certainly stays out of a disc.
+    """Return a lower bound of the number of steps until the hand can enter a disc.
 
-    The number is usually not an integer. It is 0 if the hand may be in the disc.
+    The bound is usually not an integer. The bound is 0 if the hand may be in the disc already.
 
     Parameters
     ----------
@@ -129,9 +129,9 @@ def clear_steps(square: float, rim: float, closing: float, slowness: float, bend
 def divide_steps(slots: SlotArrays, count: int, model: Any) -> bool:
     """Divide the movements in the first ``count`` slots into steps, in place.
 
-    This sets rates, bounds and numbers of steps; ``distance``, which :func:`start` has filled with
-    its square, becomes the length of the movement. Return whether all link angles certainly stay
-    below 1e5 rad in size (:func:`winding`).
+    The function sets the rates, bounds and numbers of steps. ``distance``, which :func:`start` has
+    set to the squared length of the movement, becomes the length. Return whether all link angles
+    certainly stay below 1e5 rad in size (:func:`winding`).
     """
     large, step = 0, model.step
     # In a step no joint turns by more than the step, and the base moves at most this far.
@@ -182,12 +182,13 @@ def _place_between(slots: SlotArrays, count: int, step: float) -> None:
 def check(slots: SlotArrays, count: int, stop_on_arrival: bool, rims: Any, squares: Any) -> int:
     """Evaluate the stopping rule of the movements in the first ``count`` slots, in place.
 
-    This sets ``status`` and, where a movement goes on, ``step``, which becomes the next step that
-    can end the movement. Return how many movements have ended. A movement ends
+    The function sets ``status``. Where a movement goes on, it also sets ``step`` to the next step
+    that can end the movement. Return how many movements have ended. A movement ends
 
     - at its last step;
     - with the hand within ``rims[0]`` (in length units) of the goal's centre; or
-    - with ``stop_on_arrival``, also within ``rims[1]`` of where the target brings the hand.
+    - if ``stop_on_arrival`` is True, also with the hand within ``rims[1]`` of the position that the
+      hand has at the target.
 
     ``squares`` are the squares of ``rims`` (:func:`largest_square`).
     """
@@ -312,10 +313,10 @@ def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 
 @inlined
 def _corner(run: RunRecord, waypoints: Any, k: int, j: int, noisy: bool) -> Any:
-    """Return entry ``j`` of corner ``k`` of a path: -1 is where the run stands, 0 the first of the
-    ``waypoints``.
+    """Return entry ``j`` of corner ``k`` of a path.
 
-    With noise, ``run.end`` has the displacement of the last waypoint, NaN where nothing moves.
+    Corner -1 is the present configuration of the run, corner k >= 0 is waypoint k. With noise,
+    ``run.end`` has the displacement of the last waypoint, NaN where nothing moves.
     """
     if k < 0 or (noisy and math.isnan(run.end[j])):
         return run.q[j]
@@ -367,12 +368,13 @@ def _segment_length(run: RunRecord, waypoints: Any, k: int, model: Any) -> float
 
 @inner
 def follow(run: RunRecord, waypoints: Any, robot: RobotRecord, slots: SlotArrays) -> None:
-    """Move a run along a path, until its hand hits the goal or stands at the last waypoint.
+    """Move a run along a path until its hand hits the goal or the path ends.
 
     ``waypoints`` has shape ``(W, dof)``. Point k of n = ceil(length / m) lies k m along the path;
-    point n is the last waypoint. With noise, waypoint k of W is displaced by k / W of one
-    displacement, in the coordinates that any waypoint moves. ``q``, ``hit`` and ``ticks`` of the
-    run are set, and ``evaluations`` grows by one for each point. Slot 0 is work space.
+    point n is the last waypoint. With noise, one displacement is drawn, and waypoint k of W is
+    displaced by k / W times that displacement, in the coordinates that any waypoint moves. ``q``,
+    ``hit`` and ``ticks`` of the run are set, and ``evaluations`` grows by one for each point. Slot
+    0 is work space.
     """
     model, last = robot.model, len(waypoints) - 1
     noisy = model.motor_noise > 0.0
@@ -435,10 +437,10 @@ def _point(
 def follow_paths(
     count: int, offset: int, movements: Any, waypoints: Any, robot: RobotRecord, batch: Batch
 ) -> None:
-    """Let each of the first ``count`` runs whose action is to follow a path do so.
+    """Follow the path of each of the first ``count`` runs whose action is :data:`FOLLOW`.
 
-    Row ``offset`` + n of ``movements``, shape ``(N, 3)``, has the action of run n, and the indices
-    in ``waypoints`` of its first waypoint and of the waypoint after its last.
+    Row ``offset`` + n of ``movements``, shape ``(N, 3)``, belongs to run n. The row has the action,
+    and the start and the end (exclusive) of the run's range of rows in ``waypoints``.
     """
     for i in range(count):
         run = batch.runs[i]

@@ -1,16 +1,16 @@
-"""Motor noise: standard normal numbers that depend only on what they are drawn for.
+"""Motor noise: standard normal numbers from a counter-based generator without state.
 
 A number is a function of
 
-- the world: a seed, and the number of the draw, such as the number of the trial;
+- the seed of the noise, and the number of the draw, such as the number of the trial;
 - the goal, and the number of the movement that is made for this goal, from 0;
 - the coordinate of the configuration.
 
-There is no sequence of random numbers. So no number depends on the order of trials, on the other
-runs of a batch or on the number of threads, and two solutions that are executed with the same seed
-and draw meet the same noise (*common random numbers*).
+The numbers are not a sequence. So no number depends on the order of trials, on the other runs of a
+batch or on the number of threads. Two solutions that are executed with the same seed and draw have
+the same noise (*common random numbers*).
 
-The arguments are hashed in turn by SplitMix64 (Steele, Lea & Flood 2014, *Fast splittable
+The arguments are hashed one after another by SplitMix64 (Steele, Lea & Flood 2014, *Fast splittable
 pseudorandom number generators*, OOPSLA), and the hash becomes a normal number by its inverse
 distribution function, algorithm AS 241 (Wichura 1988, *The percentage points of the normal
 distribution*, Applied Statistics 37:477-484; relative error 1e-16). The logarithm is a series,
@@ -28,7 +28,7 @@ from coartic.motion.kernels.compile import inlined, inner
 from coartic.motion.kernels.slots import RobotRecord, RunRecord, squared_distance
 
 STAYS = 1e-9
-"""Change up to which a coordinate does not move, in length units or rad."""
+"""Largest change of a coordinate that does not count as movement, in length units or rad."""
 MAX_CORRECTIONS = 50
 """Largest number of corrective movements for one goal where movements are noisy."""
 _WORD = np.uint64
@@ -116,8 +116,8 @@ def _key_of_movement(run: RunRecord) -> Any:
 def miss_target(run: RunRecord, robot: RobotRecord) -> None:
     """Displace the ``end`` of a run's aimed movement by noise, in place.
 
-    Coordinate c, which moves if its target differs by more than 1e-9 from where the robot stands,
-    ends at t_c + s z_c. Other coordinates end where they are.
+    Coordinate c moves if its target t_c differs by more than 1e-9 from its present value. It then
+    ends at t_c + s z_c. Other coordinates keep their present values.
     """
     sd, key = robot.model.motor_noise, _key_of_movement(run)
     if robot.grows:
@@ -129,7 +129,7 @@ def miss_target(run: RunRecord, robot: RobotRecord) -> None:
 
 @inlined
 def displace_path(run: RunRecord, waypoints: Any, robot: RobotRecord) -> None:
-    """Set ``end`` of a run that follows a path to the displacement of its last waypoint, in place.
+    """Set ``end`` of a run to the noisy displacement of the last waypoint of its path.
 
     ``target`` is the last of the ``waypoints``, shape ``(W, dof)``. The displacement is s z_c in
     each coordinate that any waypoint moves, and NaN in the others.

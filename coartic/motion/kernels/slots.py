@@ -1,11 +1,11 @@
-"""Arrays with which the compiled kernels move many arms side by side.
+"""Data layout with which the compiled kernels move many arms side by side.
 
-A *run* is a robot that makes a trial; a batch has a record for each run. A *slot* holds the arm of
-a run while it moves or is corrected. The innermost loop of a kernel runs over slots, so that the
-compiler turns it into vector instructions. The number of links belongs to the type of the rows, so
-that loops over links are unrolled. No operation mixes slots, and none is reordered or fused. The
-result of a slot therefore depends neither on other slots nor on their number or the width of the
-vectors.
+A *run* is a robot that makes a trial; a *batch* has a record for each run. A *slot* is a column of
+arrays that holds the arm of a run while the arm moves or is corrected. The innermost loop of a
+kernel runs over slots, so that the compiler turns it into vector instructions. The number of links
+belongs to the type of the rows, so that loops over links are unrolled. No operation combines
+numbers of different slots, and the compiler may not reorder or fuse operations. The result of a
+slot therefore does not depend on the other slots, the number of slots or the width of the vectors.
 
 Robot parameters are one record, because Numba looks at every field of a tuple each time it calls a
 kernel.
@@ -36,14 +36,14 @@ RobotRecord = Any
 RunRecord = Any
 """Record of a run, that is, a robot that makes a trial (:func:`batch_for`)."""
 SlotArrays = Any
-"""Record of the slots' arrays by name; the last axis of each array is the slot (:func:`layout`)."""
+"""Record with a field for each array of the slots; the last axis is the slot (:func:`layout`)."""
 
 
 def _links_for(robot: Robot) -> int:
     """Return the number of links per arm for which a robot's kernels are compiled.
 
-    The number is 4 or 8 if no arm has more links, so that most robots share machine code. Otherwise
-    it is :attr:`Robot.max_links`.
+    The number is rounded up to 4 or 8, so that most robots share machine code. For arms with more
+    than 8 links it is :attr:`Robot.max_links`.
     """
     return 4 if robot.max_links <= 4 else max(robot.max_links, 8)
 
@@ -51,8 +51,8 @@ def _links_for(robot: Robot) -> int:
 def width_of(robot: Robot) -> int:
     """Return the number of entries of a robot's configuration in records of kernels.
 
-    The ``dof`` entries of the robot come first. Unused entries follow, up to a base and two arms of
-    :func:`_links_for` links each.
+    The width is that of a robot with two arms of :func:`_links_for` links. The first ``dof``
+    entries are the robot's configuration; the other entries are unused.
     """
     return BASE_DOF + 2 * _links_for(robot)
 
@@ -102,8 +102,8 @@ def robot_parameters(
         Coordinates of the base that the corrective process does not change.
     model : MotionModel
     checks : bool
-        True if an arm without a target stays when its hand is in the goal already; False if the
-        corrective process begins at once.
+        True if an arm without a target does not move when its hand is in the goal already; False if
+        the corrective process begins at once.
     grows : bool
         True if the motor noise of aimed movements grows with their length.
 
@@ -152,7 +152,7 @@ class Batch(NamedTuple):
     runs: Any
     """Records of the N runs, shape ``(N,)``."""
     slots: Any
-    """The rows of the slots by name (:func:`layout`): a record in an array of shape ``(1,)``."""
+    """The arrays of the slots (:data:`SlotArrays`): a record in an array of shape ``(1,)``."""
     corrected: Any
     """The rows of ``slots`` that a correction needs, in the same memory, shape ``(rows, SLOTS)``.
     Only copy columns: some rows hold integers."""
@@ -199,7 +199,7 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
 
 @cache
 def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
-    """Return the type of :data:`SlotArrays`, and which of its rows are copied together.
+    """Return the dtype of :data:`SlotArrays`, and the ranges of rows that are copied together.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def load(slots: SlotArrays, slot: int, number: int, run: RunRecord, arm: Arm) ->
 def squared_distance(run: RunRecord) -> float:
     """Return the squared Euclidean distance from a run's configuration to its target.
 
-    By this distance postures are chosen, in every world.
+    Under every motion model, postures are compared by this distance.
     """
     square = 0.0
     for j in range(len(run.q)):
@@ -291,8 +291,8 @@ def squared_distance(run: RunRecord) -> float:
 def squared_length(run: RunRecord, model: Any) -> float:
     """Return the squared length of the movement from a run's configuration to its ``end``.
 
-    The length is in the norm of ``model``, with its weight of the base. A movement of this length
-    takes as many steps as the length has parts of ``model.step``.
+    The length is in the norm of ``model``, with its weight of the base. The number of steps of the
+    movement is the length divided by ``model.step``, rounded up.
     """
     square = 0.0
     for j in range(len(run.q)):
@@ -358,7 +358,7 @@ def padded_count(count: int) -> int:
 
 @inlined
 def winding(q: Any, slot: int) -> float:
-    """Return an upper bound on the size of each link's angle to the x axis (in rad).
+    """Return an upper bound on the absolute link angles of an arm (in rad).
 
     The bound is the sum of the sizes of the joint angles of the arm in a slot. ``q`` has a column
     for each slot.

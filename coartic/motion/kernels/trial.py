@@ -1,4 +1,4 @@
-"""Trials: the rule that executions, learners and environments follow, goal by goal.
+"""The rule of trials, goal by goal, that executions, learners and environments share.
 
 A run is one of many robots that make trials side by side. At each goal it passes through five
 phases (paper, sections *Generating Movement for Each Goal* and *The Corrective Process*):
@@ -8,8 +8,8 @@ phases (paper, sections *Generating Movement for Each Goal* and *The Corrective 
 3. *move*: the robot moves to the target. Without a target it only checks whether its hand is in the
    goal already.
 4. *correct*: if the goal is missed, the corrective process **A** looks for a configuration that
-   hits it, and the robot moves there.
-5. *account*: what happened is written down. The trial goes on if the goal is hit.
+   hits the goal, and the robot moves to that configuration.
+5. *account*: the results at the goal are recorded. The trial goes on if the goal is hit.
 
 Two loops consist of these phases: :func:`reach_kernel` moves to given targets, and
 :mod:`coartic.learner.kernel` explores around learned targets. The result of a run depends neither
@@ -36,15 +36,16 @@ COUNTED = (
     *("movement_ticks", "forward_kinematics", "corrective_iterations"),
     *("corrections", "failed_trials"),
 )
-"""Counters of :class:`~coartic.method.Meter` that the kernels update: the columns of counts."""
+"""Names of the counters of :class:`~coartic.method.Meter` that the kernels update, in the order of
+the columns of the arrays ``counts``."""
 TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
 GoalAccount = Any
-"""Record of what happened at a goal (:func:`account_type`)."""
+"""Record of the results at one goal of a trial (:func:`account_type`)."""
 
 
 @cache
 def account_type(width: int) -> np.dtype[np.void]:
-    """Return the NumPy type of the account of a goal in a trial.
+    """Return the NumPy dtype of the record of one goal in a trial.
 
     Configurations have ``width`` entries. If there are several movements to targets for a goal,
     each has a record with its ``target`` and ``moved``; all other fields are in the first record.
@@ -72,8 +73,8 @@ def account_type(width: int) -> np.dtype[np.void]:
 def set_off(run: RunRecord, q: Any, seed: Any, draw: Any, robot: RobotRecord) -> None:
     """Start the trial of a run at configuration ``q``, shape ``(dof,)``, in place.
 
-    ``going`` becomes True and ``evaluations`` 0. The noise of the trial is that of draw ``draw`` of
-    the world with ``seed``, 64 bits. Other fields stay.
+    ``going`` becomes True and ``evaluations`` 0. The trial has draw ``draw`` of the motor noise
+    with the 64-bit seed ``seed``. Other fields do not change.
     """
     fill_row(run.q, q)
     run.going, run.evaluations = True, 0
@@ -100,8 +101,8 @@ def begin(run: RunRecord, number: int, goal: Any) -> None:
 def aim(run: RunRecord, target: Any) -> None:
     """Set the target of a run, in place: phase 2, *aim*.
 
-    Where an entry of ``target`` is NaN, base or joint stays. Unless all entries are NaN, the next
-    action becomes to move. ``target`` has at least ``dof`` entries.
+    A coordinate whose entry of ``target`` is NaN does not move. Unless all entries are NaN, the
+    next action becomes :data:`MOVE`. ``target`` has at least ``dof`` entries.
     """
     for j in range(len(target)):
         if not math.isnan(target[j]):
@@ -111,7 +112,7 @@ def aim(run: RunRecord, target: Any) -> None:
 
 @inlined
 def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
-    """Write a run's result for its goal into an account: phase 5, *account*.
+    """Write a run's results at its goal into a record: phase 5, *account*.
 
     ``moved`` is the number of ticks of the run's movements to targets. If the run missed its goal,
     its trial ends. The run's count of evaluations becomes 0.
@@ -129,7 +130,7 @@ def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
 
 @inlined
 def count_goal(goal: GoalAccount, counts: Any) -> None:
-    """Add the numbers in a goal's account to a trial's counts, in place.
+    """Add the numbers in a goal's record to a trial's counts, in place.
 
     ``counts`` has shape ``(5,)``: ticks, evaluations, iterations, corrections and failures.
     """
@@ -144,34 +145,34 @@ def count_goal(goal: GoalAccount, counts: Any) -> None:
 
 
 class Requests(NamedTuple):
-    """Movements that the kernel is to make: N arms reach for G goals each.
-
-    There are M movements for each goal of an arm.
-    """
+    """Requested trials of the kernel: N arms, G goals, and M movements for each goal."""
 
     starts: Configs
     """Starting configurations, shape ``(N, dof)``, or ``(1, dof)`` if all arms start alike."""
     hands: Hands
     """Hand for each goal, 0 left or 1 right, shape ``(N, G)``."""
     targets: Configs
-    """Targets, shape ``(N, G, M, dof)``, in length units and rad; NaN for entries that stay, and
-    the last waypoint of a path. The first movement for a goal is always made, further ones only
-    while the goal is missed."""
+    """Targets, shape ``(N, G, M, dof)``, in length units and rad; NaN for coordinates that do not
+    move. The target of a path is its last waypoint. The first movement for a goal is always made,
+    further movements only while the goal is missed."""
     movements: NDArray[np.int64]
-    """How each movement is made, shape ``(N, G, M, 3)``: the action
-    :data:`~coartic.motion.kernels.move.MOVE`, ``REPEAT`` or ``FOLLOW``, and for a path the indices
-    in ``waypoints`` of its first waypoint and of the one after its last. Empty if all movements end
-    on arrival as well (``MOVE``)."""
+    """Action and waypoints of each movement, shape ``(N, G, M, 3)``:
+
+    - the action :data:`~coartic.motion.kernels.move.MOVE`, ``REPEAT`` or ``FOLLOW``;
+    - for a path, the start and the end (exclusive) of its range of rows in ``waypoints``.
+
+    The array is empty if the action of all movements is ``MOVE``.
+    """
     waypoints: Configs
     """Waypoints of all paths, shape ``(W, dof)``."""
     goals: Points
     """Centres of the goals, shape ``(N, G, 2)``, or ``(1, G, 2)`` if all arms have the same
     goals."""
     first: int
-    """Number in the task of the first of the goals, from 0."""
+    """Index in the task of the first goal of ``goals``, from 0."""
     worlds: NDArray[np.uint64]
-    """Seed of the world and number of the draw of each trial, shape ``(N, 2)``, or ``(1, 2)`` if
-    they are the same for all."""
+    """Seed of the noise and number of the noise draw for each trial, shape ``(N, 2)``, or ``(1,
+    2)`` if they are the same for all trials."""
 
 
 NO_REWARD = -(2**63 - 1)
@@ -200,8 +201,8 @@ def _reach_lot(
     """Let ``count`` arms from index ``offset`` on reach for their goals, in place.
 
     ``count`` is at most the number of runs of ``batch``. ``arms`` are :class:`Requests`, and
-    ``robot`` is a :data:`RobotRecord`. This function fills the accounts ``goals``, shape ``(N, G,
-    M)``, and adds to ``counts``, shape ``(N, 5)``, which the caller sets to 0 before.
+    ``robot`` is a :data:`RobotRecord`. This function fills the records ``goals``, shape ``(N, G,
+    M)``, and adds to ``counts``, shape ``(N, 5)``, which the caller has set to 0.
     """
     for i in range(count):
         n, run = offset + i, batch.runs[i]
