@@ -38,11 +38,11 @@ LONG = World("radius-0.02-long", "radius 0.02, 100,000 trials", {}, 0.02, 100_00
 """A world that is described, not judged."""
 CONTROL, CONTROL_OF_PAIRS = "control", "control-pairs"
 """Names of the folders of the planted control, on random tasks and on pairs of tasks."""
-CONTROL_SETS = 80
+CONTROL_SETS = 40
 """Sets of runs of random search that take the learner's place. The runs of a set have numbers after
 those of the runs with which the study compares the learner: one on each random task, and
 :data:`RUNS_OF_PAIRS` on each task of a pair."""
-CONTROL_SETS_OF_PAIRS = 40
+CONTROL_SETS_OF_PAIRS = 20
 """The same for pairs of tasks."""
 PAPER = ("ascending", "descending", "two-armed-1", "two-armed-2")
 FAMILIES = ("one-armed", "two-armed", "aligned")

@@ -93,9 +93,8 @@ def test_the_first_verdicts_are_those_of_the_runs_that_the_first_matrix_had():
             of_task = made_up().query("task == 'one-armed/v1/i0'")
             later = of_task.run > 0  # later runs turn the sign of the learner's gain
             ticks = of_task.ticks.mask(later & (of_task.method == "learner"), 300.0)
-            parts.append(
-                of_task.assign(world=world, task=f"one-armed/v1/i{task}", ticks=ticks + task / 10)
-            )
+            ticks = ticks + task * of_task.method.map(METHODS.index) / 8
+            parts.append(of_task.assign(world=world, task=f"one-armed/v1/i{task}", ticks=ticks))
     runs = pd.concat(parts)
     found = STUDY.tabulate(runs, leans).verdict
     first = STUDY.first_verdicts(runs, leans)
