@@ -38,15 +38,19 @@ LONG = World("radius-0.02-long", "radius 0.02, 100,000 trials", {}, 0.02, 100_00
 """A world that is described, not judged."""
 CONTROL, CONTROL_OF_PAIRS = "control", "control-pairs"
 """Names of the folders of the planted control, on random tasks and on pairs of tasks."""
-CONTROL_SETS = 40
+CONTROL_SETS = 80
 """Sets of runs of random search that take the learner's place. The runs of a set have numbers after
 those of the runs with which the study compares the learner: one on each random task, and
 :data:`RUNS_OF_PAIRS` on each task of a pair."""
+CONTROL_SETS_OF_PAIRS = 40
+"""The same for pairs of tasks."""
 PAPER = ("ascending", "descending", "two-armed-1", "two-armed-2")
 FAMILIES = ("one-armed", "two-armed", "aligned")
 INSTANCES = "i200..i219"
-STAGES = ("one-run", "families", "paper", "hill-climbing")
+STAGES = ("one-run", "families", "hill-climbing", "paper")
 """Parts of a world's runs, in the order in which they are made in all worlds."""
 RUNS = {"one-run": 1, "families": 3, "paper": 20}
 """Runs of a method on a task of the paper, and on a random one, where CMA-ES has one run."""
 RUNS_OF_PAIRS = 5
+FULL_AT_FIRST = ("paper", "maximum")
+"""Worlds whose random tasks had all runs when the matrix was first made; the others had one."""

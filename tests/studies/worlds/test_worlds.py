@@ -78,6 +78,32 @@ def test_verdicts():
     assert [unsure.all_tasks, unsure.without, unsure.verdict] == ["holds", "holds", "open"]
 
 
+def test_the_first_verdicts_are_those_of_the_runs_that_the_first_matrix_had():
+    leans = pd.DataFrame(
+        [
+            {"world": "maximum", "pair": f"i{pair}", "part": part, "method": method,
+             "lean": 10.0 + pair, "asked": 10, "failed": 0}
+            for pair in range(5) for part in ("all", "joints")
+            for method in ("learner", "random-search")
+        ]
+    )  # fmt: skip
+    parts = []
+    for world in ("maximum", "base-4"):
+        for task in range(8):
+            of_task = made_up().query("task == 'one-armed/v1/i0'")
+            later = of_task.run > 0  # later runs turn the sign of the learner's gain
+            ticks = of_task.ticks.mask(later & (of_task.method == "learner"), 300.0)
+            parts.append(
+                of_task.assign(world=world, task=f"one-armed/v1/i{task}", ticks=ticks + task / 10)
+            )
+    runs = pd.concat(parts)
+    found = STUDY.tabulate(runs, leans).verdict
+    first = STUDY.first_verdicts(runs, leans)
+    for world, verdict in (("maximum", "reversed"), ("base-4", "holds")):
+        row = f"learner-gains {world} one-armed"
+        assert [found[row], first[row]] == ["reversed", verdict]
+
+
 def test_worlds_differ_in_one_thing_each_and_their_tasks_in_nothing_else(tmp_path):
     for world in SETTINGS.WORLDS.values():
         changed = len(world.model) + (world.radius is not None)
@@ -127,6 +153,8 @@ def test_the_shipped_matrix_follows_from_the_shipped_rows():
              "policy-gradient-ahead": ("learner", "policy-gradient")}  # fmt: skip
     of_task = {}
     for row in rows:
+        if row["world"] == SETTINGS.LONG.name:
+            continue  # described, without a verdict
         of_task.setdefault((row["world"], row["group"], row["task"]), []).append(row)
     values = {}
     for (world, group, _), runs in of_task.items():
