@@ -153,7 +153,9 @@ def name_in_figure(study: Study, method: str, longest: int = _LONGEST_NAME) -> s
         row = study.methods.loc[method]
         values = study.varied.loc[method].items()
         words = values_in_words({str(name): value for name, value in values})
-        words += f", {default_name(str(row.base))}" * (not row.setting) + MARK * row.title.endswith(MARK)
+        words += f", {default_name(str(row.base))}" * (not row.setting) + MARK * row.title.endswith(
+            MARK
+        )
         return "\n".join(textwrap.wrap(words, _LONGEST_NAME // 2 if style.is_narrow() else longest))
     if style.is_narrow():
         return "\n".join(textwrap.wrap(study.methods.short[method], _LONGEST_NAME // 2))
