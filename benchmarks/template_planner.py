@@ -30,7 +30,7 @@ class Planner(Method):
         for number, goal in enumerate(session.goals, 1):  # goals count from 1
             postures = [(hand, self.posture(session, q, hand, goal)) for hand in session.hands]
             lengths = [
-                (np.abs(posture - q).max(), hand, posture)
+                (float(np.linalg.norm(posture - q)), hand, posture)
                 for hand, posture in postures
                 if posture is not None
             ]

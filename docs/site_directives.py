@@ -192,6 +192,7 @@ def first_screen() -> Iterator[str]:
     text = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
     _, opening, first, *_ = re.split(r"(?m)^# .*\n|^(?=## )", text)
     text = re.sub(r"(?<=\]\()studies/(\w+)/README\.md", r"studies/\1.md", opening + first)
+    text = re.sub(r"(?<=\]\()studies/(?=\w+/\w+\.svg)", "../studies/", text)
     yield re.sub(r"(?m)^## ", "### ", re.sub(r"(?<=\]\()docs/", "", text))
 
 

@@ -693,7 +693,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
     """
     learned, curves = improvements(study), [pd.DataFrame()]
     for task, label, runs in _runs_with_curves(study, learned):
-        at = np.unique(np.round(np.geomspace(1, int(runs.trials.min()), 120)).astype(np.int64))
+        at = np.unique(np.round(np.geomspace(1, int(runs.trials.min()), 100)).astype(np.int64))
         # Rewards are NaN until a run has a solution, and the mean is NaN until all runs have one.
         best = np.array([best_after(learned[run_id], at) for run_id in runs.run_id])
         if np.isnan(best).any(axis=0).all():

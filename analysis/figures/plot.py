@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import wraps
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from matplotlib.figure import Figure
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
-from coartic.analysis.methods import COLORS, MARKS
+from coartic.analysis.methods import COLORS, MARK, MARKS, default_name, values_in_words
 from coartic.analysis.standings import reference
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, ending_of, id_of, number
@@ -145,8 +146,17 @@ def name_in_figure(study: Study, method: str, longest: int = _LONGEST_NAME) -> s
     """Return the name of a method (a label) for the figure that is being drawn.
 
     It is the method's title, or its short name in a narrow figure. A name of more than ``longest``
-    letters, or of 24 in a narrow figure, has several lines.
+    letters, or of 24 in a narrow figure, has several lines. In a study that varies parameters the
+    name is their values alone, because all settings are of one method.
     """
+    if method in study.varied.index:
+        row = study.methods.loc[method]
+        values = study.varied.loc[method].items()
+        words = values_in_words({str(name): value for name, value in values})
+        words += f", {default_name(str(row.base))}" * (not row.setting) + MARK * row.title.endswith(
+            MARK
+        )
+        return "\n".join(textwrap.wrap(words, _LONGEST_NAME // 2 if style.is_narrow() else longest))
     if style.is_narrow():
         return "\n".join(textwrap.wrap(study.methods.short[method], _LONGEST_NAME // 2))
     return "\n".join(textwrap.wrap(study.methods.title[method], longest))
@@ -214,7 +224,9 @@ def for_page(plot: Plot) -> str:
 
     def shorten(attribute: re.Match[str]) -> str:  # lengths to tenths of a point
         cut = re.sub(r"\.0\b", "", re.sub(r"(\.\d)\d+", r"\1", attribute[0]))
-        return re.sub(r"\s*\b([MLQCzZ])\s*", r"\1", cut) if cut.startswith("d=") else cut
+        if not cut.startswith("d="):
+            return cut
+        return _with_short_lines(re.sub(r"\s*\b([MLQCzZ])\s*", r"\1", cut))
 
     none = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     settings = {**style.RC, "svg.fonttype": "none"}
@@ -249,6 +261,24 @@ def for_page(plot: Plot) -> str:
         f"<style>{rules}</style>"
         f"{body.replace('xlink:href', 'href').strip().removesuffix('</svg>')}</g></svg>"
     )
+
+
+def _with_short_lines(path: str) -> str:
+    """Return a path of SVG whose points have at most one decimal, its lines as differences.
+
+    Examples
+    --------
+    >>> _with_short_lines("M10 20.5L11.5 20.5L12 19.5L10 20.5z")
+    'M10 20.5l1.5 0 .5 -1 -2 1z'
+    """
+
+    def shorten(lines: re.Match[str]) -> str:
+        points = [[round(10 * float(x)) for x in p.split()] for p in lines[0].split("L")]
+        steps = [(b - a) / 10 for p, q in pairwise(points) for a, b in zip(p, q, strict=True)]
+        words = (re.sub(r"^(-?)0\.", r"\1.", f"{step:g}") for step in steps)
+        return f"{lines[0].partition('L')[0]}l{' '.join(words)}"
+
+    return re.sub(r"(?<=M)[-\d. ]+(?:L[-\d. ]+)+", shorten, path)
 
 
 def panels_for_page(plot: Plot) -> list[str]:
