@@ -38,7 +38,7 @@ LONG = World("radius-0.02-long", "radius 0.02, 100,000 trials", {}, 0.02, 100_00
 """A world that is described, not judged."""
 CONTROL, CONTROL_OF_PAIRS = "control", "control-pairs"
 """Names of the folders of the planted control, on random tasks and on pairs of tasks."""
-CONTROL_SETS = 40
+CONTROL_SETS = 100
 """Sets of runs of random search that take the learner's place. The runs of a set have numbers after
 those of the runs with which the study compares the learner: one on each random task, and
 :data:`RUNS_OF_PAIRS` on each task of a pair."""

@@ -360,10 +360,17 @@ def legend_line(label, **look):
     return Line2D([], [], label=label, linestyle="", marker="o", **look)
 
 
+SHOWN = [
+    *("paper", "maximum", "noise-0.01", "base-0.25", "base-0.5", "base-2", "base-4"),
+    *("radius-0.02", "radius-0.05", "radius-0.3"),
+]
+"""Worlds in the order in which the figure shows them; they ran in another."""
+
+
 @figures.styled
 def draw(table):
     """Draw the matrix: estimate and interval of each cell with a verdict; open cells stay blank."""
-    worlds = [name for name in WORLDS if (table.world == name).any()]
+    worlds = [name for name in sorted(WORLDS, key=SHOWN.index) if (table.world == name).any()]
     figure, panels = figures.panels((len(CLAIMS), 1), (figures.TWO, 7.6), sharex=True)
     for axes, claim in zip(panels, CLAIMS, strict=True):
         cells = table[(table.claim == claim) & table.verdict.isin(["holds", "reversed"])]
