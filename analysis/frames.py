@@ -36,7 +36,7 @@ from coartic.runs.plan import label_of, world_title
 SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
-LEAST_GAIN = 0.01
+MIN_GAIN = 0.01
 """Smallest possible gain of which there are shares in noise, as a share of the best known reward:
 smaller ones are about as large as the standard errors of the two means."""
 DUPLICATE = (
@@ -156,7 +156,7 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
 
     Both are NaN if the value or the best known reward is NaN. ``share`` is also NaN if zero is NaN,
     or not below the best known reward; in noise also if zero is on average less than 1 % below it
-    (:data:`LEAST_GAIN`), because the share would be chance.
+    (:data:`MIN_GAIN`), because the share would be chance.
 
     Raises
     ------
@@ -180,7 +180,7 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     possible = columns.best_known - columns[ZERO]
     refuse_rows(columns, ZERO, (possible < 0) & ~columns.is_noisy, highest)
     of_task = possible.groupby(columns.best_known).transform("mean")  # in noise zeros differ by run
-    is_chance = columns.is_noisy & (of_task < LEAST_GAIN * columns.best_known.abs())
+    is_chance = columns.is_noisy & (of_task < MIN_GAIN * columns.best_known.abs())
     possible = possible.where((possible > 0) & ~is_chance)
     return columns.assign(share=(columns.value - columns[ZERO]) / possible)
 

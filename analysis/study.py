@@ -88,7 +88,7 @@ def typical_run(runs: pd.DataFrame) -> str:
 
 Part = Literal["solution", "replay"]
 """Part of a run that can be executed."""
-MOST_EXECUTED = 500
+MAX_EXECUTED = 500
 """Largest number of runs of a method on a task that are executed again and have signatures."""
 
 
@@ -684,7 +684,7 @@ class Study:
         if part not in self._movements:
             ids = {*self.stored.run_id}
             with open_results(self.folder) as store:
-                stored = store.movements(part, MOST_EXECUTED)
+                stored = store.movements(part, MAX_EXECUTED)
             self._movements[part] = {key: stored[key] for key in stored if key in ids}
         return self._movements[part]
 

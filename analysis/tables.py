@@ -90,8 +90,8 @@ from coartic.analysis.words import (
 )
 from coartic.estimates import (
     FEWER_RESAMPLES,
-    FEWEST,
     LEVEL,
+    MIN_VALUES,
     Estimate,
     difference_of_means,
     mean,
@@ -491,7 +491,7 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
             rewards, learned = (solved(cell).value.to_numpy(np.float64) for cell in (runs, learner))
             if len(rewards) == len(runs) and len(learned) == len(learner):
                 ahead.append(bool(rewards.mean() > learned.mean()))
-                if min(len(learned), len(rewards) if stochastic else FEWEST) < FEWEST:
+                if min(len(learned), len(rewards) if stochastic else MIN_VALUES) < MIN_VALUES:
                     tests.append(Estimate(math.nan))
                 elif stochastic:
                     tests.append(exchange_test(learned, rewards, "two-sided"))

@@ -45,8 +45,8 @@ from coartic.tasks.task import letters_of
 _EPSILON = 0.2  # probability of a random hand, for each goal
 _GROWTH = 1.5  # factor of the one-fifth rule
 _SHRINKAGE = 1.0 / math.sqrt(math.sqrt(_GROWTH))  # square roots round alike on all machines
-_LARGEST_SPREAD = 0.3  # under the one-fifth rule, in length units and rad
-_MOST_DRAWN = 128  # largest number of trials that are drawn ahead
+_MAX_SPREAD = 0.3  # under the one-fifth rule, in length units and rad
+_MAX_DRAWN_TRIALS = 128  # largest number of trials that are drawn ahead
 
 
 class HillClimbingParameters(SequenceParameters):
@@ -129,7 +129,7 @@ class HillClimbing(Method):
             if since[hands] == window:
                 factor = _GROWTH if good[hands] > window / 5 else _SHRINKAGE
                 wanted = max(spreads[hands] * factor, parameters.floor)
-                spreads[hands] = min(wanted, _LARGEST_SPREAD)
+                spreads[hands] = min(wanted, _MAX_SPREAD)
                 since[hands] = good[hands] = 0
 
         def begin(hands: str) -> Array:
@@ -167,7 +167,7 @@ class HillClimbing(Method):
                     attempt = attempts.run_targets(drawn, targets, until=thresholds)
                     tried = len(attempt.rewards)
                     rng.bit_generator.state = states[tried]
-                    hands, ahead = drawn[tried - 1], min(2 * ahead, _MOST_DRAWN)
+                    hands, ahead = drawn[tried - 1], min(2 * ahead, _MAX_DRAWN_TRIALS)
                     if attempt.rewards[-1] > rewards[hands]:
                         ahead = tried
                     if is_learned:

@@ -67,7 +67,7 @@ from coartic.tasks.task import letters_of
 _STEP_SIZE = 0.02  # first step size of CMA-ES, in length units (base) and rad (joints)
 _SEARCH = 0x73656172  # key of the worlds in which the search executes solutions
 _JUDGED = 10  # times as many executions judge a solution as find it
-MOST_KEPT = 64  # hand sequences whose shortest paths are stored with the solution
+MAX_KEPT = 64  # hand sequences whose shortest paths are stored with the solution
 
 
 class OptimumParameters(Parameters):
@@ -136,7 +136,7 @@ class OptimumSearch(Method):
         details = {
             "path_length": plans.ranked[0].cost,
             "path_lengths": {
-                letters_of(plan.instance.hands): plan.cost for plan in plans.ranked[:MOST_KEPT]
+                letters_of(plan.instance.hands): plan.cost for plan in plans.ranked[:MAX_KEPT]
             },
             "solves": plans.solves,
             "failed_solves": plans.failed,

@@ -29,7 +29,7 @@ from pydantic import Field, model_validator
 
 from coartic.baselines.uninformed import Attempts
 from coartic.internal.validation import sentence_error
-from coartic.learner.conditions import MOST_NOISE
+from coartic.learner.conditions import MAX_NOISE
 from coartic.learner.learning import runs_at_once
 from coartic.method import TRIALS, Facts, Method, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
@@ -44,7 +44,7 @@ class RandomSearchHandsParameters(Parameters):
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Number of trials of a run, including those in which only the corrective process acts."""
-    sigma: Annotated[float, Field(gt=0, le=MOST_NOISE)] = 0.05
+    sigma: Annotated[float, Field(gt=0, le=MAX_NOISE)] = 0.05
     """Standard deviation of the noise on each explored joint, in length units (base) and rad
     (joints). The default is the learner's."""
     stages: Annotated[int, Field(ge=1)] = 1

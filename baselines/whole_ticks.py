@@ -22,7 +22,7 @@ from coartic.method import Session
 from coartic.motion.doors import move, scale_base
 from coartic.robot import Array
 
-MOST_ROUNDINGS = 64  # roundings of a plan that are tried; up to seven goals have no more
+MAX_ROUNDINGS = 64  # roundings of a plan that are tried; up to seven goals have no more
 _SLACK = 1e-6  # part of a step: lengths have the solver's tolerance
 _BEYOND = tuple(1 << k for k in range(11))  # numbers of steps from the configuration to the target
 
@@ -82,7 +82,7 @@ class Rounding:
             itertools.product(*choices),
             key=lambda steps: float(np.abs(np.array(steps) - exact).sum()),
         )
-        for steps in ranked[:MOST_ROUNDINGS]:
+        for steps in ranked[:MAX_ROUNDINGS]:
             rounded = self.divide(plan, list(steps), merged)
             if rounded is not None:
                 yield rounded

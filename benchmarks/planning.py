@@ -28,8 +28,8 @@ from coartic.benchmarks.suites import (
     tasks_of,
 )
 from coartic.internal.limits import (
-    MOST_RUNS,
-    MOST_SEED,
+    MAX_RUNS,
+    MAX_SEED,
     check_limits,
     plain_values,
 )
@@ -63,8 +63,8 @@ def _runs_asked(value: Any) -> int | range | None:
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:
         if value is not None:
-            check_limits("runs", last, 1, MOST_RUNS)
-            check_limits("its first run", first, 0, MOST_RUNS)
+            check_limits("runs", last, 1, MAX_RUNS)
+            check_limits("its first run", first, 0, MAX_RUNS)
     except ValueError as error:
         example = "range(50, 100), or 50..99 in a command"
         raise sentence_error(f"{error}, or a range, such as {example}") from None
@@ -95,7 +95,7 @@ class Request(FileData):
     trials: TrialCount | None = None
     """Trials of each run, for methods that have this parameter; by default the number of the
     suite, or else of the method."""
-    seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)] = 0
+    seed: Annotated[int, Field(ge=0, le=MAX_SEED, strict=True)] = 0
     """Seed of the suite."""
     time_limit_s: Seconds | None = None
     """Limit of the CPU time of a job, in s; by default the limit of the suite."""

@@ -34,11 +34,11 @@ from coartic.runs.plan import Cell, Job, size_of, trials_in
 from coartic.runs.record import UNREPEATED, Row
 from coartic.runs.store import Store, writing
 
-_LEAST_BATCH = 8
+_MIN_BATCH = 8
 """Smallest number of runs of a job whose method performs runs side by side, if its cell has as
 many."""
-_MOST_TRIALS = 400_000
-"""Largest number of trials of a job with more than :data:`_LEAST_BATCH` runs. They take some
+_MAX_TRIALS = 400_000
+"""Largest number of trials of a job with more than :data:`_MIN_BATCH` runs. They take some
 seconds, which is what an interruption can lose."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
@@ -359,17 +359,17 @@ def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
         for begin in range(0, len(job.numbers), size):
             yield replace(job, numbers=job.numbers[begin : begin + size])
 
-    share = max(math.ceil(size_of(jobs) / workers), _LEAST_BATCH)
+    share = max(math.ceil(size_of(jobs) / workers), _MIN_BATCH)
     parts: list[Job] = []
     for job in jobs:
         method, parameters = job.cell.method, job.cell.parameters
         allowed = method.configure(parameters).max_batch() if method.is_ours else 1
-        quick = max(_MOST_TRIALS // (trials_in(parameters) or 1), _LEAST_BATCH)
+        quick = max(_MAX_TRIALS // (trials_in(parameters) or 1), _MIN_BATCH)
         parts += divide(job, min(allowed, share, quick))
     even = len(parts) - len(parts) % workers
     ordered, last_parts = parts[:even], parts[even:]
     for job in last_parts:
-        size = max(math.ceil(len(job.numbers) * len(last_parts) / workers), _LEAST_BATCH)
+        size = max(math.ceil(len(job.numbers) * len(last_parts) / workers), _MIN_BATCH)
         ordered += divide(job, size)
 
     def trials(job: Job) -> float:

@@ -15,7 +15,7 @@ from pydantic import Field, PlainValidator, ValidationError
 from pydantic_core import PydanticCustomError
 
 from coartic import CoarticError, Task, builtin_tasks, parse_task
-from coartic.internal.limits import MOST_RUNS, MOST_SECONDS, MOST_TRIALS
+from coartic.internal.limits import MAX_RUNS, MAX_SECONDS, MAX_TRIALS
 from coartic.internal.text import Line, plain, unknown
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain, sentence_error
@@ -23,7 +23,7 @@ from coartic.model import WORLD, MotionModel, check_model
 from coartic.robot import Finite
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.families import named_by, shipped_families
-from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN
+from coartic.tasks.task import MAX_NAME_LENGTH, NAME_PATTERN
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
@@ -44,9 +44,9 @@ def _plain_value(value: Any) -> _Plain:
     raise PydanticCustomError("scalar", "{text}", {"text": problem})
 
 
-RunCount = Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True)]
-TrialCount = Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True)]
-Seconds = Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True)]
+RunCount = Annotated[int, Field(ge=1, le=MAX_RUNS, strict=True)]
+TrialCount = Annotated[int, Field(ge=1, le=MAX_TRIALS, strict=True)]
+Seconds = Annotated[float, Field(ge=1e-3, le=MAX_SECONDS, strict=True)]
 _Value = Annotated[_Plain, PlainValidator(_plain_value)]
 _SOME = Field(min_length=1)
 _Names = Annotated[tuple[str, ...], _SOME]
@@ -127,7 +127,7 @@ class _Block(FileData):
 class Suite(FileData):
     """Content of a suite file."""
 
-    name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]
+    name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=MAX_NAME_LENGTH)]
     """Name of the suite; by default the name of its file without ``.toml``."""
     title: Line
     """Title in lists and reports."""

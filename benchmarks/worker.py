@@ -37,7 +37,7 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 
 
 _OUTCOMES = TypeAdapter(list[Outcome])
-_LONGEST_DETAILS = 10_000_000
+_MAX_DETAILS_LENGTH = 10_000_000
 _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError, RecursionError
 """Errors that malformed data raises."""
 
@@ -227,8 +227,8 @@ def _plain_details(details: Any) -> dict[str, Any]:
     more than 10,000,000 characters.
     """
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
-    if len(text) > _LONGEST_DETAILS:
+    if len(text) > _MAX_DETAILS_LENGTH:
         raise ValueError(
-            f"details have {len(text):,} characters; at most {_LONGEST_DETAILS:,} are allowed"
+            f"details have {len(text):,} characters; at most {_MAX_DETAILS_LENGTH:,} are allowed"
         )
     return dict(json.loads(text.encode()))

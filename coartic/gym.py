@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import MissingExtraError, NotApplicableError
 from coartic.estimates import Estimate, mean
-from coartic.internal.limits import MOST_CELLS, brief_value, check_limits, real_array
+from coartic.internal.limits import MAX_CELLS, brief_value, check_limits, real_array
 from coartic.method import Method, MethodError, run_method
 from coartic.method.optimisers import FAILED
 from coartic.model import PAPER, MotionModel, model_from
@@ -40,11 +40,11 @@ from coartic.motion.trials import (
     world_seed,
     worlds_of,
 )
-from coartic.robot import HANDS, LARGEST_FIGURE, Array
+from coartic.robot import HANDS, MAX_NUMBER, Array
 from coartic.tasks.catalogue import as_task, builtin_tasks
 from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
 from coartic.tasks.optima import best_shipped
-from coartic.tasks.task import MOST_GOALS, Split, Task
+from coartic.tasks.task import MAX_GOALS, Split, Task
 
 try:
     import gymnasium
@@ -145,7 +145,7 @@ class TaskEnv(gymnasium.Env):
         model: MotionModel | Mapping[str, Any] = PAPER,
         render_mode: str | None = None,
     ) -> None:
-        check_limits("ahead", ahead, 0, MOST_GOALS)
+        check_limits("ahead", ahead, 0, MAX_GOALS)
         self.model, self.render_mode = model_from(model), render_mode
         instances = {"split": split, "count": count, "year": year}
         self.options = {"task": task, "ahead": ahead, "model": self.model} | instances
@@ -168,7 +168,7 @@ class TaskEnv(gymnasium.Env):
         self._joints += [f"{hand}_{k + 1}" for hand in hands for k in range(links)]
         self._view, joints, self._has_flags = ahead + 1, len(self._joints), fewest < links
         sizes = [self._view, 2 * self._view + joints, joints * self._has_flags]
-        high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
+        high = np.repeat([1.0, MAX_NUMBER, 1.0], sizes).astype(np.float32)
         self.observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
         self.action_space = Box(-1.0, 1.0, (len(hands) - 1 + joints,), np.float32)
         self.number, self.going = -1, False
@@ -511,7 +511,7 @@ def score(
     >>> table.reward.to_dict()  # doctest: +ELLIPSIS
     {'policy': -319.0, 'random actions': ..., 'corrective process': -319.0, 'best known': -292.0}
     """
-    check_limits("episodes", episodes, 1, MOST_CELLS)
+    check_limits("episodes", episodes, 1, MAX_CELLS)
     env = gymnasium.make(env, **options) if isinstance(env, str) else env
     inner, wrappers = _layers(env)[-1], _wrappers_of(env)
     if not isinstance(inner, TaskEnv):

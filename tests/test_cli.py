@@ -412,7 +412,7 @@ REFUSED = (
 @pytest.mark.usefixtures("in_this_process")
 def test_an_option_that_has_no_effect_is_refused(coartic, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(film, "LONGEST", 3)  # films are short
+    monkeypatch.setattr(film, "MAX_FRAMES", 3)  # films are short
     monkeypatch.setattr(film, "PAUSE", 1)
     monkeypatch.setattr(film, "HOLD", 1)
     Path("near.toml").write_text(NEAR, "utf-8")

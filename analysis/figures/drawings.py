@@ -66,7 +66,7 @@ from coartic.analysis.tables import (
     values_of_parameters,
 )
 from coartic.analysis.words import capital, interval, listed, marked, number, titled_apart
-from coartic.estimates import FEWEST, Estimate
+from coartic.estimates import MIN_VALUES, Estimate
 from coartic.internal.text import counted
 from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot
 from coartic.robot import Array
@@ -97,7 +97,7 @@ def _draw_parameters(study: Study) -> Parts | None:
     shown = [*dict.fromkeys(rows.parameter)]
     shape = style.grid(len(shown))
     size = (style.TWO if len(shown) > 1 else style.ONE), 2.1 * shape[0] + 0.2
-    drawing, panels = style.panels(shape, size, len(shown), style.LEAST_SMALL_PANEL, sharey=True)
+    drawing, panels = style.panels(shape, size, len(shown), style.MIN_SMALL_PANEL, sharey=True)
     is_alone, is_few = len(values) == 1, False
     thin: Any = {"color": style.GREY, "linewidth": 0.8, "zorder": 1}
     for place, (axes, parameter) in enumerate(zip(panels, shown, strict=True)):
@@ -118,7 +118,7 @@ def _draw_parameters(study: Study) -> Parts | None:
             axes.plot(at, 100 * of_parameter.at_best, "--", **thin)
         by_value = [gaps_of_settings(study, value.labels) for value in values[parameter]]
         for x, gaps in zip(at, by_value, strict=True):
-            few = 1 < int(gaps.groupby("task").size().min()) < FEWEST
+            few = 1 < int(gaps.groupby("task").size().min()) < MIN_VALUES
             by_run = 100 * gaps.groupby("run").mean() if few else gaps[:0]
             axes.plot([x] * len(by_run), by_run, ".", **_FEW, color=style.BLUE)
             is_few |= few
@@ -146,7 +146,7 @@ def _draw_parameters(study: Study) -> Parts | None:
         + ". n = {n} runs of a value."
         + " Dashed: the gap at the best setting of the other parameters." * has_thin
         + " Thin: the gap on each task." * (is_alone and 1 < len(tasks) <= 8)
-        + f" Small points: runs, if there are fewer than {FEWEST}." * is_few
+        + f" Small points: runs, if there are fewer than {MIN_VALUES}." * is_few
         + " A circle marks the default." * bool((rows.default != "").any())
     )
     return drawing, rows, f"{alt}.", more
@@ -191,7 +191,7 @@ def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
     """
     runs = runs_on(study, str(row["method"]), ranked_tasks(study))
     gaps = 100 * runs.groupby("run").gap.mean()
-    return list(gaps) if 1 < runs.groupby("task").size().min() < FEWEST else []
+    return list(gaps) if 1 < runs.groupby("task").size().min() < MIN_VALUES else []
 
 
 def _draw_gaps(study: Study) -> Parts | None:
@@ -262,7 +262,7 @@ def _draw_gaps(study: Study) -> Parts | None:
     more += " Grey lines: the gap on each task." * bool(on_tasks)
     more += " The axis is logarithmic from 0.1 % on." * is_log
     more += " Methods that are run once have no interval." * (not all(rows.stochastic))
-    more += f" Small points: runs, if there are fewer than {FEWEST}." * any(few.values())
+    more += f" Small points: runs, if there are fewer than {MIN_VALUES}." * any(few.values())
     return drawing, rows, alt, more + (f" Bold: {listed(bold)}." if bold else "")
 
 
@@ -629,7 +629,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
     size = _width_of((rows, columns)), min(2.2 * rows + 0.5, style.TALLEST)
     if style.is_narrow():
         size = style.ONE, 1.4 * rows + 0.4
-    drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
+    drawing, panels = style.panels((rows, columns), size, len(tasks), style.MIN_SMALL_PANEL)
     looks = looks_in(study, labels)
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
         of_task = data[data.task == task.name]
@@ -864,7 +864,7 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     size = style.ONE if size[0] <= style.ONE else style.TWO, size[1]  # one column, or two
     if style.is_narrow():
         size = style.ONE, size[1] * style.ONE / size[0] + 0.4 * rows
-    drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
+    drawing, panels = style.panels((rows, columns), size, len(tasks), style.MIN_SMALL_PANEL)
     drawing.set_layout_engine("compressed")  # otherwise a title can extend beyond the edge
     for axes, task, corners in zip(panels, tasks, boxes, strict=True):
         draw_robot(axes, task, task.q0, colour=style.GREY)

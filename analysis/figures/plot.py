@@ -34,7 +34,7 @@ from coartic.internal.threads import environment
 from coartic.runs.plan import world_title
 
 FORMATS = (".svg", ".pdf", ".png")
-_LONGEST_NAME = 48  # longest line of a name, in characters; half as many in a narrow figure
+_MAX_NAME_LENGTH = 48  # longest line of a name, in characters; half as many in a narrow figure
 _NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # replaces the user's value, so that no date is written
 
 
@@ -142,7 +142,7 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     return looks
 
 
-def name_in_figure(study: Study, method: str, longest: int = _LONGEST_NAME) -> str:
+def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -> str:
     """Return the name of a method (a label) for the figure that is being drawn.
 
     It is the method's title, or its short name in a narrow figure. A name of more than ``longest``
@@ -156,9 +156,11 @@ def name_in_figure(study: Study, method: str, longest: int = _LONGEST_NAME) -> s
         words += f", {default_name(str(row.base))}" * (not row.setting) + MARK * row.title.endswith(
             MARK
         )
-        return "\n".join(textwrap.wrap(words, _LONGEST_NAME // 2 if style.is_narrow() else longest))
+        return "\n".join(
+            textwrap.wrap(words, _MAX_NAME_LENGTH // 2 if style.is_narrow() else longest)
+        )
     if style.is_narrow():
-        return "\n".join(textwrap.wrap(study.methods.short[method], _LONGEST_NAME // 2))
+        return "\n".join(textwrap.wrap(study.methods.short[method], _MAX_NAME_LENGTH // 2))
     return "\n".join(textwrap.wrap(study.methods.title[method], longest))
 
 

@@ -73,7 +73,7 @@ from coartic.analysis.words import (
     p_value,
 )
 from coartic.errors import CoarticError
-from coartic.estimates import FEWEST
+from coartic.estimates import MIN_VALUES
 from coartic.internal.text import counted, error_line, one_line
 from coartic.method import TRIALS
 from coartic.runs.plan import world_title
@@ -81,7 +81,7 @@ from coartic.runs.plan import world_title
 Made = TypeVar("Made")
 RUNS = 20
 """Number of runs of each experiment of the paper."""
-NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer runs as points."
+NEEDS_RUNS = f"An interval or a test needs {MIN_VALUES} runs; figures show fewer runs as points."
 
 
 IN_NOISE = (

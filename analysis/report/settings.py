@@ -24,10 +24,10 @@ from coartic.analysis.standings import (
 from coartic.analysis.study import Study
 from coartic.analysis.tables import list_differences, list_parameters, values_of_parameters
 from coartic.analysis.words import interval, listed, number
-from coartic.estimates import FEWEST, LEVEL
+from coartic.estimates import LEVEL, MIN_VALUES
 
-TOO_FEW = f" (too few runs to test, which needs {FEWEST})"
-MOST_NAMED = 3
+TOO_FEW = f" (too few runs to test, which needs {MIN_VALUES})"
+MAX_NAMED = 3
 """Most settings that are named because they cannot be told apart from the best."""
 
 
@@ -63,10 +63,10 @@ def _best_setting(study: Study, rows: pd.DataFrame) -> str:
         f"to the {reference(study, ranked_tasks(study))} is "
         f"{interval(rows.loc[best], 'gap', scale=100, unit=' %')}."
     ]
-    named = alike[:MOST_NAMED] or unlike[:1]
+    named = alike[:MAX_NAMED] or unlike[:1]
     with_gaps = [f"{_words(study, label)} ({_gap_of(rows.gap[label])})" for label in named]
     if alike:
-        if more := alike[MOST_NAMED:]:
+        if more := alike[MAX_NAMED:]:
             with_gaps.append(f"and {len(more)} more (up to {_gap_of(max(rows.gap[more]))})")
         sentences.append(f"It cannot be told apart from {'; '.join(with_gaps)}.")
     elif unlike:

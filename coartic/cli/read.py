@@ -19,7 +19,7 @@ from coartic.cli.terminal import Display, complain, say, say_pairs, say_table
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
-from coartic.internal.limits import MOST_RUNS
+from coartic.internal.limits import MAX_RUNS
 from coartic.internal.text import counted, one_line
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def _say_ranking_of_world(study: Study) -> None:
     from coartic.analysis.report.sections import SECTIONS, finding, limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
-    from coartic.estimates import FEWEST
+    from coartic.estimates import MIN_VALUES
     from coartic.runs.record import MOTOR_NOISE
 
     methods, notes = standings(study), limits(study)
@@ -165,8 +165,8 @@ def _say_ranking_of_world(study: Study) -> None:
         pairs.append(("", f"for {listed(notes['unknown'])} no reward is known"))
     stochastic = study.methods.stochastic
     counts = [len(of) for (_, label), of in study.cells.items() if stochastic[label]]
-    if notes["failed"] < notes["runs"] and min(counts, default=FEWEST) < FEWEST:
-        enough = max(FEWEST, *counts)  # fewer would leave out runs of this folder
+    if notes["failed"] < notes["runs"] and min(counts, default=MIN_VALUES) < MIN_VALUES:
+        enough = max(MIN_VALUES, *counts)  # fewer would leave out runs of this folder
         pairs.append(("Intervals", f"too few runs to test: make {enough} (--runs {enough})"))
     if notes["failed"]:
         reasons = "; ".join(notes["reasons"])
@@ -177,7 +177,7 @@ def _say_ranking_of_world(study: Study) -> None:
 
 def verify(
     folder: given.ResultsFolder,
-    again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
+    again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MAX_RUNS)] = 0,
     run: Annotated[
         list[str] | None,
         given.option(

@@ -19,7 +19,7 @@ from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
 from coartic.internal.text import counted, one_line, unknown
-from coartic.internal.threads import MOST_JOBS
+from coartic.internal.threads import MAX_JOBS
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import CheckResult
@@ -56,7 +56,7 @@ def run(
     ] = None,
     jobs: Annotated[
         int | None,
-        given.within("--jobs", "Number of processes; by default one for each core.", 1, MOST_JOBS),
+        given.within("--jobs", "Number of processes; by default one for each core.", 1, MAX_JOBS),
     ] = None,
     tasks: Annotated[
         list[str] | None,

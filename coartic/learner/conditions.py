@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 METHOD_PREFIX = "dual-process/"
 """Prefix of the names of the learner's methods; the id of the exploration condition follows."""
-MOST_NOISE = 100.0
+MAX_NOISE = 100.0
 """Largest standard deviation of noise that is accepted, in length units and rad."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Drift = Annotated[float, Field(ge=0, le=10)]
@@ -114,7 +114,7 @@ class ExplorationCondition:
     """
     epsilon: Share = 0.2
     """ε: probability with which the hand for a goal is explored (published)."""
-    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
+    noise_sd: Annotated[float, Field(ge=0, le=MAX_NOISE, allow_inf_nan=False)] = 0.05
     """Standard deviation of the noise η (published), in length units (base) and rad (joints)."""
     corrects: bool = True
     """True if the corrective process **A** acts when a movement to a stored target misses its goal.

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError
 from coartic.internal.limits import (
-    MOST_RUN_SEED,
-    MOST_RUNS,
-    MOST_TRIALS,
+    MAX_RUN_SEED,
+    MAX_RUNS,
+    MAX_TRIALS,
     brief_value,
     check_limits,
 )
@@ -49,8 +49,8 @@ from coartic.motion.trials import (
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, letters_of
 
-_MOST_STORED = 200_000_000  # trials of one call; each takes 9 bytes
-_MOST_IN_BATCH = 4_000_000  # trials of runs whose rewards fit into one answer of a worker
+_MAX_STORED_TRIALS = 200_000_000  # trials of one call; each takes 9 bytes
+_MAX_BATCH_TRIALS = 4_000_000  # trials of runs whose rewards fit into one answer of a worker
 
 
 def runs_at_once(trials: int) -> int:
@@ -59,7 +59,7 @@ def runs_at_once(trials: int) -> int:
     The number is chosen so that the runs together make at most 4,000,000 trials; it is at least 1
     and at most 72.
     """
-    return max(1, min(SLOTS, _MOST_IN_BATCH // trials))
+    return max(1, min(SLOTS, _MAX_BATCH_TRIALS // trials))
 
 
 def learn(
@@ -186,10 +186,10 @@ def learn_many(
     condition = load_condition(condition)
     if reason := condition.why_not(task):
         raise NotApplicableError(reason)
-    check_limits("trials", trials, 1, MOST_TRIALS)
+    check_limits("trials", trials, 1, MAX_TRIALS)
     if isinstance(seeds, str | bytes) or not isinstance(seeds, Iterable):
         raise TypeError(f"seeds is {brief_value(seeds)}; it must be a list of integers")
-    trials, limit = int(trials), min(MOST_RUNS, _MOST_STORED // trials)
+    trials, limit = int(trials), min(MAX_RUNS, _MAX_STORED_TRIALS // trials)
     ordered = [*islice(seeds, limit + 1)]
     if len(ordered) > limit:
         raise ValueError(
@@ -197,7 +197,7 @@ def learn_many(
             "because all rewards are stored. Run some seeds in another call"
         )
     for seed in ordered:
-        check_limits("seed", seed, 0, MOST_RUN_SEED)
+        check_limits("seed", seed, 0, MAX_RUN_SEED)
     ordered = [int(seed) for seed in ordered]
     if len({*ordered}) < len(ordered):
         duplicate = next(seed for seed in ordered if ordered.count(seed) > 1)

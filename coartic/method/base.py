@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.dataclasses import dataclass as checked_dataclass
 
 from coartic.errors import NotApplicableError
-from coartic.internal.limits import MOST_RUN_SEED, check_limits
+from coartic.internal.limits import MAX_RUN_SEED, check_limits
 from coartic.internal.validation import in_sentences
 from coartic.method.session import Information, MethodError, Session
 from coartic.model import PAPER, WORLD, MotionModel, check_model, differences
@@ -337,7 +337,7 @@ def run_method(
         raise NotApplicableError(reason)
     built_in = (getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES)
     is_ours = any(type(method) in methods for methods in built_in)
-    check_limits("seed", seed, 0, MOST_RUN_SEED)
+    check_limits("seed", seed, 0, MAX_RUN_SEED)
     session = Session(chosen, int(seed), method.information, model=model, trusted=is_ours)
     result = method.solve(session)
     session.check_solution(result.solution)

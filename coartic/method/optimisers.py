@@ -18,8 +18,8 @@ from pydantic import Field
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import (
-    MOST_RUN_SEED,
-    MOST_TRIALS,
+    MAX_RUN_SEED,
+    MAX_TRIALS,
     WIDTHS,
     brief_value,
     check_limits,
@@ -27,7 +27,7 @@ from coartic.internal.limits import (
 )
 from coartic.internal.text import counted
 from coartic.method import (
-    MOST_COUNT,
+    MAX_COUNT,
     TRIALS,
     BudgetError,
     Information,
@@ -42,7 +42,7 @@ from coartic.model import PAPER, MotionModel
 from coartic.motion.initial_hands import sequences_with, too_many_sequences
 from coartic.motion.solution import Movement, movements_of
 from coartic.motion.trials import Accounts, HandSequences, compiled_task, make_trials
-from coartic.robot import HANDS, LARGEST_ENTRY, Array, Configs, Hands
+from coartic.robot import HANDS, MAX_ENTRY, Array, Configs, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.optima import KnownOptimum, best_shipped
 from coartic.tasks.task import Task, letters_of
@@ -176,7 +176,7 @@ class Objective:
         check_limits("half_width", half_width, *WIDTHS)
         self._session, self._task, self._process = session, task, os.getpid()
         limits = [limit for limit in (trials, session.trials_left) if limit is not None]
-        self._end = session.trials_made + min(limits, default=MOST_COUNT)
+        self._end = session.trials_made + min(limits, default=MAX_COUNT)
         sequences = sequences_of(session) if hands is None else [hands]
         sequences = sequences[: self._trials_left(len(sequences))]
         shape = (len(sequences), session.goals_count, session.dof)
@@ -454,7 +454,7 @@ class Objective:
                 "many(x) takes points as rows"
             )
         # Points with NaN or large entries need a closer check.
-        if hands is not None or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
+        if hands is not None or not math.hypot(*point.tolist()) < MAX_ENTRY:
             return float(self.many(point[None], hands)[0])
         with self._session.lock:
             self._trials_left(1)
@@ -582,7 +582,7 @@ class Objective:
 
         Raises ValueError for an infinite entry, and for a goal with both NaN and other entries.
         """
-        if points.min(initial=0.0) >= -LARGEST_ENTRY and points.max(initial=0.0) <= LARGEST_ENTRY:
+        if points.min(initial=0.0) >= -MAX_ENTRY and points.max(initial=0.0) <= MAX_ENTRY:
             return
         missing = (np.isnan(self._targets_of(points)) & self.joints).sum(axis=2)
         in_part = (missing > 0) & (missing < self.joints.sum(axis=1))
@@ -667,7 +667,7 @@ def objective(
     """
     chosen = as_task(task)
     if budget is not None:
-        check_limits("budget", budget, 1, MOST_TRIALS)
+        check_limits("budget", budget, 1, MAX_TRIALS)
     goals = len(chosen.goals)
     reason = too_many_sequences(chosen.name, goals, len(chosen.hands))
     if hands is None and reason:
@@ -677,7 +677,7 @@ def objective(
             f"budget is {budget}; it takes {counted(count, 'trial')} to choose among the hand "
             f"sequences of task {chosen.name!r}: raise the budget, or pass the hands to use"
         )
-    check_limits("seed", seed, 0, MOST_RUN_SEED)
+    check_limits("seed", seed, 0, MAX_RUN_SEED)
     information = OPTIMISER_INFORMATION | {Information.NOISE_DRAWS}
     session = Session(chosen, int(seed), information, model=model)
     return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)

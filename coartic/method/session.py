@@ -171,7 +171,7 @@ class Meter:
 
 
 Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
-MOST_COUNT = 2**63 - 1
+MAX_COUNT = 2**63 - 1
 """Largest count that can be stored."""
 
 
@@ -754,7 +754,7 @@ class Session:
         for name, count in counts.items():
             if name not in allowed:
                 raise ValueError(f"a method cannot set counter {name!r}, only {', '.join(allowed)}")
-            left = MOST_COUNT - getattr(self._meter, name)
+            left = MAX_COUNT - getattr(self._meter, name)
             check_limits(f"counter {name!r}", count, 0, left)
         self._meter.add(**counts)
 

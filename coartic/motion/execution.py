@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.limits import MOST_RUN_SEED, MOST_RUNS, brief_value, check_limits
+from coartic.internal.limits import MAX_RUN_SEED, MAX_RUNS, brief_value, check_limits
 from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel, check_model, refuse_noise
 from coartic.motion.doors import line_points, path_points
@@ -53,7 +53,7 @@ from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands
 
 _ACTIONS = {"learned": MOVE, "planned": MOVE, "corrective": REPEAT, "path": FOLLOW}
-_MOST_NOISE = 100.0  # standard deviation, in length units and rad
+_MAX_NOISE = 100.0  # standard deviation, in length units and rad
 _AT_ONCE = 4096  # noisy executions, which limits the memory
 
 
@@ -474,8 +474,8 @@ def execute_noisy(
     >>> execute_noisy("ascending", [solution], 0.01, 100, seed=0).shape
     (1, 100)
     """
-    check_limits("motor_noise", motor_noise, 0.0, _MOST_NOISE)
-    check_limits("repeats", repeats, 1, MOST_RUNS)
+    check_limits("motor_noise", motor_noise, 0.0, _MAX_NOISE)
+    check_limits("repeats", repeats, 1, MAX_RUNS)
     if not isinstance(signal_dependent, bool | np.bool_):
         raise TypeError(f"signal_dependent is {brief_value(signal_dependent)}; it must be a bool")
     if not isinstance(solutions, Iterable):
@@ -609,7 +609,7 @@ def _seeds(seed: Any, count: int) -> list[int]:
             f"seed has {len(seeds)} entries; it must have one for each of the {count} solutions"
         )
     for value in seeds[:1] if not isinstance(seed, Iterable) else seeds:
-        check_limits("seed", value, 0, MOST_RUN_SEED)
+        check_limits("seed", value, 0, MAX_RUN_SEED)
     return [int(value) for value in seeds]
 
 

@@ -23,7 +23,7 @@ from coartic.motion.trials import (
 from coartic.robot import HANDS, Hand
 from coartic.tasks.task import WITHOUT_REACH, Task, letters_of
 
-MOST_SEQUENCES = 4096  # largest number of hand sequences that are all tried
+MAX_SEQUENCES = 4096  # largest number of hand sequences that are all tried
 
 
 def ranked_sequences(
@@ -123,9 +123,9 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
     its hands.
     """
     count = hands**goals
-    if count <= MOST_SEQUENCES:
+    if count <= MAX_SEQUENCES:
         return None
-    return f"task {task!r} has {count} hand sequences; at most {MOST_SEQUENCES} are tried"
+    return f"task {task!r} has {count} hand sequences; at most {MAX_SEQUENCES} are tried"
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:

@@ -34,7 +34,7 @@ from coartic.motion.kernels.trial import (
     reach_kernel,
 )
 from coartic.motion.kernels.trial import NO_REWARD as NO_REWARD
-from coartic.robot import HANDS, LARGEST_ENTRY, Array, Configs, Hands, Points, Robot
+from coartic.robot import HANDS, MAX_ENTRY, Array, Configs, Hands, Points, Robot
 from coartic.tasks.task import Task, check_hands, hands_of
 
 
@@ -104,7 +104,7 @@ def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Account
     """Let N arms reach for G goals in order, and return the records.
 
     An arm that misses a goal makes no movement for later goals. A trial with a target beyond
-    :data:`LARGEST_ENTRY` fails without a movement; nothing else is checked. ``parameters`` come
+    :data:`MAX_ENTRY` fails without a movement; nothing else is checked. ``parameters`` come
     from :func:`robot_parameters`. Many arms are divided among threads.
     """
     count, goals, moves, _ = arms.targets.shape
@@ -209,7 +209,7 @@ def reach_goals(
     codes = finite_array("hands", hands, (count,)).astype(np.int64)
     if not (np.isin(codes, range(len(HANDS))) & (codes == hands)).all():
         raise ValueError(f"hands is {brief_value(hands)}; each entry must be 0 (left) or 1 (right)")
-    check_limits("radius", radius, 1e-9, LARGEST_ENTRY)
+    check_limits("radius", radius, 1e-9, MAX_ENTRY)
     check_exact(model, radius=radius)
     arms = Requests(
         starts=starts,

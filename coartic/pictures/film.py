@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 RATE = 12.5
 """Frames per second. GIF needs an integer number of hundredths of a second for a frame."""
-LONGEST = 125
+MAX_FRAMES = 125
 """Largest number of frames of a film, without pauses. In longer movements each frame stands for
 several ticks."""
 PAUSE, HOLD = 6, 30
@@ -78,7 +78,7 @@ def write_film(
     lengths = [len(movement.configurations) for _, movement in movements]
     if 0 in lengths:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
-    stride, end = math.ceil(max(lengths) / LONGEST), max(lengths) - 1
+    stride, end = math.ceil(max(lengths) / MAX_FRAMES), max(lengths) - 1
     hits = {int(hit) for _, movement in movements for hit in movement.hits}
     rows = sorted({*range(0, end, stride), *hits, end})
     shown = [row for row in rows

@@ -9,7 +9,7 @@ const PRACTICE = 1.05; // factor by which the number of trials shown grows from 
 const FIRST_SEEN = 0.05; // where that number begins: the first trial is shown for a second, until it reaches 2
 const HOLD_S = 0.9; // pause at a hit
 const DRIFTS = [0, 0.03, 0.1, 0.3, 1]; // κ, how far exploration leans towards the next goal
-const MOST_GOALS = 6;
+const MAX_GOALS = 6;
 const FAR = 12; // largest coordinate of a goal or angle of a joint, length units or rad
 const STRIDE = 2; // distance to a new goal, for arms of length 4
 const ROLES = ["first", "second"];
@@ -200,9 +200,9 @@ class Play {
         order(`${k} run ${seed}`, announced ? announced.task : task, job);
       }
       if (who === "plan") order(`${k} plan`, task, { horizon: this.state.ahead, turn: 0 });
-      else order(`${k} far`, task, { horizon: MOST_GOALS });
+      else order(`${k} far`, task, { horizon: MAX_GOALS });
     });
-    if (announced) order("0 before", announced.task, { horizon: MOST_GOALS });
+    if (announced) order("0 before", announced.task, { horizon: MAX_GOALS });
     this.asked = new Map(jobs.map((job) => [job.key, JSON.stringify(job)]));
     // Do not compute results again that exist already.
     this.fresh = new Set([...this.asked.keys()].filter((key) => {
@@ -601,7 +601,7 @@ class Play {
     if (state.who === "you" || (main.length < 2 && state.who !== "alone")) {
       const saved = main[0].trial.reward - this.alone[0].reward;
       const [{ hands, goals }] = this.problems;
-      const tried = hands.length ** goals.length <= MOST_SEQUENCES ? "best hands" : "hands";
+      const tried = hands.length ** goals.length <= MAX_SEQUENCES ? "best hands" : "hands";
       const used = hands.length > 1 ? ` (${tried} ${letters_of(this.alone[0].hands)})` : "";
       const runs = this.practised(0).length;
       if (state.who === "learner" && this.shown === 1) return ["In the first trial only the corrective process acts. Practice follows."];
@@ -948,7 +948,7 @@ class Play {
     const { state } = this;
     if (!this.data.presets[state.preset]) state.preset = this.first.preset;
     const { task, others = null } = this.preset;
-    const limit = Math.max(MOST_GOALS, task.goals.length);
+    const limit = Math.max(MAX_GOALS, task.goals.length);
     const places = (name) => state[name] && state[name].filter((row) => row.length === 2).slice(0, limit).map((place) => this.within(place));
     const [goals, second, announced] = ["goals", "others", "announced"].map(places);
     state.goals = goals && goals.length ? goals : task.goals;
@@ -994,10 +994,10 @@ class Play {
     ["who", "reward"].forEach((name) => this.find(name).querySelectorAll("input").forEach((input) => { input.checked = input.value === state[name]; }));
     this.find("two").checked = Boolean(others);
     this.find("announced").textContent = `Move goal ${this.moved + 1} now`;
-    const [few, full] = [goals.length < 2, goals.length >= MOST_GOALS];
+    const [few, full] = [goals.length < 2, goals.length >= MAX_GOALS];
     this.set("disabled", { reset: !changed && !state.own && !trials && drift === this.first.drift, two: few, fewer: few, announced: few, add: full });
     this.find("goad").textContent = this.optimum ? "Can you reach the proven optimum?" : `Can you beat the ${PLANNER}?`;
-    this.find("why").textContent = (few && "The only goal cannot be removed, and has no next goal.") || (full && `A task can have at most ${MOST_GOALS} goals here.`) || "";
+    this.find("why").textContent = (few && "The only goal cannot be removed, and has no next goal.") || (full && `A task can have at most ${MAX_GOALS} goals here.`) || "";
     const other = who !== "learner";
     this.set("hidden", {
       runs: !runs.length, "for-learner": other, "for-drift": other, "for-two": other || hasOneHand,

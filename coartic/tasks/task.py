@@ -27,15 +27,15 @@ from coartic.internal.text import Line, counted, did_you_mean, plain
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.model import PAPER, PAPER_RADIUS
-from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
+from coartic.robot import HANDS, MAX_LINKS, Array, Finite, Hand, Length, Robot
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
 INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")
 LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
 TASK_FOLDER = Path(__file__).parent / "paper"
 
-MOST_GOALS = 256
-LONGEST_NAME = 64
+MAX_GOALS = 256
+MAX_NAME_LENGTH = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 """Form of the names of tasks and suites, which become file names and parts of commands."""
 _IN_FAMILY = r"^([a-z][a-z0-9-]*/v[1-9][0-9]?/)?"
@@ -126,10 +126,10 @@ class Start(FileData):
 
     base: Point = (0.0, 0.0)
     """Centre of the base (in length units)."""
-    left: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
+    left: Annotated[tuple[Finite, ...], Field(max_length=MAX_LINKS)]
     """Angles of the joints of the left arm (in rad), one for each link. The first is measured from
     +x, each other from the link before."""
-    right: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
+    right: Annotated[tuple[Finite, ...], Field(max_length=MAX_LINKS)]
     """Angles of the joints of the right arm, as for the left arm."""
 
 
@@ -144,7 +144,7 @@ class Task(FileData):
     number.
     """
 
-    name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)] = "unnamed"
+    name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=MAX_NAME_LENGTH)] = "unnamed"
     """Name in commands, suites and tables, such as ``ascending`` or ``two-armed/v1/i017``."""
     title: Line = ""
     """Name in figures and tables; ``name`` if it is empty."""
@@ -152,7 +152,7 @@ class Task(FileData):
     """One sentence that describes the task in lists."""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1, max_length=len(HANDS))] = HANDS
     """Hands that may hit goals. The robot has both arms in any case."""
-    goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
+    goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MAX_GOALS)]
     """Goal centres x_g in the order in which they are to be hit (in length units)."""
     radius: Length = PAPER_RADIUS
     """θ^g: radius of every goal (in length units)."""

@@ -98,7 +98,7 @@ def descend(
         stuck = going & (not moved)
         slots.status[i] = _STUCK if stuck else slots.status[i]
         ended += 0 if (going & moved) | (i >= count) else 1
-        large += 0 if winding(slots.q, i) < trigonometry.LARGEST else 1
+        large += 0 if winding(slots.q, i) < trigonometry.MAX_ANGLE else 1
     return ended, large == 0
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from coartic.model import PAPER, PAPER_RADIUS, MotionModel, Norm
 from coartic.motion.kernels.compile import chain_by, inlined, inner, record_type
-from coartic.motion.kernels.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
+from coartic.motion.kernels.trigonometry import MAX_ANGLE, cosine, near_cosine, near_sine, sine
 from coartic.robot import BASE_DOF, HANDS, Arm, Robot
 
 SLOTS = 72
@@ -378,7 +378,7 @@ def have_small_angles(slots: SlotArrays, count: int) -> bool:
     """
     large = 0
     for i in range(padded_count(count)):
-        large += 0 if winding(slots.q, i) < LARGEST else 1
+        large += 0 if winding(slots.q, i) < MAX_ANGLE else 1
     return large == 0
 
 

@@ -30,7 +30,7 @@ from coartic.motion.kernels.correct import correct_runs
 from coartic.motion.kernels.move import CHECK, IDLE, MOVE, follow_paths, move_runs
 from coartic.motion.kernels.noise import hashed
 from coartic.motion.kernels.slots import Batch, RobotRecord, RunRecord
-from coartic.robot import LARGEST_ENTRY, Configs, Hands, Points
+from coartic.robot import MAX_ENTRY, Configs, Hands, Points
 
 COUNTED = (
     *("movement_ticks", "forward_kinematics", "corrective_iterations"),
@@ -181,7 +181,7 @@ NO_REWARD = -(2**63 - 1)
 
 @inlined
 def _are_within(targets: Any) -> bool:
-    """Return whether no entry of a trial's targets is beyond :data:`LARGEST_ENTRY` in size.
+    """Return whether no entry of a trial's targets is beyond :data:`MAX_ENTRY` in size.
 
     ``targets`` has shape ``(G, M, dof)``. NaN means that a joint stays, and counts as within the
     bound.
@@ -190,7 +190,7 @@ def _are_within(targets: Any) -> bool:
     for g in range(targets.shape[0]):
         for m in range(targets.shape[1]):
             for j in range(targets.shape[2]):
-                large += abs(targets[g, m, j]) > LARGEST_ENTRY
+                large += abs(targets[g, m, j]) > MAX_ENTRY
     return large == 0
 
 
