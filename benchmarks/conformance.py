@@ -79,7 +79,7 @@ def check_method(
     parameters = trials | info.rules()["quick"]
 
     def applies(task: Task) -> bool:
-        return info.why_not(task, parameters) is None
+        return info.inapplicable_reason(task, parameters) is None
 
     candidates = [*map(load_task, builtin_tasks())] if tasks is None else tasks
     tasks, jobs, runs = list(filter(applies, candidates)), dict[tuple[str, str], Job](), _Runs()
@@ -313,7 +313,7 @@ def check_task_file(path: Path, registered: Registry) -> list[CheckResult]:
         is_solved = trial.completed
     except (NotApplicableError, TaskError) as error:
         finding, is_solved = str(error), False
-    methods = [name for name, info in registered.items() if info.why_not(task) is None]
+    methods = [name for name, info in registered.items() if info.inapplicable_reason(task) is None]
     count = f"{counted(len(task.goals), 'goal')}; {counted(len(methods), 'method')} can run on it"
     return [
         CheckResult("valid", True, f"{task.name}, {count}"),

@@ -176,7 +176,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
         if (task.name in own or method.name not in of_suite)
         and (task.name, method.name) not in cells
         and method.refuses(world) is None
-        and method.why_not(task) is None
+        and method.inapplicable_reason(task) is None
     ]
     if wrong := [name for name in names if name not in tasks]:
         hint = " Instances are a range, such as long/v1/i000..i009."
@@ -379,7 +379,7 @@ def _suite_jobs(
                 for values in itertools.product(*block.grid.values()):
                     parameters = block.parameters | dict(zip(block.grid, values, strict=True))
                     chosen = world or _world_of(request)
-                    reason = method.refuses(chosen) or method.why_not(task, parameters)
+                    reason = method.refuses(chosen) or method.inapplicable_reason(task, parameters)
                     if reason is None:
                         yield job(task, method, parameters, block.runs, chosen)
                     elif not is_open:
@@ -434,7 +434,7 @@ def _why_nothing_runs(
     """
     tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
     reasons = dict.fromkeys(
-        method.refuses(_world_of(request)) or method.why_not(task)
+        method.refuses(_world_of(request)) or method.inapplicable_reason(task)
         for task in tasks
         for method in methods
     )

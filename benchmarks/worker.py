@@ -127,7 +127,7 @@ def perform_job(job: Job) -> list[Outcome]:
     try:
         method = cell.method.configure(cell.parameters)
         results: Sequence[Any]
-        reason_not = method.refuses(cell.model) or method.why_not(outline_of(cell.task))
+        reason_not = method.refuses(cell.model) or method.inapplicable_reason(outline_of(cell.task))
         if reason_not is not None:
             raise MethodError("infeasible", str(reason_not))
         if len(sessions) == 1:

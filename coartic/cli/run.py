@@ -289,7 +289,9 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import in_words
 
-    applies = (task for task in builtin_tasks() if info.why_not(load_task(task)) is None)
+    applies = (
+        task for task in builtin_tasks() if info.inapplicable_reason(load_task(task)) is None
+    )
     yield "Method", f"{info.name}: {info.title}"
     yield "Called", title_of(info)
     yield "Information", ", ".join(info.information)

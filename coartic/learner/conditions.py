@@ -183,7 +183,7 @@ class ExplorationCondition:
         """True if ``drift`` or ``pull`` is not 0, so that a preferred posture is used."""
         return any(self.drifts) or self.pull > 0
 
-    def why_not(self, task: Task | Outline) -> str | None:
+    def inapplicable_reason(self, task: Task | Outline) -> str | None:
         """Return why the condition does not apply to a task's hands; None if it applies."""
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:

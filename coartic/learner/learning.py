@@ -184,7 +184,7 @@ def learn_many(
     """
     task = as_task(task)
     condition = load_condition(condition)
-    if reason := condition.why_not(task):
+    if reason := condition.inapplicable_reason(task):
         raise NotApplicableError(reason)
     check_limits("trials", trials, 1, MAX_TRIALS)
     if isinstance(seeds, str | bytes) or not isinstance(seeds, Iterable):

@@ -81,7 +81,7 @@ class Outline(NamedTuple):
     """The properties of a task by which a method decides whether it applies."""
 
     name: str
-    """Name of the task, for the sentence of :meth:`Method.why_not`."""
+    """Name of the task, for the sentence of :meth:`Method.inapplicable_reason`."""
     goals_count: int
     """Number of goals."""
     dof: int
@@ -188,7 +188,7 @@ class Method(ABC):
     def __init__(self, parameters: Any = None) -> None:
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
-    def why_not(self, task: Outline) -> str | None:
+    def inapplicable_reason(self, task: Outline) -> str | None:
         """Return why the method does not apply to a task; None if it applies.
 
         By default a method applies to every task.
@@ -332,7 +332,7 @@ def run_method(
     """
     chosen = as_task(task)
     check_model(model, radius=chosen.radius)
-    reason = method.refuses(model) or method.why_not(outline_of(chosen))
+    reason = method.refuses(model) or method.inapplicable_reason(outline_of(chosen))
     if reason is not None:
         raise NotApplicableError(reason)
     built_in = (getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES)
