@@ -52,7 +52,7 @@ class Progress:
     """Runs of the plan."""
     present: int = 0
     """Runs of the plan that the folder had before, except runs that are performed again."""
-    stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+    outdated: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     """Numbers of runs in the folder that another version or code of their method made. The keys are
     triples: method, version that made the runs, and present version. The runs stay in the folder,
     but reports do not show them."""
@@ -65,7 +65,7 @@ class Progress:
     marks: dict[str, list[str]] = field(default_factory=dict)
     """Dict that maps methods to warnings about their runs in the folder (:meth:`Store.marks`)."""
     others: int = 0
-    """Runs in the folder that the plan does not ask for, without :attr:`stale` runs."""
+    """Runs in the folder that the plan does not ask for, without :attr:`outdated` runs."""
     wall_s: float = 0.0
     """Wall time of the call, in s; 0 until the call ends."""
     time_left: TimeLeft = field(default_factory=TimeLeft)
@@ -87,8 +87,8 @@ class Progress:
 
     @property
     def unused(self) -> Iterator[str]:
-        """Sentences on :attr:`stale` runs, one for each method and version."""
-        for (method, old, new), count in self.stale.items():
+        """Sentences on :attr:`outdated` runs, one for each method and version."""
+        for (method, old, new), count in self.outdated.items():
             origin = f"made by version {old}; its version here is {new}"
             if not (VERSION.fullmatch(old) and VERSION.fullmatch(new)):
                 origin = "made before its file, or a file that it imports or reads, changed"
@@ -107,7 +107,7 @@ class Progress:
         left_out = [
             f"{counted(count, 'run')} {what}"
             for count, what in (
-                (self.stale.total(), "by another version of their method"),
+                (self.outdated.total(), "by another version of their method"),
                 (self.others, "of earlier commands"),
             )
             if count > 0
@@ -236,8 +236,8 @@ def perform(
         raise CoarticError("the plan has no jobs")
     with writing(folder) as store:
         store.replace_plan(plan, made_with())
-        progress = Progress(folder, size_of(plan), stale=store.stale())
-        progress.others = store.others() - progress.stale.total()
+        progress = Progress(folder, size_of(plan), outdated=store.count_outdated_runs())
+        progress.others = store.others() - progress.outdated.total()
         progress.marks = store.marks()
         missing = _missing_jobs(plan, store, progress)
         own_methods = {job.cell.method.name: job for job in missing if not job.cell.method.is_ours}
