@@ -24,7 +24,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from pandas.api.types import is_hashable
 
-from coartic.analysis.optima import gap_share, run_values
+from coartic.analysis.optima import relative_gap, run_values
 from coartic.analysis.statistics import task_mean
 from coartic.analysis.words import listed
 from coartic.errors import CoarticError
@@ -174,7 +174,7 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     excess = (columns.value - columns.best_known).mask(columns.is_noisy)
     highest = "it is above best_known, which must be the highest reward of the task"
     refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
-    columns = columns.assign(gap=gap_share(columns.value, columns.best_known))
+    columns = columns.assign(gap=relative_gap(columns.value, columns.best_known))
     if ZERO not in columns:
         return columns
     possible = columns.best_known - columns[ZERO]
@@ -259,7 +259,7 @@ def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     return runs
 
 
-def gaps(frame: pd.DataFrame) -> pd.Series:
+def relative_gaps(frame: pd.DataFrame) -> pd.Series:
     """Return the gap of each run to the best known reward of its task.
 
     Parameters
@@ -286,7 +286,7 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     Examples
     --------
     >>> frame = pd.DataFrame({"reward": [-303, -292], "best_known": [-292, -292]})
-    >>> gaps(frame).round(3).tolist()
+    >>> relative_gaps(frame).round(3).tolist()
     [0.038, 0.0]
     """
     return _with_gaps(checked(frame, numbers=SCORES)).gap.set_axis(frame.index)
@@ -313,7 +313,7 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        A column is missing or a reward is wrong (:func:`gaps`), or ``corrective_best`` is above the
+        A column is missing or a reward is wrong (:func:`relative_gaps`), or ``corrective_best`` is above the
         best known reward.
 
     Examples
@@ -462,7 +462,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        A column or a name is missing, a reward is wrong (:func:`gaps`), a task has more than one
+        A column or a name is missing, a reward is wrong (:func:`relative_gaps`), a task has more than one
         best known reward, a run has two rows, methods have different budgets, or runs are in
         different worlds.
 
@@ -486,7 +486,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     if "note" in existing:
         runs["note"] = frame["note"].to_numpy(object)
     if "noisy_ticks" in runs:
-        runs["noisy_gap"] = gap_share(-runs.noisy_ticks, runs.best_known)
+        runs["noisy_gap"] = relative_gap(-runs.noisy_ticks, runs.best_known)
     asked = sorted(runs.budget.dropna().unique()) if "budget" in existing else []
     if len(asked) > 1:
         budgets = [f"{budget:.0f}" for budget in asked]

@@ -24,7 +24,7 @@ from coartic.analysis.optima import (
     FRESH_EXECUTIONS,
     BestKnown,
     best_known,
-    gap_share,
+    relative_gap,
     restrictions,
     run_values,
 )
@@ -397,7 +397,7 @@ class Study:
           none, and for a search with another base;
         - ``corrective_best``: as in :attr:`corrective_best`; in a world with noise judged by the
           same draws as the run;
-        - ``gap``: the gap of the value to the best known reward, as a share of it (:func:`.gaps`).
+        - ``gap``: the gap of the value to the best known reward, as a share of it (:func:`.relative_gaps`).
           In noise it can be negative by chance;
         - a column for each parameter of methods, unless there is a column of this name already.
           ``trials`` is the number of trials that were made, and ``hands`` are the hands of the
@@ -438,7 +438,7 @@ class Study:
             values, pairs = self._corrective_by_number, zip(runs.task, runs.run, strict=True)
             runs["corrective_best"] = [values[task][number] for task, number in pairs]
         of_runs = runs[["value", "best_known"]].astype("Float64")
-        runs["gap"] = gap_share(*of_runs.to_numpy(np.float64, na_value=np.nan).T)
+        runs["gap"] = relative_gap(*of_runs.to_numpy(np.float64, na_value=np.nan).T)
         runs.attrs["units"] = UNITS
         return runs
 

@@ -42,7 +42,7 @@ from coartic.analysis.methods import (
     are_numbers,
     default_name,
 )
-from coartic.analysis.optima import gap_share
+from coartic.analysis.optima import relative_gap
 from coartic.analysis.running_times import (
     SPENDS,
     best_after,
@@ -526,7 +526,7 @@ def _gaps_after(study: Study, trials: int) -> pd.Series:
         else reward
         for run_id, reward in zip(runs.run_id, runs.reward.astype(float), strict=True)
     ]
-    gaps = pd.Series(gap_share(best, runs.best_known.astype(float)), runs.index)
+    gaps = pd.Series(relative_gap(best, runs.best_known.astype(float)), runs.index)
     cells = gaps.groupby([runs.ranked_as, runs.task])
     by_task = cells.mean().where(cells.count() == cells.size())
     methods = by_task.groupby(level=0)

@@ -101,8 +101,8 @@ def fewest_ticks(
     tried:
 
     - all roundings of a plan except the 64 nearest to it (:meth:`.Rounding.iter_roundings`);
-    - roundings whose approximate lower bound (:meth:`.Rounding.estimated_ticks`) is not below the ticks of
-      the best rounding so far.
+    - roundings whose estimated ticks (:meth:`.Rounding.estimated_ticks`), an approximate lower
+      bound, are not below the ticks of the best rounding so far.
 
     Parameters
     ----------

@@ -58,8 +58,8 @@ class Rounding:
         """Round each segment to the nearest number of steps, and the last segment up.
 
         Before the last segment is rounded, the solver makes it as short as the rounded lengths of
-        the other segments allow. To first order all roundings of a shortest path (:meth:`iter_roundings`)
-        take the same number of ticks.
+        the other segments allow. To first order all roundings of a shortest path
+        (:meth:`iter_roundings`) take the same number of ticks.
 
         Returns
         -------
@@ -88,9 +88,10 @@ class Rounding:
                 yield rounded
 
     def estimated_ticks(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
-        """Return an estimate of the fewest ticks of a rounding: the plan's total length, rounded up.
+        """Return an approximate lower bound of the ticks of a plan's roundings.
 
-        It is an approximate lower bound: roundings of a shortest plan rarely take fewer ticks.
+        It is the total length of the plan, rounded up. Roundings of a shortest plan rarely take
+        fewer ticks.
         """
         length = float(plan.lengths().sum())
         movements = len(self._instance.hands) - len(merged)
@@ -111,8 +112,8 @@ class Rounding:
         task : Task
         worth : callable
             Function that returns whether a plan with a given number of ticks is of interest. A set
-            of goals is not extended if :meth:`estimated_ticks` shows that no larger set can have such a
-            number of ticks.
+            of goals is not extended if :meth:`estimated_ticks` shows that no larger set can have
+            such a number of ticks.
 
         Yields
         ------

@@ -161,7 +161,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         - ``"rules"``: none;
         - ``"refuses"``: the constants of a motion model;
         - ``"complete"``: the parameters of the method;
-        - ``"inapplicable_reason"``: the parameters of the method, then the entries of an :class:`Outline`.
+        - ``"inapplicable_reason"``: the parameters of the method, then the entries of an
+          :class:`Outline`.
 
     Raises
     ------
