@@ -508,7 +508,7 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
     return counts
 
 
-def _gaps_after(study: Study, trials: int) -> pd.Series:
+def _mean_gap_after(study: Study, trials: int) -> pd.Series:
     """Return the gap that each ranked method had after ``trials`` trials, a mean over tasks.
 
     All are NaN in a world with noise, where the best trial so far is partly luck.
@@ -538,7 +538,7 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
     rows = standings(study)
     rows = rows[(rows.why == "") == ranked]
     single = [task for task in ranked_tasks(study) if task in study.individual_tasks]
-    early = _gaps_after(study, _EARLY).to_dict() if ranked and len(rows) else {}
+    early = _mean_gap_after(study, _EARLY).to_dict() if ranked and len(rows) else {}
     for label, row in rows.iterrows():
         runs = runs_by_method(study).get(str(label), compared_runs(study)[:0])
         gaps = runs.groupby("task").gap.mean()
@@ -1183,7 +1183,7 @@ def _instances(study: Study) -> dict[str, list[str]]:
 
 
 @lru_cache(maxsize=4)
-def on_instances(study: Study) -> pd.DataFrame:
+def instance_runs(study: Study) -> pd.DataFrame:
     """Return each method's runs on the instances that it solved in all runs.
 
     Only instances with a best known reward count. Runs are sorted by family and instance, as in
@@ -1199,14 +1199,14 @@ def on_instances(study: Study) -> pd.DataFrame:
     return runs.sort_values("place", kind="stable")
 
 
-def by_family(study: Study, runs: pd.DataFrame) -> Scores:
+def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
     """Return the gaps of a method's runs on each instance, by family.
 
     Parameters
     ----------
     study : Study
     runs : DataFrame
-        The method's rows of :func:`on_instances`.
+        The method's rows of :func:`instance_runs`.
 
     Returns
     -------
@@ -1244,11 +1244,11 @@ def list_family_gaps(study: Study) -> Rows:
     number of the other instances. Both count families with two arms. If the method ran only on
     families with one arm, they count these.
     """
-    solved_runs, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
+    solved_runs, rows, families = instance_runs(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {family for family in families if len(study.tasks[families[family][0]].hands) > 1}
     for method, of_method in runs_by_method(study).items():
         runs, ran = solved_runs[solved_runs.method == method], {*of_method.family.dropna()}
-        scores, over = by_family(study, runs), two_armed if two_armed & ran else ran
+        scores, over = gaps_by_family(study, runs), two_armed if two_armed & ran else ran
         solved = runs[runs.family.isin(over)].task.nunique()
         missing = sum(len(families[family]) for family in over) - solved
         row: Row = {"method": method, "instances": solved, "missing": missing}

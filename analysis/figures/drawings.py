@@ -56,13 +56,13 @@ from coartic.analysis.standings import ranked_tasks, reference, runs_on, standin
 from coartic.analysis.statistics import other_tasks
 from coartic.analysis.study import Study, solved
 from coartic.analysis.tables import (
-    by_family,
+    gaps_by_family,
     gaps_of_settings,
+    instance_runs,
     list_contexts,
     list_parameters,
     list_runtimes,
     list_saved,
-    on_instances,
     values_of_parameters,
 )
 from coartic.analysis.words import capital, interval, listed, marked, number, titled_apart
@@ -766,14 +766,14 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     instance that the method solved in all runs. Settings of methods that are drawn are left out.
     Returns None if there is nothing to draw.
     """
-    runs, rows = on_instances(study), study.methods
+    runs, rows = instance_runs(study), study.methods
     methods = without_settings(rows[rows.index.isin(runs.method)])
     runs = runs[runs.method.isin(methods.index)]
     if not len(runs):
         return None
     parts = []
     for (method, family), part in runs.groupby(["method", "family"], sort=False):
-        scores = by_family(study, part)
+        scores = gaps_by_family(study, part)
         mean = (other_tasks(scores) if scores else Estimate(math.nan)).columns("mean")
         dots = part.groupby("task", sort=False).gap.mean().reset_index()
         dots = dots.assign(method=str(method), family=str(family), **mean, instances=len(dots))
