@@ -30,7 +30,7 @@ from coartic.analysis.words import listed
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.internal.limits import brief_value
-from coartic.internal.text import counted, plain
+from coartic.internal.text import plain, pluralize
 from coartic.runs.plan import label_of, world_title
 
 SCORES = ("reward", "best_known")
@@ -504,9 +504,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         failed = of_tasks.gap.isna()
         solved = of_tasks[~of_tasks.task.isin(of_tasks.task[failed])]
         reasons = [
-            f"{of_tasks.task.nunique()} of {counted(tasks, 'task')}"
+            f"{of_tasks.task.nunique()} of {pluralize(tasks, 'task')}"
             * (of_tasks.task.nunique() < tasks),
-            f"{failed.sum()} of {counted(len(of_tasks), 'run')} failed" * bool(failed.any()),
+            f"{failed.sum()} of {pluralize(len(of_tasks), 'run')} failed" * bool(failed.any()),
             "no best known reward" * (not tasks),
         ]
         why = "; ".join(filter(None, reasons))

@@ -32,7 +32,7 @@ from coartic.analysis.signatures import SIGNATURES, Solutions
 from coartic.analysis.words import listed, titled_apart
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
-from coartic.internal.text import counted, unknown
+from coartic.internal.text import pluralize, unknown
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.method import Information
 from coartic.model import WORLD, MotionModel
@@ -132,7 +132,7 @@ def load(folder: str | Path, *, against: str = "") -> Study:
         runs = store.runs()
         if len(runs) < size_of(plan):
             raise CoarticError(
-                f"{folder} has {len(runs)} of {counted(size_of(plan), 'run')}: it was interrupted, "
+                f"{folder} has {len(runs)} of {pluralize(size_of(plan), 'run')}: it was interrupted, "
                 "or has only a part of the runs. Repeat the `coartic run` command, which makes the "
                 "missing runs, or --include all parts in another folder."
             )

@@ -98,7 +98,7 @@ from coartic.estimates import (
     mean_of_means,
     standard_deviation,
 )
-from coartic.internal.text import counted, one_line
+from coartic.internal.text import one_line, pluralize
 from coartic.motion.execution import initial_reward
 from coartic.robot import Array
 from coartic.runs.plan import world_title
@@ -252,7 +252,7 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
 
 def caption_of(table: Table, study: Study) -> str:
     """Return the caption of a table with the study's number of tasks, reference and world."""
-    caption = table.caption.replace("{tasks}", counted(len(ranked_tasks(study)), "task"))
+    caption = table.caption.replace("{tasks}", pluralize(len(ranked_tasks(study)), "task"))
     caption = caption.replace("{reference}", reference(study, study.optima))
     return caption + f" ({world_title(study.world)})" * bool(study.world)
 

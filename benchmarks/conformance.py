@@ -26,7 +26,7 @@ from coartic import (
 )
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.method import METERED
 from coartic.motion.execution import execute_many
 from coartic.motion.solution import goals_without_target, next_action
@@ -314,7 +314,9 @@ def check_task_file(path: Path, registered: Registry) -> list[CheckResult]:
     except (NotApplicableError, TaskError) as error:
         finding, is_solved = str(error), False
     methods = [name for name, info in registered.items() if info.inapplicable_reason(task) is None]
-    count = f"{counted(len(task.goals), 'goal')}; {counted(len(methods), 'method')} can run on it"
+    count = (
+        f"{pluralize(len(task.goals), 'goal')}; {pluralize(len(methods), 'method')} can run on it"
+    )
     return [
         CheckResult("valid", True, f"{task.name}, {count}"),
         CheckResult(

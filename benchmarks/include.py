@@ -26,7 +26,7 @@ from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, hash_of
 from coartic.runs.shipped import SHIPPED, open_shipped
@@ -152,7 +152,7 @@ def _join(
                 unused[job.cell.method.name] += 1
         for method, count in unused.items():
             warnings.warn(
-                f"{name}: {counted(count, 'run')} of {method} not used, made before its file, or a "
+                f"{name}: {pluralize(count, 'run')} of {method} not used, made before its file, or a "
                 "file that it imports or reads, changed",
                 stacklevel=3,
             )
@@ -210,7 +210,7 @@ def _warn_of_gaps(
             )
         if few:
             warnings.warn(
-                f"{name} has fewer than {counted(most_runs, 'run')}, which this command asks for, "
+                f"{name} has fewer than {pluralize(most_runs, 'run')}, which this command asks for, "
                 f"of {_named(few)}",
                 stacklevel=4,
             )

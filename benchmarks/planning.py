@@ -33,7 +33,7 @@ from coartic.internal.limits import (
     check_limits,
     plain_values,
 )
-from coartic.internal.text import counted, unknown
+from coartic.internal.text import pluralize, unknown
 from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.model import PAPER, MotionModel, differences
 from coartic.runs.method_info import MethodInfo
@@ -452,7 +452,7 @@ def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
         if first_job.numbers != job.numbers:
             raise CoarticError(
                 f"{job.cell.label} on {job.cell.task.name}: the suite asks for "
-                f"{counted(len(first_job.numbers), 'run')}, and in a later block for "
+                f"{pluralize(len(first_job.numbers), 'run')}, and in a later block for "
                 f"{len(job.numbers)}; ask for one number of runs"
             )
     return list(distinct.values())

@@ -28,7 +28,7 @@ from coartic.benchmarks.time_left import TimeLeft
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
-from coartic.internal.text import counted, error_line
+from coartic.internal.text import error_line, pluralize
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
 from coartic.runs.record import UNREPEATED, Row
@@ -92,7 +92,7 @@ class Progress:
             origin = f"made by version {old}; its version here is {new}"
             if not (VERSION.fullmatch(old) and VERSION.fullmatch(new)):
                 origin = "made before its file, or a file that it imports or reads, changed"
-            runs = counted(count, "run")
+            runs = pluralize(count, "run")
             yield f"Not used: {runs} of {method}, {origin}. They stay in the folder."
 
     def __str__(self) -> str:
@@ -101,11 +101,11 @@ class Progress:
         long = self.wall_s >= 100
         time_taken = f"{minutes:.0f} min {seconds:.0f} s" if long else f"{self.wall_s:.0f} s"
         count = self.present + self.done
-        runs = counted(count, "run") if count == self.total else f"{count} of {self.total} runs"
+        runs = pluralize(count, "run") if count == self.total else f"{count} of {self.total} runs"
         runs += f" ({self.present} reused)" if self.present else ""
         failed = f"{self.failed} failed" if self.failed else "none failed"
         left_out = [
-            f"{counted(count, 'run')} {what}"
+            f"{pluralize(count, 'run')} {what}"
             for count, what in (
                 (self.outdated.total(), "by another version of their method"),
                 (self.others, "of earlier commands"),

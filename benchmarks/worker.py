@@ -19,7 +19,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter
 
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.text import counted, error_line
+from coartic.internal.text import error_line, pluralize
 from coartic.method import (
     Information,
     MethodError,
@@ -94,7 +94,7 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
         outcomes = _OUTCOMES.validate_python(content)
         if len(outcomes) == len(job.numbers):
             return outcomes
-        reason = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
+        reason = f"{len(outcomes)} for {pluralize(len(job.numbers), 'run')}"
     except _MALFORMED as error:
         reason = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {reason}")
@@ -137,7 +137,7 @@ def perform_job(job: Job) -> list[Outcome]:
         outside_trials = trials_outside() - outside_trials
         if outside_trials and not cell.method.is_ours:
             raise UndeclaredError(
-                f"the method made {counted(outside_trials, 'trial')} outside its session, which "
+                f"the method made {pluralize(outside_trials, 'trial')} outside its session, which "
                 "are not counted: by coartic.objective, learn, execute or an environment"
             )
     except BaseException as error:

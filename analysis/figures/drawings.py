@@ -67,7 +67,7 @@ from coartic.analysis.tables import (
 )
 from coartic.analysis.words import capital, interval, listed, marked, number, titled_apart
 from coartic.estimates import MIN_VALUES, Estimate
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot
 from coartic.robot import Array
 from coartic.tasks.task import shipped_tasks
@@ -248,7 +248,9 @@ def _draw_gaps(study: Study) -> Parts | None:
         mark, size = looks[row["method"]]["marker"], looks[row["method"]]["markersize"]
         (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
         name = row["title"]
-        style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
+        style.tip(
+            dot, f"{name}: {interval(row, 'gap', unit=' %')}, {pluralize(row['runs'], 'run')}"
+        )
         label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
     axes.spines["left"].set_visible(False)
     to = reference(study, tasks)

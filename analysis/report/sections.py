@@ -74,7 +74,7 @@ from coartic.analysis.words import (
 )
 from coartic.errors import CoarticError
 from coartic.estimates import MIN_VALUES
-from coartic.internal.text import counted, error_line, one_line
+from coartic.internal.text import error_line, one_line, pluralize
 from coartic.method import TRIALS
 from coartic.runs.plan import world_title
 
@@ -476,7 +476,7 @@ def failed_methods(study: Study) -> list[str]:
     rows = standings(study).query("why != '' and failed > 0")
     where = f" in {world_title(study.world)}" if study.world else ""
     return [
-        f"{row.failed} of {counted(row.runs, 'run')} failed ({row.title}){where}: it is not ranked."
+        f"{row.failed} of {pluralize(row.runs, 'run')} failed ({row.title}){where}: it is not ranked."
         for _, row in rows.iterrows()
     ]
 

@@ -20,7 +20,7 @@ from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
 from coartic.internal.limits import MAX_RUNS
-from coartic.internal.text import counted, one_line
+from coartic.internal.text import one_line, pluralize
 
 if TYPE_CHECKING:
     from coartic.analysis.study import Study
@@ -79,9 +79,9 @@ def report(
             study, out, for_paper=for_paper, width=width, watch=display.show
         )
     counts = Counter(Path(name).suffix for name in files)
-    figures = f" and {counted(counts['.svg'], 'figure')}" * for_paper
+    figures = f" and {pluralize(counts['.svg'], 'figure')}" * for_paper
     say(f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
-        f"{counted(counts['.csv'], 'table')}{figures}.")  # fmt: skip
+        f"{pluralize(counts['.csv'], 'table')}{figures}.")  # fmt: skip
     for part, reason in failures.items():
         complain("Error", f"{part} could not be made, because of a bug in coartic: {reason}")
     if failures:
@@ -170,7 +170,9 @@ def _say_ranking_of_world(study: Study) -> None:
         pairs.append(("Intervals", f"too few runs to test: make {enough} (--runs {enough})"))
     if notes["failed"]:
         reasons = "; ".join(notes["reasons"])
-        pairs.append(("Failed", f"{notes['failed']} of {counted(notes['runs'], 'run')}: {reasons}"))
+        pairs.append(
+            ("Failed", f"{notes['failed']} of {pluralize(notes['runs'], 'run')}: {reasons}")
+        )
     pairs += [("‡", sentence) for sentence in notes["late"]]
     say_pairs(pairs)
 
@@ -221,9 +223,9 @@ def verify(
                 executed, wrong = execute_with_noise_again(folder, every=noise)
         is_right = not (wrong or report.unfinished)
         say(
-            f"{counted(report.runs, 'run')} checked, "
-            f"{counted(report.movements, 'movement')} executed.",
-            *[f"{counted(executed, 'solution')} executed with motor noise."] * bool(executed),
+            f"{pluralize(report.runs, 'run')} checked, "
+            f"{pluralize(report.movements, 'movement')} executed.",
+            *[f"{pluralize(executed, 'solution')} executed with motor noise."] * bool(executed),
             *(wrong or ["Nothing differs."]),
             *report.unfinished,
         )
@@ -258,14 +260,16 @@ def _perform_again(
         _describe_run(run, registered[run.cell.method.name].code)
     differing = 0
     with Display() as display:
-        display.show(f"Performing {counted(len(runs), 'run')} again")
+        display.show(f"Performing {pluralize(len(runs), 'run')} again")
         for number, (stored, new) in enumerate(perform_runs_again(runs, registered), 1):
             differences = compare_runs(stored, new)
             differing += bool(differences)
             for difference in differences:
                 say(f"Run {stored['run_id']}, performed again: {difference}")
-            display.show(f"Performed {number} of {counted(len(runs), 'run')} again")
-    say(f"{counted(len(runs), 'run')} performed again: {differing or 'none'} with another result.")
+            display.show(f"Performed {number} of {pluralize(len(runs), 'run')} again")
+    say(
+        f"{pluralize(len(runs), 'run')} performed again: {differing or 'none'} with another result."
+    )
     return differing
 
 
@@ -427,7 +431,7 @@ def draw(
         files |= {"tasks.svg": picture(drawing, ".svg")}
         publish(out, files)
     drawn = f"; the first {_PICTURED} are drawn" if len(chosen) > _PICTURED else ""
-    return say(f"{out}: {counted(len(chosen), 'task')}{drawn}.")
+    return say(f"{out}: {pluralize(len(chosen), 'task')}{drawn}.")
 
 
 def _film(

@@ -18,7 +18,7 @@ from coartic.cli.terminal import Display, say, say_pairs, say_table
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
-from coartic.internal.text import counted, one_line, unknown
+from coartic.internal.text import one_line, pluralize, unknown
 from coartic.internal.threads import MAX_JOBS
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def run(
     def saved() -> str:
         runs_stored = "no run yet"
         with suppress(CoarticError), open_store(out) as store:
-            runs_stored = counted(len(store.present()), "run")
+            runs_stored = pluralize(len(store.present()), "run")
         return one_line(f"Stored in {out}: {runs_stored}; repeat the command to resume.")
 
     with interruptible(saved), display:
@@ -270,7 +270,7 @@ def _list_runs(folder: Path) -> None:
     if runs.mean_ticks.notna().any():
         columns.insert(-1, "mean_ticks")
     say_table(columns, runs[columns].astype("string").fillna("").to_numpy().tolist())
-    say(f"{folder}: {counted(len(runs), 'run')}.")
+    say(f"{folder}: {pluralize(len(runs), 'run')}.")
 
 
 def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
@@ -363,7 +363,7 @@ def _show_results(name: str, results: Sequence[CheckResult]) -> int:
     for result in results:
         say(f"{words[result.passed]}  {result.name}: {result.finding}")
     passed = sum(result.passed is True for result in results)
-    say(f"{name}: {passed} of {counted(len(results), 'check')} passed.")
+    say(f"{name}: {passed} of {pluralize(len(results), 'check')} passed.")
     return len(results) - passed
 
 

@@ -59,7 +59,7 @@ def escape(c: str) -> str:
     return c if prints(c) else c.encode("unicode_escape").decode()
 
 
-def counted(count: int, thing: str) -> str:
+def pluralize(count: int, thing: str) -> str:
     """Return a count with its noun, such as ``1 run`` or ``2 runs``."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
 

@@ -25,7 +25,7 @@ from coartic.internal.limits import (
     check_limits,
     real_array,
 )
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.method import (
     MAX_COUNT,
     TRIALS,
@@ -674,7 +674,7 @@ def objective(
         raise MethodError("infeasible", f"{reason}; pass the hands to use")
     if hands is None and budget is not None and budget < (count := len(chosen.hands) ** goals):
         raise ValueError(
-            f"budget is {budget}; it takes {counted(count, 'trial')} to choose among the hand "
+            f"budget is {budget}; it takes {pluralize(count, 'trial')} to choose among the hand "
             f"sequences of task {chosen.name!r}: raise the budget, or pass the hands to use"
         )
     check_limits("seed", seed, 0, MAX_RUN_SEED)

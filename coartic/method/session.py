@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value, check_limits, real_array
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.model import PAPER, MotionModel
 from coartic.motion.doors import Correction, correct
 from coartic.motion.execution import Execution, execute_many
@@ -591,7 +591,9 @@ class Session:
         if left is None:
             return count
         if left <= 0 < count:
-            raise BudgetError(f"the budget of {counted(self._trial_budget or 0, 'trial')} is spent")
+            raise BudgetError(
+                f"the budget of {pluralize(self._trial_budget or 0, 'trial')} is spent"
+            )
         return min(count, left)
 
     # The same calls for an objective, which checks points and budget itself.

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.limits import brief_value, check_limits
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.internal.threads import in_parts
 from coartic.model import PAPER, MotionModel, check_exact, check_model
 from coartic.motion.doors import check_goal, configuration, finite_array
@@ -364,7 +364,7 @@ def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
         return f"goal {number + 1}: the {hand} hand misses it after {corrections} corrections"
     return (
         f"goal {number + 1}: the corrective process did not converge with the {hand} hand in "
-        f"{counted(int(goal['iterations']), 'iteration')}"
+        f"{pluralize(int(goal['iterations']), 'iteration')}"
     )
 
 
@@ -439,7 +439,7 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
             codes[sequence] = [HANDS.index(hand) for hand in chosen]
     if is_list and len(sequences) != count:
         raise ValueError(
-            f"hands has {counted(len(sequences), 'hand sequence')} for {counted(count, 'trial')}; "
+            f"hands has {pluralize(len(sequences), 'hand sequence')} for {pluralize(count, 'trial')}; "
             "it must have one for each"
         )
     rows = np.empty((count, len(task.goals)), dtype=np.int64)

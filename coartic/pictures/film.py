@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from coartic.errors import CoarticError
 from coartic.internal.files import check_ending, check_output, errors_in_words, write_output
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals, number_goals
 
 if TYPE_CHECKING:
@@ -154,6 +154,6 @@ def _scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], Non
         for hand, trace in traces.items():
             trace.set_data(*paths[hand][: row + 1].T)
         fill_goals(goals, movement.hits <= row)
-        counter.set_text(counted(row + 1, "tick"))
+        counter.set_text(pluralize(row + 1, "tick"))
 
     return show

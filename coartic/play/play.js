@@ -19,7 +19,7 @@ const NAMES = {
 const PLANNER = "planner, all goals ahead"; // with which others are compared
 const short = (value) => Number(value.toFixed(2)).toString();
 const grouped = (count) => `${count}`.replace(/\B(?=(\d{3})+$)/g, "\u202f");
-const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
+const pluralize = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 const capital = (words) => words[0].toUpperCase() + words.slice(1);
 const bounded = (values) => values.map((value) => Math.max(-FAR, Math.min(FAR, value)));
 const ticks_by_goal = ({ hands, movements }) => hands.map((_, at) => movements.reduce((sum, { goal, ticks }) => sum + (goal === at ? ticks : 0), 0));
@@ -583,7 +583,7 @@ class Play {
   /* The number of goals ahead that a planner sees, in words. */
   horizon(ahead) {
     if (!ahead) return "no goal ahead";
-    return `${ahead < this.state.goals.length - 1 ? counted(ahead, "goal") : "all goals"} ahead`;
+    return `${ahead < this.state.goals.length - 1 ? pluralize(ahead, "goal") : "all goals"} ahead`;
   }
 
   /* The result, and what its words mean. */
@@ -606,7 +606,7 @@ class Play {
       const runs = this.practised(0).length;
       if (state.who === "learner" && this.shown === 1) return ["In the first trial only the corrective process acts. Practice follows."];
       return [
-        `${saved ? `${counted(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} the corrective process alone${used}.`,
+        `${saved ? `${pluralize(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} the corrective process alone${used}.`,
         runs > 1 && state.who === "learner" ? `Shown is the median of the learner's ${runs} runs.` : "",
       ];
     }
@@ -619,10 +619,10 @@ class Play {
     const by_chance = this.stored(state.who) && this.preset.by_chance;
     const random = Number.isFinite(by_chance) ? ` (random search: ${short(by_chance)})` : "";
     const saved = this.first_trials.map(({ reward }, k) => main[k].trial.reward - reward);
-    const pays = saved.length && Math.min(...saved) > 0 ? `Practice saves blue ${counted(saved[0], "tick")} and orange ${saved[1]}. ` : "";
+    const pays = saved.length && Math.min(...saved) > 0 ? `Practice saves blue ${pluralize(saved[0], "tick")} and orange ${saved[1]}. ` : "";
     return [
       `${pays}At goal 1 the posture difference is ${short(distance)}${random}.`,
-      `It is the distance between the mean postures (thick; ${counted(runs, "run")} each, thin), in length units and rad.${random && " Random search takes the best of as many random trials."}`,
+      `It is the distance between the mean postures (thick; ${pluralize(runs, "run")} each, thin), in length units and rad.${random && " Random search takes the best of as many random trials."}`,
     ];
   }
 
@@ -657,7 +657,7 @@ class Play {
       const line = document.createElement("span");
       const figure = document.createElement("strong");
       line.className = role;
-      figure.textContent = Number.isFinite(reward) ? counted(-reward, "tick") : "–";
+      figure.textContent = Number.isFinite(reward) ? pluralize(-reward, "tick") : "–";
       line.append(`${name} `, figure);
       return line;
     });
@@ -667,8 +667,8 @@ class Play {
     this.find("first-score").replaceChildren(...lines(first));
     const drift = state.drift ? `, drift ${state.drift}` : "";
     this.set("textContent", {
-      lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", now: `After ${counted(at, "trial")}`, play: this.playing ? "Pause" : "Show movement",
-      count: this.main.map((mover, k, all) => `${all.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${k < all.length - 1 ? mover.last + 1 : counted(mover.last + 1, "tick")}`).join(", "),
+      lead: this.lead, finding, meaning, progress: learns ? pluralize(at, "trial") + drift : "", now: `After ${pluralize(at, "trial")}`, play: this.playing ? "Pause" : "Show movement",
+      count: this.main.map((mover, k, all) => `${all.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${k < all.length - 1 ? mover.last + 1 : pluralize(mover.last + 1, "tick")}`).join(", "),
     });
     const stored = this.stored(state.who);
     this.find("film").hidden = !stored;
@@ -677,7 +677,7 @@ class Play {
     this.find("practice").hidden = !learns;
     const trials = this.find("trials");
     trials.value = at ? (1000 * Math.log(at)) / Math.log(TRIALS) : 0;
-    trials.setAttribute("aria-valuetext", counted(at, "trial"));
+    trials.setAttribute("aria-valuetext", pluralize(at, "trial"));
     const tick = this.find("tick");
     tick.max = this.last;
     tick.value = this.tick;
@@ -985,7 +985,7 @@ class Play {
     const hasOneHand = preset.task.hands.length < 2;
     const changed = !same([goals, others], [preset.task.goals, preset.others || null]);
     fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
-    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => counted(ticks, "tick")).join(" and ")}`])]);
+    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => pluralize(ticks, "tick")).join(" and ")}`])]);
     fill("ahead", goals.map((_, k) => [k, this.horizon(k)]));
     fill("edited", goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
     this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores, drift: DRIFTS.indexOf(drift) });

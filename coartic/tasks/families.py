@@ -36,7 +36,7 @@ from pydantic_core import PydanticCustomError
 from coartic.errors import NotApplicableError, TaskError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MAX_CELLS, check_limits
-from coartic.internal.text import BACKWARDS, Line, counted, plain, unknown
+from coartic.internal.text import BACKWARDS, Line, plain, pluralize, unknown
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.motion.doors import move
@@ -369,7 +369,7 @@ def instance_of(family: Family, address: Address) -> Task:
     links = len(task.robot.left_links)
     content = task.model_dump() | {
         "title": f"{family.title} {short}",
-        "description": f"{counted(len(task.goals), 'goal')}, {links} links an arm, {base}: drawn "
+        "description": f"{pluralize(len(task.goals), 'goal')}, {links} links an arm, {base}: drawn "
         f"from family {family.name}.",
         "initial_hands": search_initial_hands(task)[0],
         "provenance": {key: {"status": "chosen", "source": source} for key in chosen},

@@ -23,7 +23,7 @@ from coartic.errors import CoarticError, TaskError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import folder_named, write_output
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.text import Line, counted, did_you_mean, plain
+from coartic.internal.text import Line, did_you_mean, plain, pluralize
 from coartic.internal.toml_files import read_toml
 from coartic.internal.validation import FileData, explain, sentence_error
 from coartic.model import PAPER, PAPER_RADIUS
@@ -290,7 +290,7 @@ class Task(FileData):
                 letters, count = letters_of(sorted(self.hands)), len(self.goals)
                 raise sentence_error(
                     f"initial_hands is {brief_value(self.initial_hands)}; it must have "
-                    f"{counted(count, 'letter')} {' or '.join(letters)}, such as "
+                    f"{pluralize(count, 'letter')} {' or '.join(letters)}, such as "
                     f"{(letters * count)[:count]!r}, or be {' or '.join(INITIAL_POLICIES)}"
                 ) from None
         # With any model the corrective process ends within the radius; check_task is stricter.
@@ -356,7 +356,7 @@ def check_hands(task: Task, hands: str) -> str:
     if not fits or not set(hands) <= set(allowed):
         raise ValueError(
             f"hands {brief_value(hands)} do not fit task {task.name!r}: they must be a string with "
-            f"{' or '.join(allowed)} for each of {counted(len(task.goals), 'goal')}"
+            f"{' or '.join(allowed)} for each of {pluralize(len(task.goals), 'goal')}"
         )
     return hands
 
