@@ -313,8 +313,8 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        A column is missing or a reward is wrong (:func:`relative_gaps`), or ``corrective_best`` is above the
-        best known reward.
+        A column is missing or a reward is wrong (:func:`relative_gaps`), or ``corrective_best`` is
+        above the best known reward.
 
     Examples
     --------
@@ -462,9 +462,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        A column or a name is missing, a reward is wrong (:func:`relative_gaps`), a task has more than one
-        best known reward, a run has two rows, methods have different budgets, or runs are in
-        different worlds.
+        A column or a name is missing, a reward is wrong (:func:`relative_gaps`), a task has more
+        than one best known reward, a run has two rows, methods have different budgets, or runs are
+        in different worlds.
 
     Examples
     --------

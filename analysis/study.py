@@ -132,8 +132,8 @@ def load(folder: str | Path, *, against: str = "") -> Study:
         runs = store.runs()
         if len(runs) < size_of(plan):
             raise CoarticError(
-                f"{folder} has {len(runs)} of {pluralize(size_of(plan), 'run')}: it was interrupted, "
-                "or has only a part of the runs. Repeat the `coartic run` command, which makes the "
+                f"{folder} has {len(runs)} of {pluralize(size_of(plan), 'run')}: it was "
+                "interrupted, or has only a part of the runs. Repeat the `coartic run` command, which makes the "
                 "missing runs, or --include all parts in another folder."
             )
         study = Study(folder, plan, store.made_with(), runs, store.marks(), imports=store.imports())
@@ -397,8 +397,8 @@ class Study:
           none, and for a search with another base;
         - ``corrective_best``: as in :attr:`corrective_best`; in a world with noise judged by the
           same draws as the run;
-        - ``gap``: the gap of the value to the best known reward, as a share of it (:func:`.relative_gaps`).
-          In noise it can be negative by chance;
+        - ``gap``: the gap of the value to the best known reward, as a share of it
+          (:func:`.relative_gaps`). In noise it can be negative by chance;
         - a column for each parameter of methods, unless there is a column of this name already.
           ``trials`` is the number of trials that were made, and ``hands`` are the hands of the
           solution.

@@ -152,8 +152,8 @@ def _join(
                 unused[job.cell.method.name] += 1
         for method, count in unused.items():
             warnings.warn(
-                f"{name}: {pluralize(count, 'run')} of {method} not used, made before its file, or a "
-                "file that it imports or reads, changed",
+                f"{name}: {pluralize(count, 'run')} of {method} not used, made before its file, or "
+                "a file that it imports or reads, changed",
                 stacklevel=3,
             )
     asked = {job.cell.digest: len(job.numbers) for job in plan}
@@ -210,8 +210,8 @@ def _warn_of_gaps(
             )
         if few:
             warnings.warn(
-                f"{name} has fewer than {pluralize(most_runs, 'run')}, which this command asks for, "
-                f"of {_named(few)}",
+                f"{name} has fewer than {pluralize(most_runs, 'run')}, which this command asks "
+                f"for, of {_named(few)}",
                 stacklevel=4,
             )
 

@@ -476,7 +476,8 @@ def failed_methods(study: Study) -> list[str]:
     rows = standings(study).query("why != '' and failed > 0")
     where = f" in {world_title(study.world)}" if study.world else ""
     return [
-        f"{row.failed} of {pluralize(row.runs, 'run')} failed ({row.title}){where}: it is not ranked."
+        f"{row.failed} of {pluralize(row.runs, 'run')} failed ({row.title}){where}: "
+        "it is not ranked."
         for _, row in rows.iterrows()
     ]
 

@@ -439,8 +439,8 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
             codes[sequence] = [HANDS.index(hand) for hand in chosen]
     if is_list and len(sequences) != count:
         raise ValueError(
-            f"hands has {pluralize(len(sequences), 'hand sequence')} for {pluralize(count, 'trial')}; "
-            "it must have one for each"
+            f"hands has {pluralize(len(sequences), 'hand sequence')} for "
+            f"{pluralize(count, 'trial')}; it must have one for each"
         )
     rows = np.empty((count, len(task.goals)), dtype=np.int64)
     rows[:] = np.reshape([codes[sequence] for sequence in sequences], (-1, len(task.goals)))
