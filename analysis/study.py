@@ -133,8 +133,8 @@ def load(folder: str | Path, *, against: str = "") -> Study:
         if len(runs) < size_of(plan):
             raise CoarticError(
                 f"{folder} has {len(runs)} of {pluralize(size_of(plan), 'run')}: it was "
-                "interrupted, or has only a part of the runs. Repeat the `coartic run` command, which "
-                "makes the missing runs, or --include all parts in another folder."
+                "interrupted, or has only a part of the runs. Repeat the `coartic run` command, "
+                "which makes the missing runs, or --include all parts in another folder."
             )
         study = Study(folder, plan, store.made_with(), runs, store.marks(), imports=store.imports())
     return replace(study, against=_label_in(study, against)) if against else study

@@ -330,8 +330,8 @@ def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed:
         targets = np.repeat(with_entries(start.targets, points), executions, axis=0)
         draws = np.tile(first + np.arange(executions), len(points))
         codes = hand_codes(task, start.hands, count)
-        accounts = make_trials(compiled, codes, targets[:, :, None], worlds=worlds_of(world, draws))
-        trials = trials_of(accounts, task.robot.dof)
+        records = make_trials(compiled, codes, targets[:, :, None], worlds=worlds_of(world, draws))
+        trials = trials_of(records, task.robot.dof)
         iterations = int(trials.iterations.sum())
         session.spend(
             forward_kinematics=int(trials.evaluations.sum()),

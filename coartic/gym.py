@@ -264,8 +264,7 @@ class TaskEnv(gymnasium.Env):
         count_trials(int(self.goal == 0))
         q, dof = self.q, len(self.q)
         postures = [
-            account["corrected"][:dof] if account["corrections"] else None
-            for account in self._found
+            record["corrected"][:dof] if record["corrections"] else None for record in self._found
         ]
         distances = [math.inf if posture is None else _square(posture - q) for posture in postures]
         hand = int(len(distances) > 1 and (distances[1] < distances[0]) != (entries[0] > 0.5))
@@ -276,14 +275,14 @@ class TaskEnv(gymnasium.Env):
         reached = 1 if self.model.motor_noise > 0.0 else len(self._goals) - self.goal
         targets = self._no_targets[:, :reached].copy()
         targets[0, 0, 0] = target
-        account, *next_account = self._reach(self._compiled, hand, targets)
-        self.q, hit = account["q"][:dof].copy(), account["hit"].item()
+        record, *next_record = self._reach(self._compiled, hand, targets)
+        self.q, hit = record["q"][:dof].copy(), record["hit"].item()
         self.goal += hit
         self.going = hit and self.goal < len(self._goals)
         if self.going:
-            rest = range(len(next_account), len(self._sides))
-            self._found = next_account + self._reached_by(rest)
-        reward = -float(account["ticks"].item() if hit else FAILED)
+            rest = range(len(next_record), len(self._sides))
+            self._found = next_record + self._reached_by(rest)
+        reward = -float(record["ticks"].item() if hit else FAILED)
         self._total += reward
         if not self.going:
             self.outcome = self._total if self._total > -FAILED else np.nan
@@ -341,7 +340,7 @@ class TaskEnv(gymnasium.Env):
         ``compiled`` is the task with or without noise, and ``hand`` the index of a hand in
         ``task.hands``. ``targets`` has shape ``(1, goals, 1, dof)``, for one or two goals; without
         a target (NaN) only the corrective process moves the arm. The first hand of the task reaches
-        for the second goal. Return an account for each goal. Both movements are made in one call,
+        for the second goal. Return a record for each goal. Both movements are made in one call,
         because each call is slow.
         """
         sides = self._sides[hand][:, : targets.shape[1]]

@@ -157,8 +157,8 @@ def test_counts_of_trials_with_several_targets_for_a_goal():
     hands, targets = sample(task, 12, 0.3, seed=5)
     twice = np.stack([targets, targets[::-1]], axis=2)
     codes = [[HANDS.index(hand) for hand in hands_of(letters)] for letters in hands]
-    accounts = trials.make_trials(compiled_task(task, model), np.array(codes), twice)
-    for letters, rows, counts, reward in zip(hands, twice, *accounts[1:], strict=True):
+    records = trials.make_trials(compiled_task(task, model), np.array(codes), twice)
+    for letters, rows, counts, reward in zip(hands, twice, *records[1:], strict=True):
         solution = [
             Movement(goal, hand, "learned", target)
             for goal, (hand, both) in enumerate(zip(hands_of(letters), rows, strict=True), 1)

@@ -65,9 +65,9 @@ from coartic.motion.kernels.trial import (
     COUNTED,
     ITERATIONS,
     TICKS,
-    account,
     begin,
     count_goal,
+    record_goal,
     set_off,
 )
 from coartic.motion.kernels.trial import aim as aim_at
@@ -151,7 +151,7 @@ class Results(NamedTuple):
     """Per-goal records of trial 0, if it was completed, shape ``(N, G)``."""
     best_accounts: NDArray[np.void]
     """Per-goal records of the best trial, if there is one, shape ``(N, G)``."""
-    last_accounts: NDArray[np.void]
+    last_records: NDArray[np.void]
     """Per-goal records of the latest trial, shape ``(N, G)``. After the last call this is the
     replay."""
 
@@ -434,7 +434,7 @@ def make_trial(
     robot: RobotRecord,
     learner: LearnerParameters,
     tables: Any,
-    accounts: Any,
+    records: Any,
     rngs: Any,
     seeds: Any,
     workspace: _Workspace,
@@ -442,7 +442,7 @@ def make_trial(
     """Make trial number ``trial``, from 0, in each of N runs.
 
     A trial ends at the first goal that is missed. This function fills the per-goal records
-    ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. Trial 0 has
+    ``records``, shape ``(N, G)``, and the counts in ``workspace``. Trial 0 has
     the hands and targets of ``learner``. If ``explore`` is False, the trial is greedy, without
     drift and noise of exploration. Other arguments are as in :func:`learn_kernel`.
     """
@@ -465,21 +465,21 @@ def make_trial(
                 if run.going:
                     aim_at(run, learner.first_targets[number])
             elif run.going:
-                previous = accounts[n, number - 1].hand if number > 0 else NO_HAND
+                previous = records[n, number - 1].hand if number > 0 else NO_HAND
                 rng = generator_at(rngs, n)
                 aim(n, number, previous, tables[n], explore, robot, learner, rng, workspace)
         move_runs(runs, robot, batch)
         for n in range(runs):
-            accounts[n, number].moved = batch.runs[n].ticks
+            records[n, number].moved = batch.runs[n].ticks
             if batch.runs[n].action == MOVE:
-                fill_row(accounts[n, number].target, batch.runs[n].target)
+                fill_row(records[n, number].target, batch.runs[n].target)
         if initial or learner.nullspace_correction_gain == 0.0:
             correct_runs(runs, robot, batch)
         else:
             correct_runs_informed(runs, robot, batch)
         for n in range(runs):
-            account(batch.runs[n], accounts[n, number].moved, accounts[n, number])
-            count_goal(accounts[n, number], counts[n])
+            record_goal(batch.runs[n], records[n, number].moved, records[n, number])
+            count_goal(records[n, number], counts[n])
 
 
 @inlined
@@ -524,7 +524,7 @@ def _learn_from(
     later_trials = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // later_trials
     for n in range(len(tables)):
-        trial, counts = results.last_accounts[n], workspace.counts[n]
+        trial, counts = results.last_records[n], workspace.counts[n]
         completed = workspace.batch.runs[n].going
         for k in range(len(counts)):
             results.counts[n, k] += counts[k]
@@ -579,7 +579,7 @@ def learn_kernel(
     """
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last trial is the replay, which is not part of the runs
-        explore, accounts = number < trials, results.last_accounts
-        make_trial(number, explore, robot[0], learner, tables, accounts, rngs, seeds, workspace)
+        explore, records = number < trials, results.last_records
+        make_trial(number, explore, robot[0], learner, tables, records, rngs, seeds, workspace)
         if number < trials:
             _learn_from(number, learner, tables, results, workspace)

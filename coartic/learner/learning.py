@@ -42,7 +42,7 @@ from coartic.motion.solution import Movement, corrective_movements, hands_in, mo
 from coartic.motion.trials import (
     compiled_task,
     count_trials,
-    empty_accounts,
+    empty_records,
     make_trials,
     world_seed,
 )
@@ -243,7 +243,7 @@ def _learn_together(
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
-    empty = np.zeros_like(empty_accounts(task.robot, runs, len(task.goals)).goals[..., 0])
+    empty = np.zeros_like(empty_records(task.robot, runs, len(task.goals)).goals[..., 0])
     results = Results(
         rewards=np.zeros((runs, trials), dtype=np.int64),
         completed=np.zeros((runs, trials), dtype=np.bool_),
@@ -252,7 +252,7 @@ def _learn_together(
         corrections=np.zeros((runs, 1 + TENTHS), dtype=np.int64),
         initial_accounts=empty,
         best_accounts=empty.copy(),
-        last_accounts=empty.copy(),
+        last_records=empty.copy(),
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
     learner, rngs = learner_parameters(compiled, condition, initial), addresses(generators)
@@ -264,13 +264,13 @@ def _learn_together(
 
     requested = [[[Movement(1, "right", "learned")]] * len(task.goals)] * runs
 
-    def movements(accounts: NDArray[np.void]) -> list[tuple[Movement, ...]]:
-        trials = zip(movements_in(accounts[..., None], dof, requested), accounts, strict=True)
+    def movements(records: NDArray[np.void]) -> list[tuple[Movement, ...]]:
+        trials = zip(movements_in(records[..., None], dof, requested), records, strict=True)
         return [tuple(trial) if goals["hit"][-1] else () for trial, goals in trials]
 
     initial_trials = movements(results.initial_accounts)
     best_trials = movements(results.best_accounts)
-    replays = movements(results.last_accounts)
+    replays = movements(results.last_records)
     return [
         LearningRun(
             task=task,
@@ -283,7 +283,7 @@ def _learn_together(
             initial=initial_trials[n],
             solution=best_trials[n],
             replay=replays[n],
-            replay_reward=-int(results.last_accounts["ticks"][n].sum()) if replays[n] else None,
+            replay_reward=-int(results.last_records["ticks"][n].sum()) if replays[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
             corrections=results.corrections[n],

@@ -27,9 +27,9 @@ from coartic.motion.solution import Movement, check_targets
 from coartic.motion.trials import (
     NO_NOISE,
     NO_REWARD,
-    Accounts,
     CompiledTask,
     HandSequences,
+    TrialRecords,
     Trials,
     compiled_task,
     count_trials,
@@ -571,8 +571,8 @@ class Session:
         with self.lock:
             left = self._affordable(count)
             drawn = None if chosen is None else chosen[:left]
-            accounts = self._make_trials(codes[:left], configurations[:left], until, drawn)
-        trials = trials_of(accounts, self.dof)
+            records = self._make_trials(codes[:left], configurations[:left], until, drawn)
+        trials = trials_of(records, self.dof)
         if Information.CORRECTIVE_PROCESS in self._information:
             return trials
         return trials._replace(
@@ -642,7 +642,7 @@ class Session:
         targets: Configs,
         until: Array | None = None,
         draws: NDArray[np.int64] | None = None,
-    ) -> Accounts:
+    ) -> TrialRecords:
         """Make and count N trials, and return their per-goal records.
 
         With ``until`` fewer trials may be counted and returned (:meth:`trials`). ``codes`` are the
@@ -650,15 +650,15 @@ class Session:
         holds ``lock``.
         """
         worlds = self._worlds(len(targets), draws)
-        accounts = make_trials(self._compiled, codes, targets[:, :, None], worlds=worlds)
+        records = make_trials(self._compiled, codes, targets[:, :, None], worlds=worlds)
         count_trials(-len(targets) * self._of_run)
         if until is not None:
-            better = trials_of(accounts, self.dof).rewards > until[: len(targets)]
+            better = trials_of(records, self.dof).rewards > until[: len(targets)]
             if better.any():
                 count = int(better.argmax()) + 1
-                accounts = Accounts._make(array[:count] for array in accounts)
-        self._count(accounts.rewards, *np.add.reduce(accounts.counts).tolist())
-        return accounts
+                records = TrialRecords._make(array[:count] for array in records)
+        self._count(records.rewards, *np.add.reduce(records.counts).tolist())
+        return records
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """Find the hand sequence of the first trial, such as ``"RRRR"``.

@@ -40,8 +40,8 @@ from coartic.motion.trials import (
     JUDGE,
     NO_NOISE,
     NO_WAYPOINTS,
-    Accounts,
     CompiledTask,
+    TrialRecords,
     compiled_task,
     make_trials,
     reason_of_failure,
@@ -244,14 +244,14 @@ def _execute_plans(
         return []
     aims = [[_with_targets(movements) for movements in plan] for plan in plans]
     requested = _requested(compiled, aims, _hands_of(plans))
-    accounts = make_trials(compiled, *requested, worlds=worlds).goals
-    executed = movements_in(accounts, compiled.task.robot.dof, aims)
-    trials = zip(plans, executed, accounts[..., 0], strict=True)
+    records = make_trials(compiled, *requested, worlds=worlds).goals
+    executed = movements_in(records, compiled.task.robot.dof, aims)
+    trials = zip(plans, executed, records[..., 0], strict=True)
     return [_execution_of(compiled, *trial) for trial in trials]
 
 
 def movements_in(
-    accounts: NDArray[np.void], dof: int, requested: Iterable[Iterable[Sequence[Movement | None]]]
+    records: NDArray[np.void], dof: int, requested: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
     """Return the movements made in N trials, up to the first goal that was missed.
 
@@ -259,7 +259,7 @@ def movements_in(
 
     Parameters
     ----------
-    accounts : ndarray, shape (N, G, M)
+    records : ndarray, shape (N, G, M)
         Per-goal records of the trials.
             dof : int
         Length of a configuration.
@@ -273,9 +273,9 @@ def movements_in(
         A list for each trial.
     """
     names = ("hand", "hit", "ticks", "corrections")
-    goals = accounts[..., 0]
-    columns = [goals[name].tolist() for name in names] + [accounts["moved"].tolist()]
-    targets, trials = accounts["target"][..., :dof], []
+    goals = records[..., 0]
+    columns = [goals[name].tolist() for name in names] + [records["moved"].tolist()]
+    targets, trials = records["target"][..., :dof], []
     for n, of_trial in enumerate(requested):
         movements: list[Movement] = []
         of_goals = zip(of_trial, *[column[n] for column in columns], strict=True)
@@ -289,14 +289,12 @@ def movements_in(
                     movements.append(made)
             if corrections:
                 ticks = total - sum(moved)
-                corrected = accounts["corrected"][n, g, 0, :dof]
+                corrected = records["corrected"][n, g, 0, :dof]
                 movements.append(Movement(goal, hand, "corrective", corrected, ticks))
             if not hit:
                 break
             if len(movements) == start:  # hit without a movement: record the hand
-                movements.append(
-                    Movement(goal, hand, "corrective", accounts["q"][n, g, 0, :dof], 0)
-                )
+                movements.append(Movement(goal, hand, "corrective", records["q"][n, g, 0, :dof], 0))
         trials.append(movements)
     return trials
 
@@ -503,8 +501,8 @@ def execute_noisy(
         number, draws = np.divmod(np.arange(begin, min(begin + _AT_ONCE, count)), int(repeats))
         actions = movements[number] if len(movements) else movements
         of_part = hands[number], targets[number], actions, waypoints
-        accounts = make_trials(compiled, *of_part, worlds_of(seeds[number], draws))
-        parts.append(_ticks_of(accounts))
+        records = make_trials(compiled, *of_part, worlds_of(seeds[number], draws))
+        parts.append(_ticks_of(records))
     return np.concatenate(parts).reshape(len(plans), -1)
 
 
@@ -513,9 +511,9 @@ def _hands_of(plans: Sequence[Plan]) -> list[int]:
     return [HANDS.index(movements[0].hand) for plan in plans for movements in plan]
 
 
-def _ticks_of(accounts: Accounts) -> Array:
+def _ticks_of(records: TrialRecords) -> Array:
     """Return the ticks of trials, shape ``(N,)``; NaN for a trial that failed."""
-    return np.where(accounts.counts[:, FAILURES] > 0, np.nan, accounts.counts[:, TICKS])
+    return np.where(records.counts[:, FAILURES] > 0, np.nan, records.counts[:, TICKS])
 
 
 def _execute_exactly(
@@ -540,11 +538,11 @@ def _execute_exactly(
     ticks, due = np.empty(len(plans)), [*range(len(plans))]
     while due:
         aims_due, hands = [aims[k] for k in due], _hands_of([plans[k] for k in due])
-        accounts = make_trials(compiled, *_requested(compiled, aims_due, hands))
-        ticks[due] = _ticks_of(accounts)
+        records = make_trials(compiled, *_requested(compiled, aims_due, hands))
+        ticks[due] = _ticks_of(records)
         changed = []
         for n, k in enumerate(due):
-            for g, goal in enumerate(accounts.goals[n, :, 0]):
+            for g, goal in enumerate(records.goals[n, :, 0]):
                 after = [m for m in plans[k][g] if m.kind == "corrective"][kept[k][g] :]
                 target = after[0].target if after else None
                 if target is not None and not _is_found(goal, target):

@@ -54,11 +54,9 @@ def ranked_sequences(
     exact = model.without_noise()
     compiled, codes = compiled_task(task, exact), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
-    accounts = make_trials(compiled, codes, targets)
+    records = make_trials(compiled, codes, targets)
     trials = []
-    for hands, goals, counts in zip(
-        sequences, accounts.goals[..., 0], accounts.counts, strict=True
-    ):
+    for hands, goals, counts in zip(sequences, records.goals[..., 0], records.counts, strict=True):
         spent = dict(zip(COUNTED, counts.tolist(), strict=True))
         # coartic.execute also evaluates the position of the hand at each goal that is tried.
         spent["forward_kinematics"] += int(goals["hit"].sum()) + spent["failed_trials"]

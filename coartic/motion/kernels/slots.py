@@ -191,7 +191,7 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
         "spent": np.int64,  # of these, of the corrections before the present one
         "corrections": np.int64,  # corrective movements made for the goal
         "iterations": np.int64,  # of the corrective process for the goal
-        "evaluations": np.int64,  # of forward kinematics, since the last account
+        "evaluations": np.int64,  # of forward kinematics, since the last record
     }
     record, corrected, moved = layout(_links_for(robot))
     slots = np.zeros(1, record)
