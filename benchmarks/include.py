@@ -30,7 +30,7 @@ from coartic.internal.text import pluralize
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, hash_of
 from coartic.runs.shipped import SHIPPED, open_shipped
-from coartic.runs.store import Store, open_store, writing
+from coartic.runs.store import Store, open_store, open_store_for_writing
 
 
 def include_folders(
@@ -109,7 +109,7 @@ def include_folders(
             source.check_file()  # all sources are checked before the first row is copied
         known = methods or {job.cell.method.name: job.cell.method for job in plan}
         joined = _join(plan, sources, tasks, known)
-        target = stack.enter_context(writing(out))
+        target = stack.enter_context(open_store_for_writing(out))
         _check_same_results({str(out): target, **sources})
         target.replace_plan(joined, made_with())
         for source in sources.values():

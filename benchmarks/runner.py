@@ -32,7 +32,7 @@ from coartic.internal.text import error_line, pluralize
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
 from coartic.runs.record import UNREPEATED, Row
-from coartic.runs.store import Store, writing
+from coartic.runs.store import Store, open_store_for_writing
 
 _MIN_BATCH = 8
 """Smallest number of runs of a job whose method performs runs side by side, if its cell has as
@@ -234,7 +234,7 @@ def perform(
         raise CoarticError(f"executor is {brief_value(executor)}; it must be a Local or a Dask")
     if not plan:
         raise CoarticError("the plan has no jobs")
-    with writing(folder) as store:
+    with open_store_for_writing(folder) as store:
         store.replace_plan(plan, made_with())
         progress = Progress(folder, size_of(plan), outdated=store.count_outdated_runs())
         progress.others = store.others() - progress.outdated.total()

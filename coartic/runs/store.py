@@ -623,7 +623,7 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[Store]:
+def open_store_for_writing(folder: Path) -> Iterator[Store]:
     """Lock a results folder, and open it for writing in a ``with`` block.
 
     A missing folder is made. Raises CoarticError if the folder contains something else, if it
