@@ -40,7 +40,9 @@ def report(
     ] = False,
     width: Annotated[
         float | None,
-        given.within("--width", "Width of these figures in inches: 3.4 for one column.", 2.5, 20),
+        given.ranged_option(
+            "--width", "Width of these figures in inches: 3.4 for one column.", 2.5, 20
+        ),
     ] = None,
     against: Annotated[
         str | None,
@@ -179,7 +181,9 @@ def _say_ranking_of_world(study: Study) -> None:
 
 def verify(
     folder: given.ResultsFolder,
-    again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MAX_RUNS)] = 0,
+    again: Annotated[
+        int, given.ranged_option("--again", "Also perform N runs again.", 0, MAX_RUNS)
+    ] = 0,
     run: Annotated[
         list[str] | None,
         given.option(
@@ -367,7 +371,7 @@ def draw(
     ] = False,
     width: Annotated[
         int | None,
-        given.within("--width", "Width of the film in pixels; by default 800.", 200, 3840),
+        given.ranged_option("--width", "Width of the film in pixels; by default 800.", 200, 3840),
     ] = None,
     out: Annotated[
         Path | None,

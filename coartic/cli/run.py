@@ -45,7 +45,7 @@ def run(
     runs: Annotated[
         Any,
         typer.Option(
-            parser=given.runs_named,
+            parser=given.parse_run_range,
             metavar="N",
             help="Runs of each method on each task, or a part of them, such as 50..99.",
         ),
@@ -56,7 +56,9 @@ def run(
     ] = None,
     jobs: Annotated[
         int | None,
-        given.within("--jobs", "Number of processes; by default one for each core.", 1, MAX_JOBS),
+        given.ranged_option(
+            "--jobs", "Number of processes; by default one for each core.", 1, MAX_JOBS
+        ),
     ] = None,
     tasks: Annotated[
         list[str] | None,
@@ -131,16 +133,16 @@ def run(
     with interruptible(saved), display:
         display.show(f"Planning the runs of {chosen.name}")
         registered = registry(method_file or ())
-        names = given.methods_meant(given.names_in(methods), registered, expand=False)
+        names = given.resolve_methods(given.split_names(methods), registered, expand=False)
         if include and not names:  # only the user's own methods
             names = [name for name, info in registered.items() if info.where.endswith(".py")]
         request = request_for(
-            tasks=given.names_in(tasks),
+            tasks=given.split_names(tasks),
             methods=names,
             family_files=family_file or (),
             **{"runs": runs, "trials": trials, "seed": seed},
             **{"time_limit_s": time_limit, "trial_budget": trial_budget},
-            model=given.constants_in(given.names_in(model)),
+            model=given.constants_in(given.split_names(model)),
         )
         asked = plan(chosen, request, registered)
         if include:
@@ -212,7 +214,7 @@ def list_(
         pairs = _describe_family(family, family.name)
     else:
         try:
-            methods = given.methods_meant([name], registered)
+            methods = given.resolve_methods([name], registered)
         except CoarticError as error:
             if Path(name).is_dir():
                 return _list_runs(Path(name))  # explains what the folder lacks
@@ -345,7 +347,7 @@ def check(
             results = check_task_file(Path(subject), registered)
         broken = _show_results(subject, results)
     else:
-        names = given.methods_meant([subject], registered)
+        names = given.resolve_methods([subject], registered)
         given.check_used(method_file, registered, names)
         broken = 0
         for name in names:
