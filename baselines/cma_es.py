@@ -50,7 +50,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic.baselines.bandit import Search, recommend, sequences_to_try, spend_trials
-from coartic.baselines.evolution import EvolutionStrategy
+from coartic.baselines.cma_strategy import EvolutionStrategy
 from coartic.baselines.uninformed import Attempts, SequenceParameters, UninformedParameters
 from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION

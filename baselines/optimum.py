@@ -34,7 +34,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Task, TaskError, execute, parse_task
-from coartic.baselines.evolution import EvolutionStrategy
+from coartic.baselines.cma_strategy import EvolutionStrategy
 from coartic.baselines.posture_graph import QUICK, Count, Nodes, cheapest_chains
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import IPOPT, trajectory_problem
