@@ -42,7 +42,7 @@ _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError
 """Errors that malformed data raises."""
 
 
-def process_peak_mb() -> float:
+def peak_rss_mib() -> float:
     """Return the largest resident memory of this process so far, in MiB."""
     unit = 2**20 if sys.platform == "darwin" else 2**10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
@@ -144,7 +144,7 @@ def perform_job(job: Job) -> list[Outcome]:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     runs = len(sessions)
-    times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
+    times = Times(wall / runs, cpu / runs, warm, runs, peak_rss_mib())
     pairs = zip(results, sessions, strict=True)
     return [_outcome_of(cell.method, result, session, times) for result, session in pairs]
 

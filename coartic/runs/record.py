@@ -69,7 +69,7 @@ class Times:
     """True if the process had run the method before; None if unknown."""
     together: int = 1
     """Number of runs of the job, which were made together."""
-    process_peak_mb: float | None = None
+    peak_rss_mib: float | None = None
     """Largest memory of the worker so far, including earlier runs (in MiB); None if unknown."""
 
 
@@ -319,7 +319,7 @@ COLUMNS = (
      "whether the process had run the method before"),
     ("together", "INTEGER", "outcome.times.together",
      "runs that one process made side by side; they share their time evenly"),
-    ("process_peak_mb", "REAL", "outcome.times.process_peak_mb",
+    ("process_peak_mb", "REAL", "outcome.times.peak_rss_mib",
      "most memory of the process so far, MiB"),
     ("time_limit_s", "REAL", "job.time_limit_s", "limit of CPU time, seconds"),
     ("date", "TEXT NOT NULL", "date", "date and time at the end, UTC"),
