@@ -151,7 +151,9 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
         if cell is None or cell.iloc[0].get("stages", 1) > 1:
             continue
         hands = {*solved(cell).hands}
-        sequences = {""} if hands and of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
+        sequences = (
+            {""} if hands and of_search.method_id[label] == f"{RANDOM_SEARCH}/hands" else hands
+        )
         if len(sequences) == 1:
             explored = explores_idle_arm(study, task, label)
             key = sequences.pop(), _most_trials(study, task, label), explored

@@ -147,7 +147,7 @@ def _label_in(study: Study, name: str) -> str:
     such as ``EC4``. Raises CoarticError if no method, or more than one, has the name.
     """
     methods = study.methods
-    for names in (methods.index, methods.base, methods.title):
+    for names in (methods.index, methods.method_id, methods.title):
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
             labels = [str(label) for label in methods.index[names == wanted]]
             if len(labels) > 1:
@@ -450,12 +450,12 @@ class Study:
         EC4 on tasks for two, have a further row, which copies most columns of the second condition.
         Columns:
 
-        - ``base``: id of the method without a setting;
+        - ``method_id``: id of the method without a setting;
         - ``condition``: id of the learner's condition, such as ``EC4``, also if informed or an
           ablation; empty for a user's own condition and for other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
         - ``title``: name on the page, in tables and figures;
-        - ``short``: name in figures of one column;
+        - ``short_title``: name in figures of one column;
         - ``algorithm``: algorithm of which the method is a form;
         - ``is_learner``: True for the paper's learner under the paper's conditions, with any
           setting;
@@ -465,9 +465,10 @@ class Study:
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with any setting, represents its algorithm;
-        - ``under``: if this row is a setting or an ablation of another method, under which lists
+        - ``parent``: if this row is a setting or an ablation of another method, under which lists
           show it, the label of that method; otherwise empty;
-        - ``look``: names of colour and marker in figures, a tuple of two strings.
+        - ``style``: names of colour and marker in figures, a tuple of two strings. Write
+          ``methods["style"]``: ``methods.style`` is pandas' own.
         """
         return methods_of(self.runs, self.declared, self.marks)
 

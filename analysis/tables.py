@@ -230,7 +230,7 @@ def _with_marks(rows: pd.DataFrame, study: Study) -> pd.DataFrame:
         return rows
     notes = []
     for row in rows.to_dict("records"):
-        methods = dict.fromkeys(str(study.methods.base.get(row[name])) for name in columns)
+        methods = dict.fromkeys(str(study.methods.method_id.get(row[name])) for name in columns)
         marks = itertools.chain(*(study.marks.get(method, ()) for method in methods))
         notes.append("; ".join(filter(None, [row.get("note"), *marks])))
     if "note" not in rows:
@@ -242,12 +242,12 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
     """Return True for rows whose method is a setting or an ablation of another row's method.
 
     Methods are compared by column ``against`` if the table has it, otherwise by ``method``. Column
-    ``under`` of :attr:`.Study.methods` says of which method a method is a setting or an ablation.
+    ``parent`` of :attr:`.Study.methods` says of which method a method is a setting or an ablation.
     """
     if "method" not in frame:
         return pd.Series(False, frame.index)
     label = frame["against" if "against" in frame else "method"]
-    return label.map(study.methods.under).isin([*label])
+    return label.map(study.methods.parent).isin([*label])
 
 
 def caption_of(table: Table, study: Study) -> str:
@@ -654,7 +654,7 @@ def list_differences(study: Study) -> Rows:
 
     - it has no runs or a failed run on one of these tasks;
     - it was asked for another number of trials;
-    - it is a setting or an ablation of a method that ran (:attr:`.Study.methods`, ``under``).
+    - it is a setting or an ablation of a method that ran (:attr:`.Study.methods`, ``parent``).
 
     Intervals are for other runs on the same tasks. p is two-sided (:func:`.stratified_test`), and
     corrected over the rows of the same reference method (Holm).
@@ -671,7 +671,7 @@ def list_differences(study: Study) -> Rows:
         alike = methods.built_in & (methods.information == methods.information[against])
         if chosen:
             alike = methods.index != against
-        for row in methods.index[alike & (methods.under == "")].intersection(rows.index):
+        for row in methods.index[alike & (methods.parent == "")].intersection(rows.index):
             runs = runs_on(study, row, tasks) if tasks else compared_runs(study)[:0]
             names = runs.label.unique()
             name = names[0] if len(names) == 1 else row
@@ -833,7 +833,7 @@ def list_parameters(study: Study) -> Rows:
         differences = [_difference_of_gaps(sample, samples[best]) for sample in samples]
         p = holm([each.p for place, each in enumerate(differences) if place != best])
         p.insert(best, math.nan)
-        base = str(methods.base[values[0].labels[0]])
+        base = str(methods.method_id[values[0].labels[0]])
         default = study.declared[base].defaults.get(parameter)
         same = _are_equal(study, [value.labels for value in values])
         rows = zip(values, estimates, differences, p, strict=True)

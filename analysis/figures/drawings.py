@@ -747,7 +747,7 @@ def _runs_with_curves(
         if task in study.individual_tasks and len(runs := solved(cell[cell.run_id.isin(run_ids)]))
     }
     rows = study.methods[study.methods.index.isin([label for _, label in cells])]
-    drawn = headline_methods(rows[rows.base.isin(CURVES) | ~rows.built_in])
+    drawn = headline_methods(rows[rows.method_id.isin(CURVES) | ~rows.built_in])
     for task, label in itertools.product(study.individual_tasks, drawn):
         two_armed = any((task, learner) in cells for learner in LEARNERS[1:])
         if (task, label) in cells and not (two_armed and label == EC1):

@@ -132,7 +132,7 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     """
     looks: dict[str, style.Look] = {}
     for label, row in study.methods.loc[[*labels]].iterrows():
-        color, mark = row.look
+        color, mark = row["style"]
         width, size = (1.2, 4.2) if row.built_in else (2.4, 7.0)
         looks[str(label)] = {
             "color": COLORS[color], "marker": MARKS[mark][0], "linestyle": MARKS[mark][1],
@@ -153,14 +153,14 @@ def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -
         row = study.methods.loc[method]
         values = study.varied.loc[method].items()
         words = values_in_words({str(name): value for name, value in values})
-        words += f", {default_name(str(row.base))}" * (not row.setting) + MARK * row.title.endswith(
-            MARK
-        )
+        words += f", {default_name(str(row.method_id))}" * (
+            not row.setting
+        ) + MARK * row.title.endswith(MARK)
         return "\n".join(
             textwrap.wrap(words, _MAX_NAME_LENGTH // 2 if style.is_narrow() else longest)
         )
     if style.is_narrow():
-        return "\n".join(textwrap.wrap(study.methods.short[method], _MAX_NAME_LENGTH // 2))
+        return "\n".join(textwrap.wrap(study.methods.short_title[method], _MAX_NAME_LENGTH // 2))
     return "\n".join(textwrap.wrap(study.methods.title[method], longest))
 
 

@@ -53,7 +53,7 @@ def answer_on_parameters(study: Study) -> list[str]:
 
 def _best_setting(study: Study, rows: pd.DataFrame) -> str:
     """Return sentences on the best of the ranked settings ``rows``, the first of them."""
-    best, base = str(rows.index[0]), str(rows.base.iloc[0])
+    best, base = str(rows.index[0]), str(rows.method_id.iloc[0])
     method = {**rows.iloc[0], "title": title_of(study.declared[base])}
     others = list_differences(study)
     is_alike = (others.p_holm >= LEVEL) | (others.difference == 0)

@@ -127,7 +127,7 @@ def _say_ranking_of_world(study: Study) -> None:
         row.title
         if row.built_in
         else "> " * has_others
-        + (row.title if row.title.startswith(row.base) else f"{row.base}: {row.title}")
+        + (row.title if row.title.startswith(row.method_id) else f"{row.method_id}: {row.title}")
         for _, row in methods.iterrows()
     ]
     methods = methods.assign(name=names)
