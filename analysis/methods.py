@@ -105,7 +105,7 @@ def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False
         name = one_line(method)
     else:
         name = one_line((method.facts.short or method.name) if short else method.title)
-    return f"{name} ({setting_in_words(setting)})" if setting else name
+    return f"{name} ({describe_setting(setting)})" if setting else name
 
 
 def subject_of(method: Mapping[str, Any]) -> str:
@@ -129,14 +129,14 @@ def subject_of(method: Mapping[str, Any]) -> str:
     return f"{article}{title}{comma}"
 
 
-def setting_in_words(setting: str) -> str:
+def describe_setting(setting: str) -> str:
     """Return a setting, such as ``sigma=0.1, stop=1``, as titles have it: ``σ 0.1, stop 1``."""
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
     words = (_WORDS.get(key, key + equals) + value for key, equals, value in pairs)
     return ", ".join(words).replace("_", " ")
 
 
-def values_in_words(values: Mapping[str, Any]) -> str:
+def describe_values(values: Mapping[str, Any]) -> str:
     """Return values of varied parameters in words, such as ``noise_sd 0.05, epsilon 0.2``.
 
     Parameters have the names under which a suite sets them.
@@ -198,11 +198,11 @@ def methods_of(
     shorts = Counter(title_of(info, short=True) for info in declared.values())
     for label, of_method in by_label.items():
         method_id, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
-        named = f" ({setting_in_words(setting)})" * bool(setting)
+        named = f" ({describe_setting(setting)})" * bool(setting)
         if label in varied.index:
             default_note = f", {default_name(method_id)}" * (not setting)
             values = dict(zip(varied.columns, varied.loc[label], strict=True))
-            named = f" ({values_in_words(values)}{default_note})"
+            named = f" ({describe_values(values)}{default_note})"
         info = declared[method_id]
         known = KNOWN_METHODS.get(method_id) if info.is_ours else None
         facts = known.facts if known else info.facts

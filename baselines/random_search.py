@@ -28,7 +28,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from coartic.baselines.uninformed import Attempts
-from coartic.internal.validation import sentence_error
+from coartic.internal.validation import described_error
 from coartic.learner.conditions import MAX_NOISE
 from coartic.learner.learning import runs_at_once
 from coartic.method import TRIALS, Facts, Method, MethodError, Parameters, Result, Session
@@ -61,7 +61,7 @@ class RandomSearchHandsParameters(Parameters):
     @model_validator(mode="after")
     def _check_stages(self) -> Self:
         if self.stages > self.trials:
-            raise sentence_error(
+            raise described_error(
                 f"stages is {self.stages}; it must be at most the number of trials, {self.trials}"
             )
         return self

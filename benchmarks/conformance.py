@@ -32,7 +32,7 @@ from coartic.motion.execution import execute_many
 from coartic.motion.solution import goals_without_target, next_action
 from coartic.motion.trials import compiled_task, world_seed, worlds_of
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, in_words
+from coartic.runs.plan import Job, cell_of, describe_parameters
 from coartic.runs.record import Row
 from coartic.tasks.task import check_task
 
@@ -249,7 +249,7 @@ CHECKS: dict[
     tuple[Callable[[MethodInfo, _Runs], Iterator[str]], Callable[[MethodInfo, _Runs], str]],
 ] = {
     "declaration": (_declaration, lambda info, _: info.title),
-    "parameters": (_parameters, lambda info, _: in_words(info.complete({})) or "none"),
+    "parameters": (_parameters, lambda info, _: describe_parameters(info.complete({})) or "none"),
     "solution": (_solution, _rewards),
     "determinism": (_determinism, _seeds),
     "no hidden state": (

@@ -34,10 +34,10 @@ from coartic.internal.limits import (
     plain_values,
 )
 from coartic.internal.text import pluralize, unknown
-from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.internal.validation import FileData, described_error, explain
 from coartic.model import PAPER, MotionModel, differences
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, in_words, tasks_by_name
+from coartic.runs.plan import Job, cell_of, describe_parameters, tasks_by_name
 from coartic.tasks.families import (
     instance_of,
     is_file,
@@ -54,7 +54,7 @@ def _task_or_name(value: Any) -> Task | str:
     """Validate a task: a Task, or a name or path, which is returned as a string."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
-    raise sentence_error(f"task {value!r} must be a name, a path or a Task")
+    raise described_error(f"task {value!r} must be a name, a path or a Task")
 
 
 def _runs_asked(value: Any) -> int | range | None:
@@ -67,7 +67,7 @@ def _runs_asked(value: Any) -> int | range | None:
             check_limits("its first run", first, 0, MAX_RUNS)
     except ValueError as error:
         example = "range(50, 100), or 50..99 in a command"
-        raise sentence_error(f"{error}, or a range, such as {example}") from None
+        raise described_error(f"{error}, or a range, such as {example}") from None
     return value if is_range or value is None else int(value)
 
 
@@ -371,7 +371,7 @@ def _suite_jobs(
             if request.model and worlds:
                 warnings.warn(
                     f"suite {suite.name!r}, block {number}, is left out: it has a world of its own "
-                    f"({', '.join(in_words(differences(world)) for world in worlds)})",
+                    f"({', '.join(describe_parameters(differences(world)) for world in worlds)})",
                     stacklevel=2,
                 )
                 continue

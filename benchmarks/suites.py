@@ -18,7 +18,7 @@ from coartic import CoarticError, Task, builtin_tasks, parse_task
 from coartic.internal.limits import MAX_RUNS, MAX_SECONDS, MAX_TRIALS
 from coartic.internal.text import Line, plain, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.internal.validation import FileData, described_error, explain
 from coartic.model import WORLD, MotionModel, check_model
 from coartic.robot import Finite
 from coartic.runs.store import RUNS_FILE
@@ -63,14 +63,14 @@ def _worlds(value: Any) -> tuple[MotionModel, ...]:
     if isinstance(value, tuple) and all(isinstance(world, MotionModel) for world in value):
         return value
     if not isinstance(value, Mapping) or not value:
-        raise sentence_error(
+        raise described_error(
             f"model is {value!r}; it must be a table of constants, such as {{ motor_noise = 0.01 }}"
         )
     for name in value:
         if name not in WORLD:
-            raise sentence_error(f"model has no constant {name!r}; it has {', '.join(WORLD)}")
+            raise described_error(f"model has no constant {name!r}; it has {', '.join(WORLD)}")
         if value[name] in ([], ()):
-            raise sentence_error(f"model.{name} is empty; it must be a value or a list of values")
+            raise described_error(f"model.{name} is empty; it must be a value or a list of values")
     lists = [
         value[name] if isinstance(value[name], list | tuple) else [value[name]] for name in value
     ]
@@ -80,7 +80,7 @@ def _worlds(value: Any) -> tuple[MotionModel, ...]:
             for values in itertools.product(*lists)
         )
     except (TypeError, ValueError) as error:
-        raise sentence_error(str(error)) from None
+        raise described_error(str(error)) from None
 
 
 Worlds = Annotated[tuple[MotionModel, ...], PlainValidator(_worlds)]

@@ -23,7 +23,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.validation import in_sentences
+from coartic.internal.validation import describe_validation_errors
 
 Hand = Literal["left", "right"]
 """Name of a hand: ``"left"`` or ``"right"``."""
@@ -112,7 +112,7 @@ def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
 
 
-@in_sentences
+@describe_validation_errors
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class Robot:
     """Geometry and kinematics of a planar robot with two arms, by default the paper's.

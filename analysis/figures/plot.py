@@ -22,12 +22,12 @@ from matplotlib.figure import Figure
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
-from coartic.analysis.methods import COLORS, MARK, MARKS, default_name, values_in_words
+from coartic.analysis.methods import COLORS, MARK, MARKS, default_name, describe_values
 from coartic.analysis.standings import reference
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, ending_of, id_of, number
 from coartic.errors import CoarticError
-from coartic.internal.files import errors_in_words
+from coartic.internal.files import describe_os_errors
 from coartic.internal.limits import brief_value
 from coartic.internal.text import one_line
 from coartic.internal.threads import environment
@@ -58,7 +58,7 @@ class Plot:
         Raises CoarticError for another suffix, and if the file cannot be written.
         """
         path = Path(path)
-        with errors_in_words(path):
+        with describe_os_errors(path):
             path.write_bytes(picture(self.figure, path.suffix))
 
     def _repr_html_(self) -> str:
@@ -152,7 +152,7 @@ def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -
     if method in study.varied.index:
         row = study.methods.loc[method]
         values = study.varied.loc[method].items()
-        words = values_in_words({str(name): value for name, value in values})
+        words = describe_values({str(name): value for name, value in values})
         words += f", {default_name(str(row.method_id))}" * (
             not row.setting
         ) + MARK * row.title.endswith(MARK)

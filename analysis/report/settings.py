@@ -10,9 +10,9 @@ import pandas as pd
 from coartic.analysis.methods import (
     are_numbers,
     default_name,
+    describe_values,
     subject_of,
     title_of,
-    values_in_words,
 )
 from coartic.analysis.standings import (
     has_few_runs,
@@ -143,7 +143,7 @@ def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
 
 def _words(study: Study, label: str) -> str:
     """Return the varied values of a setting in words."""
-    return values_in_words(dict(zip(study.varied.columns, study.varied.loc[label], strict=True)))
+    return describe_values(dict(zip(study.varied.columns, study.varied.loc[label], strict=True)))
 
 
 def _gap_of(gap: float) -> str:

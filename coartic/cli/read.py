@@ -285,7 +285,7 @@ def _describe_run(run: Row, code: str) -> None:
     """
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
-    from coartic.runs.plan import in_words
+    from coartic.runs.plan import describe_parameters
 
     cell, result = run.cell, f"{run['status']}: {run['reason']}"
     if run["reward"] is not None:
@@ -300,7 +300,7 @@ def _describe_run(run: Row, code: str) -> None:
                 f"{run['run_id']}: {cell.task.label}, {title_of(cell.method)}, run {run['run']}",
             ),
             ("Seed", str(run["seed"])),
-            ("Parameters", in_words(cell.parameters)),
+            ("Parameters", describe_parameters(cell.parameters)),
             *world,
             ("Result", result),
         ]

@@ -289,7 +289,7 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     """Yield a description of a method, as pairs for :func:`.say_pairs`."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
-    from coartic.runs.plan import in_words
+    from coartic.runs.plan import describe_parameters
 
     applies = (
         task for task in builtin_tasks() if info.inapplicable_reason(load_task(task)) is None
@@ -297,7 +297,7 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     yield "Method", f"{info.name}: {info.title}"
     yield "Called", title_of(info)
     yield "Information", ", ".join(info.information)
-    yield "Parameters", in_words(info.defaults) or "none"
+    yield "Parameters", describe_parameters(info.defaults) or "none"
     yield "Tasks", ", ".join(applies) or "none of the paper's tasks"
     yield "Runs", "depend on the seed" if info.stochastic else "do not depend on the seed"
     yield "Tuned on", info.tuned_on or "not stated"

@@ -47,7 +47,7 @@ from pydantic.dataclasses import dataclass
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import unknown
-from coartic.internal.validation import in_sentences, sentence_error
+from coartic.internal.validation import describe_validation_errors, described_error
 from coartic.robot import HANDS, Hand
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _one_or_many(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
     try:
         return validate(value)
     except ValidationError:
-        raise sentence_error(
+        raise described_error(
             f"drift is {brief_value(value)}; it must be a number from 0 to 10, or a list of such "
             "numbers"
         ) from None
@@ -82,7 +82,7 @@ Drifts = Annotated[
 ]
 
 
-@in_sentences
+@describe_validation_errors
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class ExplorationCondition:
     """Rules of the learner's exploration and learning (paper, section *Experiments*).

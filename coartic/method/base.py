@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 
 from coartic.errors import NotApplicableError
 from coartic.internal.limits import MAX_RUN_SEED, check_limits
-from coartic.internal.validation import in_sentences
+from coartic.internal.validation import describe_validation_errors
 from coartic.method.session import Information, MethodError, Session
 from coartic.model import PAPER, WORLD, MotionModel, check_model, differences
 from coartic.motion.initial_hands import too_many_sequences
@@ -31,7 +31,7 @@ CORRECTIONS_BY_TENTH = "corrections"
 each tenth of the later trials."""
 
 
-@in_sentences
+@describe_validation_errors
 class Parameters(BaseModel):
     """Base class of the parameters of methods: typed, validated, immutable, plain data."""
 
@@ -108,7 +108,7 @@ def outline_of(task: Task) -> Outline:
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
-@in_sentences
+@describe_validation_errors
 @checked_dataclass(frozen=True)
 class Facts:
     """Citations and names of a method for figures, tables and the bibliography.

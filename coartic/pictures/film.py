@@ -20,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from coartic.errors import CoarticError
-from coartic.internal.files import check_ending, check_output, errors_in_words, write_output
+from coartic.internal.files import check_ending, check_output, describe_os_errors, write_output
 from coartic.internal.text import pluralize
 from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals, number_goals
 
@@ -87,7 +87,7 @@ def write_film(
     rate: Any = RATE
     writer = FFMpegWriter(rate, codec="h264") if is_mp4 else PillowWriter(rate)
     try:
-        with errors_in_words(path), tempfile.TemporaryDirectory() as folder:
+        with describe_os_errors(path), tempfile.TemporaryDirectory() as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
             FuncAnimation(figure, show, shown, lambda: (), cache_frame_data=False).save(
                 film, writer

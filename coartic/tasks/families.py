@@ -38,7 +38,7 @@ from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import MAX_CELLS, check_limits
 from coartic.internal.text import BACKWARDS, Line, plain, pluralize, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.internal.validation import FileData, described_error, explain
 from coartic.motion.doors import move
 from coartic.motion.initial_hands import ranked_sequences, search_initial_hands
 from coartic.robot import HANDS, Hand, Robot
@@ -81,7 +81,7 @@ def _in_thousandths(value: float) -> int:
     if not is_number or not abs(value * _PARTS) <= sys.float_info.max:
         raise PydanticCustomError("finite", "should be a finite number")
     if round(value * _PARTS) / _PARTS != value:
-        raise sentence_error(f"{value} should have at most three decimals")
+        raise described_error(f"{value} should have at most three decimals")
     return round(value * _PARTS)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import product
 from statistics import median
 
-from comparisons import Higher, in_words, written
+from comparisons import Higher, describe_parts, written
 from performance import no_trial_fails
 from reader import CONDITIONS, EC1, EC2, EC3, EC4, LEARNER, MARGINS, MissingError
 
@@ -50,7 +50,7 @@ def in_families(families, *comparisons):
         if not findings:
             raise MissingError(f"fewer than {MIN_TASKS} instances of {listed(few)} can be judged")
         finding = all_of(*findings)
-        evidence = in_words(parts)
+        evidence = describe_parts(parts)
         if few:
             seen = f"fewer than {MIN_TASKS} instances can be judged of {listed(few)}. {evidence}"
             return Finding(None, seen)
