@@ -57,9 +57,9 @@ from coartic.motion.trials import (
     compiled_task,
     hand_codes,
     make_trials,
+    noise_draws,
+    noise_seed,
     trials_of,
-    world_seed,
-    worlds_of,
 )
 from coartic.robot import Array, Configs
 from coartic.tasks.task import letters_of
@@ -323,14 +323,16 @@ def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed:
     ticks.
     """
     compiled = compiled_task(task, session.model)
-    world = world_seed(seed, _SEARCH)
+    world = noise_seed(seed, _SEARCH)
 
     def mean_ticks(points: Array, first: int, executions: int) -> Array:
         count = len(points) * executions
         targets = np.repeat(with_entries(start.targets, points), executions, axis=0)
         draws = np.tile(first + np.arange(executions), len(points))
         codes = hand_codes(task, start.hands, count)
-        records = make_trials(compiled, codes, targets[:, :, None], worlds=worlds_of(world, draws))
+        records = make_trials(
+            compiled, codes, targets[:, :, None], worlds=noise_draws(world, draws)
+        )
         trials = trials_of(records, task.robot.dof)
         iterations = int(trials.iterations.sum())
         session.spend(

@@ -30,7 +30,7 @@ from coartic.internal.text import pluralize
 from coartic.method import METERED
 from coartic.motion.execution import execute_many
 from coartic.motion.solution import goals_without_target, next_action
-from coartic.motion.trials import compiled_task, world_seed, worlds_of
+from coartic.motion.trials import compiled_task, noise_draws, noise_seed
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, cell_of, describe_parameters
 from coartic.runs.record import Row
@@ -202,7 +202,7 @@ def _is_best_trial(run: Row) -> bool:
     if len({*rewards}) < 2:
         return False  # there was nothing to choose from
     task, best = run.cell.task, max(rewards)
-    worlds = worlds_of(world_seed(run["seed"]), rewards.index(best))
+    worlds = noise_draws(noise_seed(run["seed"]), rewards.index(best))
     answer = next_action(run.part("solution"))
     (execution,) = execute_many(compiled_task(task, run.cell.model), [answer], worlds)
     return isinstance(execution, Execution) and execution.reward == best

@@ -36,9 +36,9 @@ from coartic.motion.trials import (
     CompiledTask,
     compiled_task,
     count_trials,
+    noise_draws,
+    noise_seed,
     reach_next,
-    world_seed,
-    worlds_of,
 )
 from coartic.robot import HANDS, MAX_NUMBER, Array
 from coartic.tasks.catalogue import as_task, builtin_tasks
@@ -210,7 +210,7 @@ class TaskEnv(gymnasium.Env):
         """
         super().reset(seed=seed)
         if seed is not None or self.draw < 0:
-            self.world, self.draw = world_seed(max(int(self.np_random_seed), 0)), -1
+            self.world, self.draw = noise_seed(max(int(self.np_random_seed), 0)), -1
         self.draw += 1
         drawn, options = self.np_random.integers(len(self.tasks)), {**(options or {})}
         number = options.pop("task", drawn)
@@ -345,7 +345,7 @@ class TaskEnv(gymnasium.Env):
         """
         sides = self._sides[hand][:, : targets.shape[1]]
         noisy = compiled.model.motor_noise > 0.0
-        worlds = worlds_of(self.world, self.draw) if noisy else NO_NOISE
+        worlds = noise_draws(self.world, self.draw) if noisy else NO_NOISE
         return reach_next(compiled, self.q[None], sides, targets, self.goal, worlds).goals[0, :, 0]
 
     def _reached_by(self, hands: range) -> list[Any]:
@@ -676,7 +676,7 @@ def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int, seed
     seen = []
     for n, robot in enumerate(robots):
         seen.append(robot.reset(options={"task": n // trials})[0])
-        robot.world, robot.draw = world_seed(seed, JUDGE), n % trials
+        robot.world, robot.draw = noise_seed(seed, JUDGE), n % trials
     while going := [n for n, robot in enumerate(robots) if robot.going]:
         actions = np.asarray(act(np.array([seen[n] for n in going])))
         if len(actions) != len(going):
@@ -713,7 +713,7 @@ def _wrapped_trial(
             raise TypeError(
                 "a wrapper of env does not pass the options of reset to the environment"
             )
-        inner.world, inner.draw = world_seed(seed, JUDGE), draw
+        inner.world, inner.draw = noise_seed(seed, JUDGE), draw
         inner.outcome, ended = np.nan, False
         while not ended:
             actions = np.asarray(act(np.asarray(seen)[None] if is_one else seen))

@@ -572,7 +572,7 @@ def learn_kernel(
     rngs
         The runs' own generators (:func:`addresses`).
     seeds
-        Seed of the motor noise of each run (:func:`.world_seed`), shape ``(N,)``. Trial k has noise
+        Seed of the motor noise of each run (:func:`.noise_seed`), shape ``(N,)``. Trial k has noise
         draw k. The replay has the draw after that of the last trial.
     workspace
         From :func:`workspace_for`.

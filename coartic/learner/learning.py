@@ -44,7 +44,7 @@ from coartic.motion.trials import (
     count_trials,
     empty_records,
     make_trials,
-    world_seed,
+    noise_seed,
 )
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, letters_of
@@ -256,7 +256,7 @@ def _learn_together(
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
     learner, rngs = learner_parameters(compiled, condition, initial), addresses(generators)
-    workspace, worlds = workspace_for(runs, task), np.array([*map(world_seed, seeds)], np.uint64)
+    workspace, worlds = workspace_for(runs, task), np.array([*map(noise_seed, seeds)], np.uint64)
     count_trials(runs * trials)
     clock = time.perf_counter()
     learn_kernel(compiled.parameters, learner, tables, results, rngs, worlds, workspace)

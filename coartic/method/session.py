@@ -35,9 +35,9 @@ from coartic.motion.trials import (
     count_trials,
     hand_codes,
     make_trials,
+    noise_draws,
+    noise_seed,
     trials_of,
-    world_seed,
-    worlds_of,
 )
 from coartic.robot import Array, Configs, Hand, Hands, Robot
 from coartic.tasks.task import Task
@@ -611,11 +611,11 @@ class Session:
         return hand_codes(self._task, hands, count)
 
     def _worlds(self, count: int, draws: ArrayLike | None = None) -> NDArray[np.uint64]:
-        """Return the worlds of the next ``count`` trials (:func:`worlds_of`)."""
+        """Return the worlds of the next ``count`` trials (:func:`noise_draws`)."""
         if self.model.motor_noise == 0.0:
             return NO_NOISE
         numbers = self.trials_made + np.arange(count) if draws is None else draws
-        return worlds_of(world_seed(self.seed), numbers)
+        return noise_draws(noise_seed(self.seed), numbers)
 
     def chosen_draws(self, draws: Any, count: int) -> NDArray[np.int64] | None:
         """Return chosen draws as an array, shape ``(count,)``; return None if none are chosen.

@@ -44,9 +44,9 @@ from coartic.motion.trials import (
     TrialRecords,
     compiled_task,
     make_trials,
+    noise_draws,
+    noise_seed,
     reason_of_failure,
-    world_seed,
-    worlds_of,
 )
 from coartic.robot import HANDS, Array, Configs, Hand, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
@@ -167,7 +167,7 @@ def execute_many(
 
     For a solution that cannot be executed, the entry is the error that :func:`execute` would raise;
     the error is not raised. If the model of ``compiled`` has motor noise, ``worlds`` has the seed
-    and the draw of the noise for each solution (:func:`.worlds_of`).
+    and the draw of the noise for each solution (:func:`.noise_draws`).
     """
     executions: list[Plan | Refused] = []
     for solution in solutions:
@@ -485,7 +485,7 @@ def execute_noisy(
             "motor_noise says how large the noise is"
         )
     plans = [_plan_of(chosen, k, solution) for k, solution in enumerate(solutions)]
-    seeds = np.array([world_seed(value, JUDGE) for value in _seeds(seed, len(plans))], np.uint64)
+    seeds = np.array([noise_seed(value, JUDGE) for value in _seeds(seed, len(plans))], np.uint64)
     if not plans:
         return np.empty((0, int(repeats)))
     aims, ticks = _execute_exactly(compiled_task(chosen, model), plans)
@@ -501,7 +501,7 @@ def execute_noisy(
         number, draws = np.divmod(np.arange(begin, min(begin + _AT_ONCE, count)), int(repeats))
         actions = movements[number] if len(movements) else movements
         of_part = hands[number], targets[number], actions, waypoints
-        records = make_trials(compiled, *of_part, worlds_of(seeds[number], draws))
+        records = make_trials(compiled, *of_part, noise_draws(seeds[number], draws))
         parts.append(_ticks_of(records))
     return np.concatenate(parts).reshape(len(plans), -1)
 

@@ -80,7 +80,7 @@ PRACTICE, JUDGE = 0x70726163, 0x6A756467
 
 
 @lru_cache(maxsize=4096)
-def world_seed(seed: int, world: int = PRACTICE) -> int:
+def noise_seed(seed: int, world: int = PRACTICE) -> int:
     """Derive the seed of the motor noise from the seed of a run.
 
     The noise seed is from 0 to 2^64 - 1. It is a child of ``seed`` (``numpy.random.SeedSequence``),
@@ -90,10 +90,10 @@ def world_seed(seed: int, world: int = PRACTICE) -> int:
     return int(np.random.SeedSequence(seed, spawn_key=(world,)).generate_state(1, np.uint64)[0])
 
 
-def worlds_of(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
+def noise_draws(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
     """Return the noise seed and the noise draw of N trials, shape ``(N, 2)``.
 
-    The result is a value for :attr:`Requests.worlds`. ``seeds`` (from :func:`world_seed`) and
+    The result is a value for :attr:`Requests.worlds`. ``seeds`` (from :func:`noise_seed`) and
     ``draws`` are integers or have shape ``(N,)``.
     """
     pairs = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64))
