@@ -110,7 +110,7 @@ def draw_trials(
     if trials <= 0:
         raise MethodError("infeasible", "no trial can be made: the trial budget is used up")
     attempts.run_corrective(*(sequences_of(session) if hands is None else [hands])[:trials])
-    if not (chosen := attempts.hands):
+    if not (chosen := attempts.hand_sequence):
         raise MethodError("infeasible", "the corrective process completes no hand sequence")
     explored = attempts.explored.copy()
     for goal, hand in enumerate(hands_of(chosen)):
