@@ -44,7 +44,8 @@ static double clear(double dx, double dy, double rim, const double *velocity, do
 /* Moves q to a target; returns the ticks, and whether the goal is hit. */
 static long move(double *q, const double *target, long dof, const Arm *arm, const double *goal,
                  int stops, const Rules *rules, int bounds, int *hit) {
-    double start[MAX_ENTRIES], x[MAX_ENTRIES], y[MAX_ENTRIES], rate[MAX_ENTRIES], square = 0.0, bend = 0.0, angle_rate = 0.0;
+    double start[MAX_ENTRIES], x[MAX_ENTRIES], y[MAX_ENTRIES], rate[MAX_ENTRIES];
+    double square = 0.0, bend = 0.0, angle_rate = 0.0;
     long tip = arm->links;
     memcpy(start, q, dof * sizeof *q);
     for (long j = 0; j < dof; j++) square += (target[j] - start[j]) * (target[j] - start[j]);
