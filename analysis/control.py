@@ -29,11 +29,11 @@ import pandas as pd
 
 from coartic.analysis.methods import BY_TRIAL, LEARNERS, RANDOM_SEARCH, headline_methods
 from coartic.analysis.signatures import SIGNATURES, Part, TwoContexts, context_pairs
-from coartic.analysis.study import MOST_EXECUTED, Study, solved
+from coartic.analysis.study import MAX_EXECUTED, Study, solved
 from coartic.learner.conditions import EVERY_CONDITION, METHOD_PREFIX
 from coartic.robot import HANDS, Array
 
-LEAST_SHARE = 0.1
+MIN_SHARE = 0.1
 """Smallest share of a method's solved runs on a task that a compared hand sequence must have."""
 
 
@@ -70,10 +70,10 @@ def with_control(
     ... # doctest: +SKIP
     """
     of_method = signature_by_hands(study, signature, task, label)
-    total = min(len(solved(study.cells[task, label])), MOST_EXECUTED)
+    total = min(len(solved(study.cells[task, label])), MAX_EXECUTED)
     pairs = {}
     for hands, values in sorted(of_method.items(), key=lambda item: -len(item[1])):
-        if len(values) >= LEAST_SHARE * total:
+        if len(values) >= MIN_SHARE * total:
             control = control_of(study, task, label, hands)
             of_control = signature_by_hands(study, signature, task, control) if control else {}
             pairs[hands] = values, of_control.get(hands, np.empty(0))
@@ -151,7 +151,9 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
         if cell is None or cell.iloc[0].get("stages", 1) > 1:
             continue
         hands = {*solved(cell).hands}
-        sequences = {""} if hands and of_search.base[label] == f"{RANDOM_SEARCH}/hands" else hands
+        sequences = (
+            {""} if hands and of_search.method_id[label] == f"{RANDOM_SEARCH}/hands" else hands
+        )
         if len(sequences) == 1:
             explored = explores_idle_arm(study, task, label)
             key = sequences.pop(), _most_trials(study, task, label), explored

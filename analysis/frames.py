@@ -24,19 +24,19 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from pandas.api.types import is_hashable
 
-from coartic.analysis.optima import gap_share, run_values
+from coartic.analysis.optima import relative_gap, run_values
 from coartic.analysis.statistics import task_mean
 from coartic.analysis.words import listed
 from coartic.errors import CoarticError
 from coartic.estimates import NEGLIGIBLE, Estimate, mean
 from coartic.internal.limits import brief_value
-from coartic.internal.text import counted, plain
+from coartic.internal.text import plain, pluralize
 from coartic.runs.plan import label_of, world_title
 
 SCORES = ("reward", "best_known")
 ZERO = "corrective_best"
 """Column of the reward at which the share of the possible gain is 0."""
-LEAST_GAIN = 0.01
+MIN_GAIN = 0.01
 """Smallest possible gain of which there are shares in noise, as a share of the best known reward:
 smaller ones are about as large as the standard errors of the two means."""
 DUPLICATE = (
@@ -156,7 +156,7 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
 
     Both are NaN if the value or the best known reward is NaN. ``share`` is also NaN if zero is NaN,
     or not below the best known reward; in noise also if zero is on average less than 1 % below it
-    (:data:`LEAST_GAIN`), because the share would be chance.
+    (:data:`MIN_GAIN`), because the share would be chance.
 
     Raises
     ------
@@ -174,13 +174,13 @@ def _with_gaps(columns: pd.DataFrame) -> pd.DataFrame:
     excess = (columns.value - columns.best_known).mask(columns.is_noisy)
     highest = "it is above best_known, which must be the highest reward of the task"
     refuse_rows(columns, "reward", excess > NEGLIGIBLE * columns.best_known.abs(), highest)
-    columns = columns.assign(gap=gap_share(columns.value, columns.best_known))
+    columns = columns.assign(gap=relative_gap(columns.value, columns.best_known))
     if ZERO not in columns:
         return columns
     possible = columns.best_known - columns[ZERO]
     refuse_rows(columns, ZERO, (possible < 0) & ~columns.is_noisy, highest)
     of_task = possible.groupby(columns.best_known).transform("mean")  # in noise zeros differ by run
-    is_chance = columns.is_noisy & (of_task < LEAST_GAIN * columns.best_known.abs())
+    is_chance = columns.is_noisy & (of_task < MIN_GAIN * columns.best_known.abs())
     possible = possible.where((possible > 0) & ~is_chance)
     return columns.assign(share=(columns.value - columns[ZERO]) / possible)
 
@@ -259,7 +259,7 @@ def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     return runs
 
 
-def gaps(frame: pd.DataFrame) -> pd.Series:
+def relative_gaps(frame: pd.DataFrame) -> pd.Series:
     """Return the gap of each run to the best known reward of its task.
 
     Parameters
@@ -286,7 +286,7 @@ def gaps(frame: pd.DataFrame) -> pd.Series:
     Examples
     --------
     >>> frame = pd.DataFrame({"reward": [-303, -292], "best_known": [-292, -292]})
-    >>> gaps(frame).round(3).tolist()
+    >>> relative_gaps(frame).round(3).tolist()
     [0.038, 0.0]
     """
     return _with_gaps(checked(frame, numbers=SCORES)).gap.set_axis(frame.index)
@@ -313,8 +313,8 @@ def shares(frame: pd.DataFrame) -> pd.Series:
     Raises
     ------
     CoarticError
-        A column is missing or a reward is wrong (:func:`gaps`), or ``corrective_best`` is above the
-        best known reward.
+        A column is missing or a reward is wrong (:func:`relative_gaps`), or ``corrective_best`` is
+        above the best known reward.
 
     Examples
     --------
@@ -462,9 +462,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     Raises
     ------
     CoarticError
-        A column or a name is missing, a reward is wrong (:func:`gaps`), a task has more than one
-        best known reward, a run has two rows, methods have different budgets, or runs are in
-        different worlds.
+        A column or a name is missing, a reward is wrong (:func:`relative_gaps`), a task has more
+        than one best known reward, a run has two rows, methods have different budgets, or runs are
+        in different worlds.
 
     Examples
     --------
@@ -486,7 +486,7 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
     if "note" in existing:
         runs["note"] = frame["note"].to_numpy(object)
     if "noisy_ticks" in runs:
-        runs["noisy_gap"] = gap_share(-runs.noisy_ticks, runs.best_known)
+        runs["noisy_gap"] = relative_gap(-runs.noisy_ticks, runs.best_known)
     asked = sorted(runs.budget.dropna().unique()) if "budget" in existing else []
     if len(asked) > 1:
         budgets = [f"{budget:.0f}" for budget in asked]
@@ -504,9 +504,9 @@ def ranking(frame: pd.DataFrame) -> pd.DataFrame:
         failed = of_tasks.gap.isna()
         solved = of_tasks[~of_tasks.task.isin(of_tasks.task[failed])]
         reasons = [
-            f"{of_tasks.task.nunique()} of {counted(tasks, 'task')}"
+            f"{of_tasks.task.nunique()} of {pluralize(tasks, 'task')}"
             * (of_tasks.task.nunique() < tasks),
-            f"{failed.sum()} of {counted(len(of_tasks), 'run')} failed" * bool(failed.any()),
+            f"{failed.sum()} of {pluralize(len(of_tasks), 'run')} failed" * bool(failed.any()),
             "no best known reward" * (not tasks),
         ]
         why = "; ".join(filter(None, reasons))

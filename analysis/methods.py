@@ -105,7 +105,7 @@ def title_of(method: str | MethodInfo, setting: str = "", *, short: bool = False
         name = one_line(method)
     else:
         name = one_line((method.facts.short or method.name) if short else method.title)
-    return f"{name} ({setting_in_words(setting)})" if setting else name
+    return f"{name} ({describe_setting(setting)})" if setting else name
 
 
 def subject_of(method: Mapping[str, Any]) -> str:
@@ -129,14 +129,14 @@ def subject_of(method: Mapping[str, Any]) -> str:
     return f"{article}{title}{comma}"
 
 
-def setting_in_words(setting: str) -> str:
+def describe_setting(setting: str) -> str:
     """Return a setting, such as ``sigma=0.1, stop=1``, as titles have it: ``σ 0.1, stop 1``."""
     pairs = (part.partition("=") for part in one_line(setting).split(", "))
     words = (_WORDS.get(key, key + equals) + value for key, equals, value in pairs)
     return ", ".join(words).replace("_", " ")
 
 
-def values_in_words(values: Mapping[str, Any]) -> str:
+def describe_values(values: Mapping[str, Any]) -> str:
     """Return values of varied parameters in words, such as ``noise_sd 0.05, epsilon 0.2``.
 
     Parameters have the names under which a suite sets them.
@@ -197,45 +197,45 @@ def methods_of(
     titles = Counter(map(title_of, declared.values()))
     shorts = Counter(title_of(info, short=True) for info in declared.values())
     for label, of_method in by_label.items():
-        base, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
-        named = f" ({setting_in_words(setting)})" * bool(setting)
+        method_id, setting = of_method.method.iloc[0], of_method.setting.iloc[0]
+        named = f" ({describe_setting(setting)})" * bool(setting)
         if label in varied.index:
-            default_note = f", {default_name(base)}" * (not setting)
+            default_note = f", {default_name(method_id)}" * (not setting)
             values = dict(zip(varied.columns, varied.loc[label], strict=True))
-            named = f" ({values_in_words(values)}{default_note})"
-        info = declared[base]
-        known = KNOWN_METHODS.get(base) if info.is_ours else None
+            named = f" ({describe_values(values)}{default_note})"
+        info = declared[method_id]
+        known = KNOWN_METHODS.get(method_id) if info.is_ours else None
         facts = known.facts if known else info.facts
-        default = base if setting else facts.ablation_of
-        called = info if titles[title_of(info)] == 1 else base  # ids, if titles are the same
-        briefly = info if shorts[title_of(info, short=True)] == 1 else base
-        under = default if default in by_label and label not in varied.index else ""
+        default = method_id if setting else facts.ablation_of
+        called = info if titles[title_of(info)] == 1 else method_id  # ids, if titles are the same
+        briefly = info if shorts[title_of(info, short=True)] == 1 else method_id
+        parent = default if default in by_label and label not in varied.index else ""
         rows[label] = {
-            "base": base,
-            "condition": CONDITION_OF.get(base, ""),
+            "method_id": method_id,
+            "condition": CONDITION_OF.get(method_id, ""),
             "setting": setting,
-            "title": title_of(called) + named + MARK * (base in marked),
-            "short": title_of(briefly, short=True) + named + MARK * (base in marked),
+            "title": title_of(called) + named + MARK * (method_id in marked),
+            "short_title": title_of(briefly, short=True) + named + MARK * (method_id in marked),
             "algorithm": one_line(facts.algorithm or (known.title if known else label)),
-            "is_learner": base in LEARNERS,
-            "is_search": base in SEARCHES,
+            "is_learner": method_id in LEARNERS,
+            "is_search": method_id in SEARCHES,
             "information": _group_of(of_method),
             "built_in": info.is_ours,
             "stochastic": info.stochastic,
             "headline": facts.headline,
-            "under": under,
-            "look": LOOKS.get(base, ()) if known and not setting else (),
+            "parent": parent,
+            "style": LOOKS.get(method_id, ()) if known and not setting else (),
         }
     for label, joined in runs[runs.ranked_as != runs.label].groupby("ranked_as"):
         second = rows[max(joined.label, key=[*KNOWN_METHODS].index)]
         conditions = str(label).partition(" ")[2].replace("-informed", "")
         names = {"title": f"{second['algorithm']} {conditions}"}
-        names["short"] = f"{second['short'].rpartition(' ')[0]} {conditions}"
+        names["short_title"] = f"{second['short_title'].rpartition(' ')[0]} {conditions}"
         rows[str(label)] = second | names
     for label, look in _looks_of(rows):
-        rows[label]["look"] = look
+        rows[label]["style"] = look
     position = {name: number for number, name in enumerate(KNOWN_METHODS)}
-    ordered = sorted(rows, key=lambda label: position.get(rows[label]["base"], len(position)))
+    ordered = sorted(rows, key=lambda label: position.get(rows[label]["method_id"], len(position)))
     return pd.DataFrame([rows[label] for label in ordered], ordered).rename_axis("method")
 
 
@@ -365,12 +365,12 @@ LOOKS = _looks_of_built_in()
 def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[str, str]]]:
     """Yield the label of each row with the names of its colour and marker.
 
-    - A row with a ``look`` keeps it.
+    - A row with a ``style`` keeps it.
     - The first nine methods from files have :data:`OWN_COLOR` and a marker.
     - Other rows have the next free pair of their group, those with unused colours first. After the
       last pair, the first is used again.
     """
-    fixed = {row["look"] for row in rows.values()}
+    fixed = {row["style"] for row in rows.values()}
     taken = {look[0] for look in fixed if look}
     free = {
         group: itertools.cycle(
@@ -385,16 +385,16 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
     for label in sorted(rows, key=lambda label: bool(rows[label]["built_in"])):
         row = rows[label]
         others = free[row["information"]]
-        yield label, row["look"] or (None if row["built_in"] else next(own, None)) or next(others)
+        yield label, row["style"] or (None if row["built_in"] else next(own, None)) or next(others)
 
 
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
     """Return rows without the settings and ablations of methods that are also in ``rows``.
 
-    ``rows`` are rows of :attr:`.Study.methods`; their column ``under`` is used. Values of a varied
+    ``rows`` are rows of :attr:`.Study.methods`; their column ``parent`` is used. Values of a varied
     parameter are not left out.
     """
-    return rows[~rows.under.isin(rows.index)]
+    return rows[~rows.parent.isin(rows.index)]
 
 
 def headline_methods(rows: pd.DataFrame) -> list[str]:

@@ -150,6 +150,6 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def gap_share(rewards: ArrayLike, optimum: ArrayLike) -> Array:
+def relative_gap(rewards: ArrayLike, optimum: ArrayLike) -> Array:
     """Return (optimum − reward) / |optimum|, which is 0.01 for 1 % more ticks."""
     return np.asarray(np.subtract(optimum, rewards, dtype=np.float64) / np.abs(optimum))

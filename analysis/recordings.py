@@ -18,7 +18,7 @@ from coartic.analysis.signatures import Solutions
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.limits import brief_value, check_limits
 from coartic.model import PAPER
-from coartic.robot import LARGEST_ENTRY, Array
+from coartic.robot import MAX_ENTRY, Array
 
 FAR = 2.0
 """Distance from the centre of a goal (in radii) beyond which a hit does not fit the task."""
@@ -254,8 +254,8 @@ def _numbers(frame: pd.DataFrame, columns: list[str], source: str) -> Array:
             odd = values.map(lambda value: isinstance(value, bool | np.bool_ | complex))
             values = values.mask(odd.astype(bool), "not a real number")
         read = pd.to_numeric(values, errors="coerce").to_numpy(np.float64, na_value=np.nan)
-        is_wrong = ~(np.abs(read) <= LARGEST_ENTRY)
-        _refuse(frame, name, is_wrong, f"a number from -{LARGEST_ENTRY:g} to {LARGEST_ENTRY:g}",
+        is_wrong = ~(np.abs(read) <= MAX_ENTRY)
+        _refuse(frame, name, is_wrong, f"a number from -{MAX_ENTRY:g} to {MAX_ENTRY:g}",
                 source)  # fmt: skip
         numbers[:, k] = read
     return numbers

@@ -22,7 +22,7 @@ from coartic.analysis.frames import DUPLICATE, SCORES, checked, refuse_rows, sco
 from coartic.analysis.standings import cells_of, ranked_tasks, runs_by_method
 from coartic.analysis.study import Study, load, solved
 from coartic.errors import CoarticError
-from coartic.estimates import FEWER_RESAMPLES, FEWEST, IN_CACHE, SEED, TAILS, Estimate, slices
+from coartic.estimates import FEWER_RESAMPLES, IN_CACHE, MIN_VALUES, SEED, TAILS, Estimate, slices
 from coartic.internal.limits import brief_value, real_array
 from coartic.robot import Array
 from coartic.runs.plan import world_title
@@ -33,7 +33,7 @@ TARGETS = tuple(n / 20 for n in range(1, 21))
 """Targets, as shares of the distance between two rewards: that of the corrective process alone with
 its best hands, and the best known reward."""
 
-_MOST_RUNS_DRAWN = 20_000_000  # in all resamples together; very many runs have fewer resamples
+_MAX_DRAWN_RUNS = 20_000_000  # in all resamples together; very many runs have fewer resamples
 RunningTimes = Sequence[Array]
 """For each task, the cost at which each run of a method reaches each target, shape
 ``(runs, targets)``; infinite if the run does not reach the target."""
@@ -99,7 +99,7 @@ def budget_for(times: RunningTimes, share: float) -> Estimate:
 
     sizes = tuple(map(len, times))
     value = float(budgets(np.ones((1, sum(sizes)), dtype=np.uint8))[0])
-    if min(sizes) < FEWEST:
+    if min(sizes) < MIN_VALUES:
         return Estimate(value)
     drawn, at_once = _draws(sizes), 1 + IN_CACHE // (1 + len(values))
     resampled = [budgets(drawn[part]) for part in slices(len(drawn), at_once)]
@@ -126,7 +126,7 @@ def interval_by_budget(times: RunningTimes, budgets: Array) -> tuple[Array, Arra
         Low and high ends; NaN if a task has fewer than five runs.
     """
     sizes = tuple(map(len, times))
-    if min(sizes) < FEWEST:
+    if min(sizes) < MIN_VALUES:
         return np.full(len(budgets), math.nan), np.full(len(budgets), math.nan)
     weights = np.repeat([1 / size / len(times) for size in sizes], sizes)
     reached = [np.searchsorted(np.sort(run), budgets, "right") / len(run)
@@ -145,7 +145,7 @@ def _draws(sizes: tuple[int, ...]) -> NDArray[np.uint8]:
     many runs fewer, but at least 200. The array is cached: do not change it.
     """
     rng = np.random.default_rng(SEED)
-    resamples = min(FEWER_RESAMPLES, max(_MOST_RUNS_DRAWN // sum(sizes), 200))
+    resamples = min(FEWER_RESAMPLES, max(_MAX_DRAWN_RUNS // sum(sizes), 200))
     drawn = np.empty((resamples, sum(sizes)), dtype=np.uint8)
     for size, end in zip(sizes, np.cumsum(sizes).tolist(), strict=True):
         for part in slices(resamples, 100):

@@ -37,7 +37,7 @@ from coartic.analysis.statistics import drawn_rows, places
 from coartic.errors import NotApplicableError
 from coartic.estimates import (
     FEWER_RESAMPLES,
-    FEWEST,
+    MIN_VALUES,
     RESAMPLES,
     SEED,
     TAILS,
@@ -686,7 +686,7 @@ NEXT_APART = 0.1
 It mixes length units and rad."""
 STANDARD_ERRORS = 3
 """Smallest distance between the mean next postures, in standard errors, for a lean."""
-FEWEST_RUNS = 5
+MIN_RUNS = 5
 """Smallest number of runs in each context for the interval of a lean or posture difference."""
 
 
@@ -827,7 +827,7 @@ def lean(
 
     start, goal = shares([[half.mean(axis=0) for half in halves] for halves in parts]).tolist()
     more = Estimate(goal - start, n=n)
-    if min(n) >= FEWEST_RUNS and not deterministic:
+    if min(n) >= MIN_RUNS and not deterministic:
         drawn = shares(
             [[_means_drawn(half, rng, resamples) for half in halves] for halves in parts]
         )
@@ -1083,7 +1083,7 @@ class TwoContexts:
     @property
     def can_test(self) -> bool:
         """True if each context has the five compared runs that a test needs."""
-        return min(map(len, self.configurations)) >= FEWEST
+        return min(map(len, self.configurations)) >= MIN_VALUES
 
     @property
     def posture_difference(self) -> float:
@@ -1104,7 +1104,7 @@ class TwoContexts:
         be too high.
         """
         value, n = self.posture_difference, tuple(map(len, self.configurations))
-        if min(n) < FEWEST_RUNS or self.first.deterministic:
+        if min(n) < MIN_RUNS or self.first.deterministic:
             return Estimate(value, n=n)
         rng = self._rng("difference")
         drawn = [_means_drawn(runs, rng, FEWER_RESAMPLES) for runs in self.configurations]

@@ -15,8 +15,8 @@ from coartic.analysis.frames import ranking
 from coartic.analysis.methods import BY_TRIAL
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import listed, number
-from coartic.estimates import FEWEST
-from coartic.internal.text import counted
+from coartic.estimates import MIN_VALUES
+from coartic.internal.text import pluralize
 from coartic.runs.record import NOISE_RULE
 
 
@@ -171,9 +171,9 @@ def standings(study: Study) -> pd.DataFrame:
         failed = int(of_method.failed_executions.sum())
         note = [
             f"made {' to '.join(map(number, ends))} of {number(due)} trials" * bool(is_told),
-            f"{fragile} of {counted(len(of_method), 'solution')} can fail with motor noise"
+            f"{fragile} of {pluralize(len(of_method), 'solution')} can fail with motor noise"
             * bool(fragile),
-            f"{counted(failed, 'execution')} failed" * bool(failed),
+            f"{pluralize(failed, 'execution')} failed" * bool(failed),
         ]
         notes.append("; ".join(filter(None, note)))
     rows = rows.assign(why=reasons, note=notes)
@@ -192,7 +192,7 @@ def has_few_runs(study: Study, methods: Iterable[str], tasks: Iterable[str]) -> 
     stochastic = study.methods.stochastic.astype(bool)
     drawn = [runs_on(study, method, tasks) for method in methods]
     counts = [runs[runs.label.map(stochastic)].groupby("task").size() for runs in drawn]
-    return min((int(of.min()) for of in counts if len(of)), default=FEWEST) < FEWEST
+    return min((int(of.min()) for of in counts if len(of)), default=MIN_VALUES) < MIN_VALUES
 
 
 @lru_cache(maxsize=1_024)

@@ -38,9 +38,9 @@ from pydantic import Field
 
 from coartic.estimates import (
     FEWER_RESAMPLES,
-    FEWEST,
-    FEWEST_TASKS,
     IN_CACHE,
+    MIN_TASKS,
+    MIN_VALUES,
     NEGLIGIBLE,
     RESAMPLES,
     SEED,
@@ -53,12 +53,12 @@ from coartic.estimates import (
     vector,
 )
 from coartic.internal.arguments import Numbers
-from coartic.internal.limits import MOST_RUNS
+from coartic.internal.limits import MAX_RUNS
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
-_MOST_PLACES = 2_000_000  # largest number of indices of resamples that are cached together
-_Count = Annotated[int, Field(ge=0, le=MOST_RUNS)]
+_MAX_INDICES = 2_000_000  # largest number of indices of resamples that are cached together
+_Count = Annotated[int, Field(ge=0, le=MAX_RUNS)]
 _Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -155,7 +155,7 @@ def exchange_test(
     samples = vector(first), vector(second)
     n, m = map(len, samples)
     value = float(samples[0].mean() - samples[1].mean())
-    if min(n, m) < FEWEST or not centred(np.concatenate(samples)).any():
+    if min(n, m) < MIN_VALUES or not centred(np.concatenate(samples)).any():
         return Estimate(value, n=(n, m))
     exact = math.comb(n + m, n) <= resamples
     p = _p_of([samples], alternative, resamples, exact=exact)
@@ -210,7 +210,7 @@ def stratified_test(strata: Sequence[tuple[Array | float, Array | float]]) -> fl
     0.0001
     """
     samples = [sample for pair in strata for sample in pair if not isinstance(sample, float)]
-    if not samples or min(map(len, samples)) < FEWEST:
+    if not samples or min(map(len, samples)) < MIN_VALUES:
         return math.nan
     return _p_of(strata, "two-sided", RESAMPLES)
 
@@ -245,7 +245,7 @@ def _p_of(
             chosen = min(n, len(second))
             observed += _moments(pool, np.arange(n)[None], n)
         size += float(np.abs(pool).max())
-        is_cached = len(strata) == 1 and resamples * chosen <= _MOST_PLACES
+        is_cached = len(strata) == 1 and resamples * chosen <= _MAX_INDICES
         chunks = (
             _kept_places(len(pool), chosen, resamples, exact)
             if is_cached
@@ -466,7 +466,7 @@ def other_tasks(scores: Scores) -> Estimate:
     }
     mean = float(np.mean([instances.mean() for instances in values.values()]))
     n = tuple(map(len, values.values()))
-    if min(n) < FEWEST_TASKS:
+    if min(n) < MIN_TASKS:
         return Estimate(mean, n=n)
     deviations = np.zeros(FEWER_RESAMPLES)
     for index, (family, instances) in enumerate(samples.items()):

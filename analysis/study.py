@@ -24,7 +24,7 @@ from coartic.analysis.optima import (
     FRESH_EXECUTIONS,
     BestKnown,
     best_known,
-    gap_share,
+    relative_gap,
     restrictions,
     run_values,
 )
@@ -32,7 +32,7 @@ from coartic.analysis.signatures import SIGNATURES, Solutions
 from coartic.analysis.words import listed, titled_apart
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
-from coartic.internal.text import counted, unknown
+from coartic.internal.text import pluralize, unknown
 from coartic.learner.conditions import METHOD_PREFIX
 from coartic.method import Information
 from coartic.model import WORLD, MotionModel
@@ -88,7 +88,7 @@ def typical_run(runs: pd.DataFrame) -> str:
 
 Part = Literal["solution", "replay"]
 """Part of a run that can be executed."""
-MOST_EXECUTED = 500
+MAX_EXECUTED = 500
 """Largest number of runs of a method on a task that are executed again and have signatures."""
 
 
@@ -132,9 +132,9 @@ def load(folder: str | Path, *, against: str = "") -> Study:
         runs = store.runs()
         if len(runs) < size_of(plan):
             raise CoarticError(
-                f"{folder} has {len(runs)} of {counted(size_of(plan), 'run')}: it was interrupted, "
-                "or has only a part of the runs. Repeat the `coartic run` command, which makes the "
-                "missing runs, or --include all parts in another folder."
+                f"{folder} has {len(runs)} of {pluralize(size_of(plan), 'run')}: it was "
+                "interrupted, or has only a part of the runs. Repeat the `coartic run` command, "
+                "which makes the missing runs, or --include all parts in another folder."
             )
         study = Study(folder, plan, store.made_with(), runs, store.marks(), imports=store.imports())
     return replace(study, against=_label_in(study, against)) if against else study
@@ -147,7 +147,7 @@ def _label_in(study: Study, name: str) -> str:
     such as ``EC4``. Raises CoarticError if no method, or more than one, has the name.
     """
     methods = study.methods
-    for names in (methods.index, methods.base, methods.title):
+    for names in (methods.index, methods.method_id, methods.title):
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
             labels = [str(label) for label in methods.index[names == wanted]]
             if len(labels) > 1:
@@ -397,8 +397,8 @@ class Study:
           none, and for a search with another base;
         - ``corrective_best``: as in :attr:`corrective_best`; in a world with noise judged by the
           same draws as the run;
-        - ``gap``: the gap of the value to the best known reward, as a share of it (:func:`.gaps`).
-          In noise it can be negative by chance;
+        - ``gap``: the gap of the value to the best known reward, as a share of it
+          (:func:`.relative_gaps`). In noise it can be negative by chance;
         - a column for each parameter of methods, unless there is a column of this name already.
           ``trials`` is the number of trials that were made, and ``hands`` are the hands of the
           solution.
@@ -438,7 +438,7 @@ class Study:
             values, pairs = self._corrective_by_number, zip(runs.task, runs.run, strict=True)
             runs["corrective_best"] = [values[task][number] for task, number in pairs]
         of_runs = runs[["value", "best_known"]].astype("Float64")
-        runs["gap"] = gap_share(*of_runs.to_numpy(np.float64, na_value=np.nan).T)
+        runs["gap"] = relative_gap(*of_runs.to_numpy(np.float64, na_value=np.nan).T)
         runs.attrs["units"] = UNITS
         return runs
 
@@ -450,12 +450,12 @@ class Study:
         EC4 on tasks for two, have a further row, which copies most columns of the second condition.
         Columns:
 
-        - ``base``: id of the method without a setting;
+        - ``method_id``: id of the method without a setting;
         - ``condition``: id of the learner's condition, such as ``EC4``, also if informed or an
           ablation; empty for a user's own condition and for other methods;
         - ``setting``: parameters that differ from the defaults, such as ``noise_sd=0.1``;
         - ``title``: name on the page, in tables and figures;
-        - ``short``: name in figures of one column;
+        - ``short_title``: name in figures of one column;
         - ``algorithm``: algorithm of which the method is a form;
         - ``is_learner``: True for the paper's learner under the paper's conditions, with any
           setting;
@@ -465,9 +465,10 @@ class Study:
         - ``built_in``: True for methods of coartic, False for methods from files;
         - ``stochastic``: True if results depend on the seed;
         - ``headline``: True if the method, with any setting, represents its algorithm;
-        - ``under``: if this row is a setting or an ablation of another method, under which lists
+        - ``parent``: if this row is a setting or an ablation of another method, under which lists
           show it, the label of that method; otherwise empty;
-        - ``look``: names of colour and marker in figures, a tuple of two strings.
+        - ``style``: names of colour and marker in figures, a tuple of two strings. Write
+          ``methods["style"]``: ``methods.style`` is pandas' own.
         """
         return methods_of(self.runs, self.declared, self.marks)
 
@@ -684,7 +685,7 @@ class Study:
         if part not in self._movements:
             ids = {*self.stored.run_id}
             with open_results(self.folder) as store:
-                stored = store.movements(part, MOST_EXECUTED)
+                stored = store.movements(part, MAX_EXECUTED)
             self._movements[part] = {key: stored[key] for key in stored if key in ids}
         return self._movements[part]
 

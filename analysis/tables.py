@@ -42,7 +42,7 @@ from coartic.analysis.methods import (
     are_numbers,
     default_name,
 )
-from coartic.analysis.optima import gap_share
+from coartic.analysis.optima import relative_gap
 from coartic.analysis.running_times import (
     SPENDS,
     best_after,
@@ -90,15 +90,15 @@ from coartic.analysis.words import (
 )
 from coartic.estimates import (
     FEWER_RESAMPLES,
-    FEWEST,
     LEVEL,
+    MIN_VALUES,
     Estimate,
     difference_of_means,
     mean,
     mean_of_means,
     standard_deviation,
 )
-from coartic.internal.text import counted, one_line
+from coartic.internal.text import one_line, pluralize
 from coartic.motion.execution import initial_reward
 from coartic.robot import Array
 from coartic.runs.plan import world_title
@@ -230,7 +230,7 @@ def _with_marks(rows: pd.DataFrame, study: Study) -> pd.DataFrame:
         return rows
     notes = []
     for row in rows.to_dict("records"):
-        methods = dict.fromkeys(str(study.methods.base.get(row[name])) for name in columns)
+        methods = dict.fromkeys(str(study.methods.method_id.get(row[name])) for name in columns)
         marks = itertools.chain(*(study.marks.get(method, ()) for method in methods))
         notes.append("; ".join(filter(None, [row.get("note"), *marks])))
     if "note" not in rows:
@@ -242,17 +242,17 @@ def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
     """Return True for rows whose method is a setting or an ablation of another row's method.
 
     Methods are compared by column ``against`` if the table has it, otherwise by ``method``. Column
-    ``under`` of :attr:`.Study.methods` says of which method a method is a setting or an ablation.
+    ``parent`` of :attr:`.Study.methods` says of which method a method is a setting or an ablation.
     """
     if "method" not in frame:
         return pd.Series(False, frame.index)
     label = frame["against" if "against" in frame else "method"]
-    return label.map(study.methods.under).isin([*label])
+    return label.map(study.methods.parent).isin([*label])
 
 
 def caption_of(table: Table, study: Study) -> str:
     """Return the caption of a table with the study's number of tasks, reference and world."""
-    caption = table.caption.replace("{tasks}", counted(len(ranked_tasks(study)), "task"))
+    caption = table.caption.replace("{tasks}", pluralize(len(ranked_tasks(study)), "task"))
     caption = caption.replace("{reference}", reference(study, study.optima))
     return caption + f" ({world_title(study.world)})" * bool(study.world)
 
@@ -491,7 +491,7 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
             rewards, learned = (solved(cell).value.to_numpy(np.float64) for cell in (runs, learner))
             if len(rewards) == len(runs) and len(learned) == len(learner):
                 ahead.append(bool(rewards.mean() > learned.mean()))
-                if min(len(learned), len(rewards) if stochastic else FEWEST) < FEWEST:
+                if min(len(learned), len(rewards) if stochastic else MIN_VALUES) < MIN_VALUES:
                     tests.append(Estimate(math.nan))
                 elif stochastic:
                     tests.append(exchange_test(learned, rewards, "two-sided"))
@@ -508,7 +508,7 @@ def _counts_against_learner(study: Study) -> dict[str, dict[str, int]]:
     return counts
 
 
-def _gaps_after(study: Study, trials: int) -> pd.Series:
+def _mean_gap_after(study: Study, trials: int) -> pd.Series:
     """Return the gap that each ranked method had after ``trials`` trials, a mean over tasks.
 
     All are NaN in a world with noise, where the best trial so far is partly luck.
@@ -526,7 +526,7 @@ def _gaps_after(study: Study, trials: int) -> pd.Series:
         else reward
         for run_id, reward in zip(runs.run_id, runs.reward.astype(float), strict=True)
     ]
-    gaps = pd.Series(gap_share(best, runs.best_known.astype(float)), runs.index)
+    gaps = pd.Series(relative_gap(best, runs.best_known.astype(float)), runs.index)
     cells = gaps.groupby([runs.ranked_as, runs.task])
     by_task = cells.mean().where(cells.count() == cells.size())
     methods = by_task.groupby(level=0)
@@ -538,7 +538,7 @@ def _standing_rows(study: Study, *, ranked: bool) -> Rows:
     rows = standings(study)
     rows = rows[(rows.why == "") == ranked]
     single = [task for task in ranked_tasks(study) if task in study.individual_tasks]
-    early = _gaps_after(study, _EARLY).to_dict() if ranked and len(rows) else {}
+    early = _mean_gap_after(study, _EARLY).to_dict() if ranked and len(rows) else {}
     for label, row in rows.iterrows():
         runs = runs_by_method(study).get(str(label), compared_runs(study)[:0])
         gaps = runs.groupby("task").gap.mean()
@@ -654,7 +654,7 @@ def list_differences(study: Study) -> Rows:
 
     - it has no runs or a failed run on one of these tasks;
     - it was asked for another number of trials;
-    - it is a setting or an ablation of a method that ran (:attr:`.Study.methods`, ``under``).
+    - it is a setting or an ablation of a method that ran (:attr:`.Study.methods`, ``parent``).
 
     Intervals are for other runs on the same tasks. p is two-sided (:func:`.stratified_test`), and
     corrected over the rows of the same reference method (Holm).
@@ -671,7 +671,7 @@ def list_differences(study: Study) -> Rows:
         alike = methods.built_in & (methods.information == methods.information[against])
         if chosen:
             alike = methods.index != against
-        for row in methods.index[alike & (methods.under == "")].intersection(rows.index):
+        for row in methods.index[alike & (methods.parent == "")].intersection(rows.index):
             runs = runs_on(study, row, tasks) if tasks else compared_runs(study)[:0]
             names = runs.label.unique()
             name = names[0] if len(names) == 1 else row
@@ -833,7 +833,7 @@ def list_parameters(study: Study) -> Rows:
         differences = [_difference_of_gaps(sample, samples[best]) for sample in samples]
         p = holm([each.p for place, each in enumerate(differences) if place != best])
         p.insert(best, math.nan)
-        base = str(methods.base[values[0].labels[0]])
+        base = str(methods.method_id[values[0].labels[0]])
         default = study.declared[base].defaults.get(parameter)
         same = _are_equal(study, [value.labels for value in values])
         rows = zip(values, estimates, differences, p, strict=True)
@@ -1183,7 +1183,7 @@ def _instances(study: Study) -> dict[str, list[str]]:
 
 
 @lru_cache(maxsize=4)
-def on_instances(study: Study) -> pd.DataFrame:
+def instance_runs(study: Study) -> pd.DataFrame:
     """Return each method's runs on the instances that it solved in all runs.
 
     Only instances with a best known reward count. Runs are sorted by family and instance, as in
@@ -1199,14 +1199,14 @@ def on_instances(study: Study) -> pd.DataFrame:
     return runs.sort_values("place", kind="stable")
 
 
-def by_family(study: Study, runs: pd.DataFrame) -> Scores:
+def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
     """Return the gaps of a method's runs on each instance, by family.
 
     Parameters
     ----------
     study : Study
     runs : DataFrame
-        The method's rows of :func:`on_instances`.
+        The method's rows of :func:`instance_runs`.
 
     Returns
     -------
@@ -1244,11 +1244,11 @@ def list_family_gaps(study: Study) -> Rows:
     number of the other instances. Both count families with two arms. If the method ran only on
     families with one arm, they count these.
     """
-    solved_runs, rows, families = on_instances(study), list[tuple[str, Row]](), _instances(study)
+    solved_runs, rows, families = instance_runs(study), list[tuple[str, Row]](), _instances(study)
     two_armed = {family for family in families if len(study.tasks[families[family][0]].hands) > 1}
     for method, of_method in runs_by_method(study).items():
         runs, ran = solved_runs[solved_runs.method == method], {*of_method.family.dropna()}
-        scores, over = by_family(study, runs), two_armed if two_armed & ran else ran
+        scores, over = gaps_by_family(study, runs), two_armed if two_armed & ran else ran
         solved = runs[runs.family.isin(over)].task.nunique()
         missing = sum(len(families[family]) for family in over) - solved
         row: Row = {"method": method, "instances": solved, "missing": missing}

@@ -136,7 +136,7 @@ def scaled(changes: Floats, model: Any) -> Floats:
     return sizes
 
 
-def line(q: Floats, target: Floats, model: Any) -> Floats:
+def straight_path_points(q: Floats, target: Floats, model: Any) -> Floats:
     """Return the points of a straight movement from ``q`` to a target, shape ``(dof, points)``.
 
     They are spaced by a step of ``model`` in joint space; the last step can be shorter. Entries of
@@ -179,7 +179,7 @@ def make(
     of a path.
     """
     model, is_path = task.model, kind == "path"
-    points = path(q, corners, model) if is_path else line(q, corners[-1], model)
+    points = path(q, corners, model) if is_path else straight_path_points(q, corners[-1], model)
     x, y = hand_at(points, task.arms[hand])
     dx, dy = task.goals[goal - 1][0] - x, task.goals[goal - 1][1] - y
     hits = np.sqrt(dx * dx + dy * dy) <= task.radius

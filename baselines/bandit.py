@@ -30,16 +30,16 @@ class Search(ABC):
     ----------
     attempts : Attempts
         Makes and counts the trials of the run.
-    hands : str
+    hand_sequence : str
         Hand sequence, such as ``"RRLR"``.
     """
 
-    def __init__(self, attempts: Attempts, hands: str) -> None:
-        self.hands = hands
+    def __init__(self, attempts: Attempts, hand_sequence: str) -> None:
+        self.hand_sequence = hand_sequence
         self.generations = 1  # the trial by the corrective process counts as a generation
         self.trials = 1
         self._attempts = attempts
-        corrective_trial = attempts.run_corrective(hands)
+        corrective_trial = attempts.run_corrective(hand_sequence)
         self.reward = float(corrective_trial.rewards[0])
         """Best reward so far; -inf if the corrective process does not complete the sequence."""
         self.first_mean: Array = corrective_trial.reached[0, attempts.explored]
@@ -55,7 +55,7 @@ class Search(ABC):
             Targets of the explored joints, goal by goal, in length units and rad. If fewer than N
             trials are left, only the first ones are made; at least one must be left.
         """
-        rewards = self._attempts.around(self.hands, values[: self._attempts.left]).rewards
+        rewards = self._attempts.around(self.hand_sequence, values[: self._attempts.left]).rewards
         self.generations += 1
         self.trials += len(rewards)
         self.reward = max(self.reward, float(rewards.max()))
@@ -115,7 +115,9 @@ def recommend(searches: Iterable[Search], attempts: Attempts) -> tuple[Movement,
 
     If no search has a complete generation, the mean of the best trial's hand sequence is returned.
     """
-    best = min(searches, key=lambda each: (each.answer[0], each.hands != attempts.hands))
+    best = min(
+        searches, key=lambda each: (each.answer[0], each.hand_sequence != attempts.hand_sequence)
+    )
     targets = np.full(attempts.explored.shape, np.nan)
     targets[attempts.explored] = best.answer[1]
-    return movements_of(best.hands, targets)
+    return movements_of(best.hand_sequence, targets)

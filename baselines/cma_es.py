@@ -50,7 +50,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic.baselines.bandit import Search, recommend, sequences_to_try, spend_trials
-from coartic.baselines.evolution import EvolutionStrategy
+from coartic.baselines.cma_strategy import EvolutionStrategy
 from coartic.baselines.uninformed import Attempts, SequenceParameters, UninformedParameters
 from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
@@ -73,14 +73,16 @@ class Strategy(Search):
     session : Session
     attempts : Attempts
         Makes and counts the trials of the run.
-    hands : str
+    hand_sequence : str
         Hand sequence, such as ``"RRLR"``.
     sigma : float
         First step size, in length units (base) and rad (joints).
     """
 
-    def __init__(self, session: Session, attempts: Attempts, hands: str, sigma: float) -> None:
-        super().__init__(attempts, hands)
+    def __init__(
+        self, session: Session, attempts: Attempts, hand_sequence: str, sigma: float
+    ) -> None:
+        super().__init__(attempts, hand_sequence)
         self.sigma = sigma
         self._rng = session.rng
         self._failure = -2.0 * self.reward
@@ -149,12 +151,13 @@ class CMAES(Method):
         told = self.parameters.told_hands(session)
         with session.solving():
             strategies = [
-                Strategy(session, attempts, hands, self.parameters.sigma)
-                for hands in sequences_to_try(session, told)[: attempts.left]
+                Strategy(session, attempts, hand_sequence, self.parameters.sigma)
+                for hand_sequence in sequences_to_try(session, told)[: attempts.left]
             ]
             spend_trials(strategies, attempts, self.parameters.exploration)
         return attempts.result(
-            lambda: recommend(strategies, attempts), trials={s.hands: s.trials for s in strategies}
+            lambda: recommend(strategies, attempts),
+            trials={s.hand_sequence: s.trials for s in strategies},
         )
 
 
@@ -198,25 +201,29 @@ class GoalByGoal(Method):
         letters = sorted(letters_of(session.hands))
         values: dict[tuple[int, str], float] = defaultdict(lambda: -math.inf)
         strategies: dict[str, Strategy] = {}
-        hands = session.find_initial_hands()
+        hand_sequence = session.find_initial_hands()
         with session.solving():
             sequences = len(letters) ** session.goals_count
-            while attempts.left > 0 and (attempts.hands or len(strategies) < sequences):
-                if hands not in strategies:
-                    strategies[hands] = Strategy(session, attempts, hands, self.parameters.sigma)
-                elif strategies[hands].reward > -math.inf:
-                    strategies[hands].generation()
+            while attempts.left > 0 and (attempts.hand_sequence or len(strategies) < sequences):
+                if hand_sequence not in strategies:
+                    strategies[hand_sequence] = Strategy(
+                        session, attempts, hand_sequence, self.parameters.sigma
+                    )
+                elif strategies[hand_sequence].reward > -math.inf:
+                    strategies[hand_sequence].generation()
                 elif not self.parameters.epsilon:
                     break  # the same hands would be chosen again
-                pairs = [hands[max(goal - 1, 0) : goal + 1] for goal in range(len(hands))]
+                pairs = [
+                    hand_sequence[max(goal - 1, 0) : goal + 1] for goal in range(len(hand_sequence))
+                ]
                 for entry in enumerate(pairs):
-                    values[entry] = max(values[entry], strategies[hands].reward)
-                hands = ""
+                    values[entry] = max(values[entry], strategies[hand_sequence].reward)
+                hand_sequence = ""
                 for goal in range(session.goals_count):
-                    pair = {letter: (goal, hands[-1:] + letter) for letter in letters}
+                    pair = {letter: (goal, hand_sequence[-1:] + letter) for letter in letters}
                     best = max(letters, key=lambda letter: values[pair[letter]])
                     explores = session.rng.random() < self.parameters.epsilon
-                    hands += str(session.rng.choice(letters)) if explores else best
+                    hand_sequence += str(session.rng.choice(letters)) if explores else best
         return attempts.result(
             lambda: recommend(strategies.values(), attempts), sequences=len(strategies)
         )

@@ -239,7 +239,7 @@ class Control(Method):
     goals_ahead: ClassVar[int] = 0
     """Number of goals after the current goal that the controller takes into account."""
 
-    def why_not(self, task: Outline) -> str | None:
+    def inapplicable_reason(self, task: Outline) -> str | None:
         """Return a sentence if a task has more than 4096 hand sequences; else None."""
         return task.too_many_sequences
 

@@ -47,7 +47,7 @@ class BestHands(GivenHands):
         short="corrective, best hands",
     )
 
-    def why_not(self, task: Outline) -> str | None:
+    def inapplicable_reason(self, task: Outline) -> str | None:
         """Return a sentence if a task has more than 4096 hand sequences; else None."""
         return task.too_many_sequences
 

@@ -45,8 +45,8 @@ from coartic.tasks.task import letters_of
 _EPSILON = 0.2  # probability of a random hand, for each goal
 _GROWTH = 1.5  # factor of the one-fifth rule
 _SHRINKAGE = 1.0 / math.sqrt(math.sqrt(_GROWTH))  # square roots round alike on all machines
-_LARGEST_SPREAD = 0.3  # under the one-fifth rule, in length units and rad
-_MOST_DRAWN = 128  # largest number of trials that are drawn ahead
+_MAX_SPREAD = 0.3  # under the one-fifth rule, in length units and rad
+_MAX_DRAWN_TRIALS = 128  # largest number of trials that are drawn ahead
 
 
 class HillClimbingParameters(SequenceParameters):
@@ -115,32 +115,34 @@ class HillClimbing(Method):
             if given is not None:
                 return given
             while True:
-                chosen = list(attempts.hands or letters[0] * session.goals_count)
+                chosen = list(attempts.hand_sequence or letters[0] * session.goals_count)
                 for goal in range(len(chosen)):
-                    if not attempts.hands or rng.random() < _EPSILON:
+                    if not attempts.hand_sequence or rng.random() < _EPSILON:
                         chosen[goal] = letters[rng.integers(len(letters))]
-                if (hands := "".join(chosen)) not in hopeless:
-                    return hands
+                if (hand_sequence := "".join(chosen)) not in hopeless:
+                    return hand_sequence
 
-        def adapt(hands: str, is_good: bool) -> None:
+        def adapt(hand_sequence: str, is_good: bool) -> None:
             """Count a trial of a hand sequence, and follow the one-fifth rule."""
-            since[hands] += 1
-            good[hands] += is_good
-            if since[hands] == window:
-                factor = _GROWTH if good[hands] > window / 5 else _SHRINKAGE
-                wanted = max(spreads[hands] * factor, parameters.floor)
-                spreads[hands] = min(wanted, _LARGEST_SPREAD)
-                since[hands] = good[hands] = 0
+            since[hand_sequence] += 1
+            good[hand_sequence] += is_good
+            if since[hand_sequence] == window:
+                factor = _GROWTH if good[hand_sequence] > window / 5 else _SHRINKAGE
+                wanted = max(spreads[hand_sequence] * factor, parameters.floor)
+                spreads[hand_sequence] = min(wanted, _MAX_SPREAD)
+                since[hand_sequence] = good[hand_sequence] = 0
 
-        def begin(hands: str) -> Array:
+        def begin(hand_sequence: str) -> Array:
             """Return the targets of the first trial of a hand sequence, shape ``(G, dof)``."""
             targets = np.full(explored.shape, np.nan)
-            if parameters.begin == "best" and attempts.hands:
-                states, of_best = ([*pairwise(f" {each}")] for each in (hands, attempts.hands))
+            if parameters.begin == "best" and attempts.hand_sequence:
+                states, of_best = (
+                    [*pairwise(f" {each}")] for each in (hand_sequence, attempts.hand_sequence)
+                )
                 shared = np.array([*map(eq, states, of_best)])
                 aimed = shared[:, None] & explored
                 noise = parameters.sigma * rng.standard_normal(aimed.sum())
-                targets[aimed] = centres[attempts.hands][aimed] + noise
+                targets[aimed] = centres[attempts.hand_sequence][aimed] + noise
             return targets
 
         with session.solving():
@@ -151,24 +153,24 @@ class HillClimbing(Method):
                 # the generator goes back to its state after the trial.
                 drawn, noise, states = list[str](), list[Array](), [rng.bit_generator.state]
                 while len(drawn) < min(ahead, attempts.left):
-                    hands = draw() if attempts.trials_made else initial_hands
-                    if hands not in centres:
+                    hand_sequence = draw() if attempts.trials_made else initial_hands
+                    if hand_sequence not in centres:
                         break
-                    drawn.append(hands)
+                    drawn.append(hand_sequence)
                     noise.append(rng.standard_normal(dim))
                     states.append(rng.bit_generator.state)
-                    if is_learned and since[hands] + drawn.count(hands) == window:
+                    if is_learned and since[hand_sequence] + drawn.count(hand_sequence) == window:
                         break
                 if drawn:
-                    thresholds = np.array([rewards[hands] for hands in drawn])
-                    targets = np.array([centres[hands] for hands in drawn])
-                    scales = np.array([spreads[hands] for hands in drawn])
+                    thresholds = np.array([rewards[hand_sequence] for hand_sequence in drawn])
+                    targets = np.array([centres[hand_sequence] for hand_sequence in drawn])
+                    scales = np.array([spreads[hand_sequence] for hand_sequence in drawn])
                     targets[:, explored] += scales[:, None] * np.array(noise)
                     attempt = attempts.run_targets(drawn, targets, until=thresholds)
                     tried = len(attempt.rewards)
                     rng.bit_generator.state = states[tried]
-                    hands, ahead = drawn[tried - 1], min(2 * ahead, _MOST_DRAWN)
-                    if attempt.rewards[-1] > rewards[hands]:
+                    hand_sequence, ahead = drawn[tried - 1], min(2 * ahead, _MAX_DRAWN_TRIALS)
+                    if attempt.rewards[-1] > rewards[hand_sequence]:
                         ahead = tried
                     if is_learned:
                         for each, is_good in zip(
@@ -176,17 +178,17 @@ class HillClimbing(Method):
                         ):
                             adapt(each, bool(is_good))
                 else:
-                    rewards[hands] = -np.inf
-                    targets = begin(hands)
-                    attempt = attempts.run_targets([hands], targets[None])
+                    rewards[hand_sequence] = -np.inf
+                    targets = begin(hand_sequence)
+                    attempt = attempts.run_targets([hand_sequence], targets[None])
                     if attempt.rewards[-1] == -np.inf and np.isnan(targets).all():
-                        hopeless.add(hands)
-                if attempt.rewards[-1] > rewards[hands]:
-                    centres[hands] = np.where(explored, attempt.reached[-1], np.nan)
-                    rewards[hands] = float(attempt.rewards[-1])
+                        hopeless.add(hand_sequence)
+                if attempt.rewards[-1] > rewards[hand_sequence]:
+                    centres[hand_sequence] = np.where(explored, attempt.reached[-1], np.nan)
+                    rewards[hand_sequence] = float(attempt.rewards[-1])
 
         def centre() -> tuple[Movement, ...]:
-            return movements_of(attempts.hands, centres[attempts.hands])
+            return movements_of(attempts.hand_sequence, centres[attempts.hand_sequence])
 
         return attempts.result(centre, sequences=len(centres))
 

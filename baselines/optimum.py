@@ -34,7 +34,7 @@ import numpy as np
 from pydantic import Field
 
 from coartic import Task, TaskError, execute, parse_task
-from coartic.baselines.evolution import EvolutionStrategy
+from coartic.baselines.cma_strategy import EvolutionStrategy
 from coartic.baselines.posture_graph import QUICK, Count, Nodes, cheapest_chains
 from coartic.baselines.shortest_paths import REWARD_INFORMATION, fewest_ticks, shortest_plans
 from coartic.baselines.trajectory_problem import IPOPT, trajectory_problem
@@ -57,9 +57,9 @@ from coartic.motion.trials import (
     compiled_task,
     hand_codes,
     make_trials,
+    noise_draws,
+    noise_seed,
     trials_of,
-    world_seed,
-    worlds_of,
 )
 from coartic.robot import Array, Configs
 from coartic.tasks.task import letters_of
@@ -67,7 +67,7 @@ from coartic.tasks.task import letters_of
 _STEP_SIZE = 0.02  # first step size of CMA-ES, in length units (base) and rad (joints)
 _SEARCH = 0x73656172  # key of the worlds in which the search executes solutions
 _JUDGED = 10  # times as many executions judge a solution as find it
-MOST_KEPT = 64  # hand sequences whose shortest paths are stored with the solution
+MAX_KEPT = 64  # hand sequences whose shortest paths are stored with the solution
 
 
 class OptimumParameters(Parameters):
@@ -136,7 +136,7 @@ class OptimumSearch(Method):
         details = {
             "path_length": plans.ranked[0].cost,
             "path_lengths": {
-                letters_of(plan.instance.hands): plan.cost for plan in plans.ranked[:MOST_KEPT]
+                letters_of(plan.instance.hands): plan.cost for plan in plans.ranked[:MAX_KEPT]
             },
             "solves": plans.solves,
             "failed_solves": plans.failed,
@@ -323,15 +323,17 @@ def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed:
     ticks.
     """
     compiled = compiled_task(task, session.model)
-    world = world_seed(seed, _SEARCH)
+    world = noise_seed(seed, _SEARCH)
 
     def mean_ticks(points: Array, first: int, executions: int) -> Array:
         count = len(points) * executions
         targets = np.repeat(with_entries(start.targets, points), executions, axis=0)
         draws = np.tile(first + np.arange(executions), len(points))
         codes = hand_codes(task, start.hands, count)
-        accounts = make_trials(compiled, codes, targets[:, :, None], worlds=worlds_of(world, draws))
-        trials = trials_of(accounts, task.robot.dof)
+        records = make_trials(
+            compiled, codes, targets[:, :, None], worlds=noise_draws(world, draws)
+        )
+        trials = trials_of(records, task.robot.dof)
         iterations = int(trials.iterations.sum())
         session.spend(
             forward_kinematics=int(trials.evaluations.sum()),

@@ -90,7 +90,7 @@ class Policy(Search):
     rng : numpy.random.Generator
     attempts : Attempts
         Makes and counts the trials of the run.
-    hands : str
+    hand_sequence : str
         Hand sequence, such as ``"RRLR"``.
     parameters : PolicyGradientParameters
     """
@@ -99,10 +99,10 @@ class Policy(Search):
         self,
         rng: np.random.Generator,
         attempts: Attempts,
-        hands: str,
+        hand_sequence: str,
         parameters: PolicyGradientParameters,
     ) -> None:
-        super().__init__(attempts, hands)
+        super().__init__(attempts, hand_sequence)
         self._rng = rng
         self._batch, self._step, self._spread_step = parameters.steps
         self.mean = self.first_mean
@@ -177,12 +177,13 @@ class PolicyGradient(Method):
         told = parameters.told_hands(session)
         with session.solving():
             policies = [
-                Policy(session.rng, attempts, hands, parameters)
-                for hands in sequences_to_try(session, told)[: attempts.left]
+                Policy(session.rng, attempts, hand_sequence, parameters)
+                for hand_sequence in sequences_to_try(session, told)[: attempts.left]
             ]
             spend_trials(policies, attempts, _EXPLORATION)
         return attempts.result(
-            lambda: recommend(policies, attempts), trials={p.hands: p.trials for p in policies}
+            lambda: recommend(policies, attempts),
+            trials={p.hand_sequence: p.trials for p in policies},
         )
 
 

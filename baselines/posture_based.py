@@ -52,7 +52,7 @@ PER_ROUND = 60
 """Number of postures that a round generates for each hand sequence."""
 # Feedforward correction: damped Gauss-Newton steps on the hand's error.
 _DAMPING = 1e-3  # in squared length units: the Jacobian of a straight arm is singular
-_LONGEST = 0.5  # in length units: largest part of the error that one step corrects
+_MAX_STEP = 0.5  # in length units: largest part of the error that one step corrects
 _RETRIEVED = 40  # steps for a stored posture, which may be far from the goal
 _GENERATED = 3  # steps for a generated posture, which is near the goal
 _INSIDE = 0.999  # a step aims at this part of the tolerated error
@@ -406,7 +406,7 @@ def _linearise_far(
         miss_y = y - ys[tip]
         distance = math.hypot(miss_x, miss_y)
         if distance > tolerance:
-            share = min(distance - _INSIDE * tolerance, _LONGEST) / distance
+            share = min(distance - _INSIDE * tolerance, _MAX_STEP) / distance
             wanted[left, 0, 0] = miss_x * share
             wanted[left, 1, 0] = miss_y * share
             for k in range(tip):

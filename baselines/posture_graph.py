@@ -83,7 +83,7 @@ def _sample_postures(
     return np.asarray(q[np.hypot(*miss.T) <= task.radius])
 
 
-class Beginning(NamedTuple):
+class PrefixCosts(NamedTuple):
     """A prefix of hand sequences, with the costs of its cheapest paths.
 
     Dynamic programming over prefixes: the state is a pair of last nodes, namely the last node of
@@ -98,7 +98,7 @@ class Beginning(NamedTuple):
     cost: Array
     """``cost[i, j]`` is the joint-space length of the shortest path whose last nodes are node i of
     the hand used last and node j of the other hand."""
-    back: tuple[NDArray[np.int32], ...]
+    predecessors: tuple[NDArray[np.int32], ...]
     """Predecessors, an array for each goal. Entry ``[i, j]`` is the index of the node before node i
     of the same hand, on the cheapest path to the pair (i, j)."""
 
@@ -161,18 +161,18 @@ def chains_of(
         alphabetical order of the hand sequences. Hand sequences without a chain are left out.
     """
     start = dict.fromkeys(HANDS, np.array(task.q0)[None, :])
-    beam = [Beginning((), start, np.zeros((1, 1)), ())]
+    beam = [PrefixCosts((), start, np.zeros((1, 1)), ())]
     for _ in range(len(task.goals)):
         longer = [more for begun in beam for more in _extend(task, layers, begun, base_weight)]
         ranked = sorted(range(len(longer)), key=lambda i: float(longer[i].cost.min()))
         beam = [longer[i] for i in sorted(ranked[:most])]
     chains: list[Chain] = []
-    for hands, _, cost, back in beam:
+    for hands, _, cost, predecessors in beam:
         i, j = np.unravel_index(cost.argmin(), cost.shape)
         picked = []
         for goal in reversed(range(len(hands))):
             picked.append(layers[goal, hands[goal]][i])
-            came = back[goal][i, j]
+            came = predecessors[goal][i, j]
             same = goal == 0 or hands[goal - 1] == hands[goal]
             i, j = (came, j) if same else (j, came)
         configurations, q = [], np.array(task.q0)
@@ -186,10 +186,10 @@ def chains_of(
 
 
 def _extend(
-    task: Task, layers: Layers, begun: Beginning, base_weight: float
-) -> Iterator[Beginning]:
+    task: Task, layers: Layers, begun: PrefixCosts, base_weight: float
+) -> Iterator[PrefixCosts]:
     """Yield ``begun`` extended by one goal, for each hand with a node at that goal."""
-    hands, nodes, cost, back = begun
+    hands, nodes, cost, predecessors = begun
     goal = len(hands)
     for hand in sorted(task.hands):  # left before right
         layer = layers[goal, hand]
@@ -207,7 +207,7 @@ def _extend(
             distances = np.sqrt(base[other] + arm) if step is None else step
             total = came_from[:, other, None] + distances
             came[:, other], reached[:, other] = total.argmin(axis=0), total.min(axis=0)
-        yield Beginning((*hands, hand), {**nodes, hand: layer}, reached, (*back, came))
+        yield PrefixCosts((*hands, hand), {**nodes, hand: layer}, reached, (*predecessors, came))
 
 
 def cheapest_chains(

@@ -28,8 +28,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from coartic.baselines.uninformed import Attempts
-from coartic.internal.validation import sentence_error
-from coartic.learner.conditions import MOST_NOISE
+from coartic.internal.validation import described_error
+from coartic.learner.conditions import MAX_NOISE
 from coartic.learner.learning import runs_at_once
 from coartic.method import TRIALS, Facts, Method, MethodError, Parameters, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION, sequences_of
@@ -44,7 +44,7 @@ class RandomSearchHandsParameters(Parameters):
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Number of trials of a run, including those in which only the corrective process acts."""
-    sigma: Annotated[float, Field(gt=0, le=MOST_NOISE)] = 0.05
+    sigma: Annotated[float, Field(gt=0, le=MAX_NOISE)] = 0.05
     """Standard deviation of the noise on each explored joint, in length units (base) and rad
     (joints). The default is the learner's."""
     stages: Annotated[int, Field(ge=1)] = 1
@@ -61,7 +61,7 @@ class RandomSearchHandsParameters(Parameters):
     @model_validator(mode="after")
     def _check_stages(self) -> Self:
         if self.stages > self.trials:
-            raise sentence_error(
+            raise described_error(
                 f"stages is {self.stages}; it must be at most the number of trials, {self.trials}"
             )
         return self
@@ -110,7 +110,7 @@ def draw_trials(
     if trials <= 0:
         raise MethodError("infeasible", "no trial can be made: the trial budget is used up")
     attempts.run_corrective(*(sequences_of(session) if hands is None else [hands])[:trials])
-    if not (chosen := attempts.hands):
+    if not (chosen := attempts.hand_sequence):
         raise MethodError("infeasible", "the corrective process completes no hand sequence")
     explored = attempts.explored.copy()
     for goal, hand in enumerate(hands_of(chosen)):

@@ -40,13 +40,13 @@ from coartic.baselines.trajectory_problem import IPOPT, trajectory_problem
 from coartic.method import Facts, Method, Parameters, Result, Session
 from coartic.motion.doors import segment_lengths
 from coartic.robot import BASE_DOF, HANDS
-from coartic.tasks.task import MOST_GOALS, Start
+from coartic.tasks.task import MAX_GOALS, Start
 
 
 class RecedingHorizonParameters(Parameters):
     """Parameters: the horizon, and the effort of the search."""
 
-    horizon: Annotated[int, Field(ge=0, lt=MOST_GOALS)] = 1
+    horizon: Annotated[int, Field(ge=0, lt=MAX_GOALS)] = 1
     """Number of goals in a window after the current goal. At the end of a task the window has fewer
     goals."""
     nodes: Nodes = 200

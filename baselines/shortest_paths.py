@@ -100,9 +100,9 @@ def fewest_ticks(
     ticks, the rounding with the fewest corrections is returned. Two kinds of roundings are not
     tried:
 
-    - all roundings of a plan except the 64 nearest to it (:meth:`.Rounding.every`);
-    - roundings whose approximate lower bound (:meth:`.Rounding.least`) is not below the ticks of
-      the best rounding so far.
+    - all roundings of a plan except the 64 nearest to it (:meth:`.Rounding.iter_roundings`);
+    - roundings whose estimated ticks (:meth:`.Rounding.estimated_ticks`), an approximate lower
+      bound, are not below the ticks of the best rounding so far.
 
     Parameters
     ----------
@@ -134,12 +134,12 @@ def fewest_ticks(
     for plan in plans.ranked:
         instance, rounding = plan.instance, Rounding(session, problem, plan.instance)
         # Without a movement to a goal one tick is saved, and the path is not shorter.
-        if not worth(rounding.least(plan) - len(instance.hands)):
+        if not worth(rounding.estimated_ticks(plan) - len(instance.hands)):
             continue
-        for merged, shortest in rounding.plans(plan, task, worth):
-            if not worth(rounding.least(shortest, merged)):
+        for merged, shortest in rounding.iter_plans(plan, task, worth):
+            if not worth(rounding.estimated_ticks(shortest, merged)):
                 continue
-            for rounded in rounding.every(shortest, merged):
+            for rounded in rounding.iter_roundings(shortest, merged):
                 if not worth(rounded.ticks):
                     continue
                 planned = movements(session, task, instance, rounded.configurations, rounded.steps)
@@ -148,7 +148,7 @@ def fewest_ticks(
                 spent = execution.ticks, execution.corrections
                 if execution.completed and spent < fewest:
                     fewest, best = spent, PlanInTicks(planned, execution, shortest)
-                if not worth(rounding.least(shortest, merged)):
+                if not worth(rounding.estimated_ticks(shortest, merged)):
                     break  # no other rounding takes fewer ticks
     if best is None:
         raise MethodError("solver-failed", "IPOPT could not round any plan to whole ticks")

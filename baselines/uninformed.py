@@ -67,7 +67,7 @@ class Attempts:
         """Number of trials made."""
         self.reward = -math.inf
         """Best reward so far; -inf before the first success."""
-        self.hands = ""
+        self.hand_sequence = ""
         """Hand sequence of the best trial; empty before the first success."""
         self.best_trial = -1
         """Number of the best trial, from 0; -1 before the first success."""
@@ -77,12 +77,12 @@ class Attempts:
         self.reached: Array = np.empty(0)
         """Configurations in which the best trial hit the goals, shape ``(G, dof)``."""
 
-    def run_corrective(self, *hands: str) -> Trials:
+    def run_corrective(self, *hand_sequences: str) -> Trials:
         """For each hand sequence, make a trial in which only the corrective process acts.
 
         Parameters
         ----------
-        *hands : str
+        *hand_sequences : str
             Hand sequences, such as ``"RRLR"``; at least one.
 
         Returns
@@ -96,15 +96,15 @@ class Attempts:
         BudgetError
             No trial of the session is left.
         """
-        shape = (len(hands), self._session.goals_count, self._session.dof)
-        return self.run_targets([*hands], np.full(shape, np.nan))
+        shape = (len(hand_sequences), self._session.goals_count, self._session.dof)
+        return self.run_targets([*hand_sequences], np.full(shape, np.nan))
 
-    def around(self, hands: str, values: Array) -> Trials:
+    def around(self, hand_sequence: str, values: Array) -> Trials:
         """Make trials with one hand sequence and targets for the explored joints.
 
         Parameters
         ----------
-        hands : str
+        hand_sequence : str
             Hand sequence, such as ``"RRLR"``.
         values : ndarray, shape (N, n)
             Targets of the n explored joints of all goals (True in ``explored``), goal by goal, in
@@ -122,16 +122,16 @@ class Attempts:
         """
         targets = np.full((len(values), *self.explored.shape), np.nan)
         targets[:, self.explored] = values
-        return self.run_targets(hands, targets)
+        return self.run_targets(hand_sequence, targets)
 
     def run_targets(
-        self, hands: str | list[str], targets: Array, until: Array | None = None
+        self, hand_sequences: str | list[str], targets: Array, until: Array | None = None
     ) -> Trials:
         """Make trials with targets, and remember the best trial so far.
 
         Parameters
         ----------
-        hands : str or list of str
+        hand_sequences : str or list of str
             Hand sequence of all trials, or of each trial.
         targets : ndarray, shape (N, G, dof)
             Targets, in length units and rad; NaN for joints that do not move. N is at least 1.
@@ -149,12 +149,14 @@ class Attempts:
         BudgetError
             No trial of the session is left.
         """
-        trials = self._session.trials(hands, targets, until=until)
+        trials = self._session.trials(hand_sequences, targets, until=until)
         rewards = trials.rewards
         best = int(rewards.argmax())
         if rewards[best] > self.reward:
             self.reward = float(rewards[best])
-            self.hands = hands if isinstance(hands, str) else hands[best]
+            self.hand_sequence = (
+                hand_sequences if isinstance(hand_sequences, str) else hand_sequences[best]
+            )
             self.best_trial = self.trials_made + best
             self.targets, self.reached = trials.targets[best], trials.reached[best]
             if self.is_noisy:
@@ -169,7 +171,7 @@ class Attempts:
 
         Raises ValueError before the first success.
         """
-        return movements_of(self.hands, self.targets)
+        return movements_of(self.hand_sequence, self.targets)
 
     def result(
         self, recommended: Callable[[], tuple[Movement, ...]] | None = None, **details: Any
@@ -181,7 +183,7 @@ class Attempts:
         """
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)
-        if not self.hands:
+        if not self.hand_sequence:
             raise MethodError(
                 "infeasible",
                 f"no trial hit every goal: the corrective process failed in all "

@@ -22,7 +22,7 @@ from coartic.method import Session
 from coartic.motion.doors import move, scale_base
 from coartic.robot import Array
 
-MOST_ROUNDINGS = 64  # roundings of a plan that are tried; up to seven goals have no more
+MAX_ROUNDINGS = 64  # roundings of a plan that are tried; up to seven goals have no more
 _SLACK = 1e-6  # part of a step: lengths have the solver's tolerance
 _BEYOND = tuple(1 << k for k in range(11))  # numbers of steps from the configuration to the target
 
@@ -58,8 +58,8 @@ class Rounding:
         """Round each segment to the nearest number of steps, and the last segment up.
 
         Before the last segment is rounded, the solver makes it as short as the rounded lengths of
-        the other segments allow. To first order all roundings of a shortest path (:meth:`every`)
-        take the same number of ticks.
+        the other segments allow. To first order all roundings of a shortest path
+        (:meth:`iter_roundings`) take the same number of ticks.
 
         Returns
         -------
@@ -69,7 +69,7 @@ class Rounding:
         exact = plan.lengths()[:-1] / self._step
         return self.divide(plan, [round(length) for length in exact], ())
 
-    def every(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
+    def iter_roundings(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
         """Yield the 64 nearest roundings of a plan to whole steps, in the order of distance.
 
         Each segment but the last is rounded up or down; the last segment is rounded up. A plan for
@@ -82,21 +82,22 @@ class Rounding:
             itertools.product(*choices),
             key=lambda steps: float(np.abs(np.array(steps) - exact).sum()),
         )
-        for steps in ranked[:MOST_ROUNDINGS]:
+        for steps in ranked[:MAX_ROUNDINGS]:
             rounded = self.divide(plan, list(steps), merged)
             if rounded is not None:
                 yield rounded
 
-    def least(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
-        """Return the approximate lower bound of ticks: the total length of the plan, rounded up.
+    def estimated_ticks(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
+        """Return an approximate lower bound of the ticks of a plan's roundings.
 
-        Roundings of a shortest plan rarely take fewer ticks.
+        It is the total length of the plan, rounded up. Roundings of a shortest plan rarely take
+        fewer ticks.
         """
         length = float(plan.lengths().sum())
         movements = len(self._instance.hands) - len(merged)
         return math.ceil(length / self._step - _SLACK) + movements
 
-    def plans(
+    def iter_plans(
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
         """Yield the shortest plan for each set of goals that take no movement.
@@ -111,8 +112,8 @@ class Rounding:
         task : Task
         worth : callable
             Function that returns whether a plan with a given number of ticks is of interest. A set
-            of goals is not extended if :meth:`least` shows that no larger set can have such a
-            number of ticks.
+            of goals is not extended if :meth:`estimated_ticks` shows that no larger set can have
+            such a number of ticks.
 
         Yields
         ------
@@ -137,7 +138,7 @@ class Rounding:
             merged, shortest = waiting.popleft()
             yield merged, shortest
             further = [g for g in able if not merged or g > merged[-1]]
-            if not worth(self.least(shortest, merged) - len(further)):
+            if not worth(self.estimated_ticks(shortest, merged) - len(further)):
                 continue
             for g in further:
                 more = (*merged, g)

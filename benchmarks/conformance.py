@@ -26,13 +26,13 @@ from coartic import (
 )
 from coartic.benchmarks.registry import Registry
 from coartic.benchmarks.reproduce import compare_runs, perform_in_order
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.method import METERED
 from coartic.motion.execution import execute_many
 from coartic.motion.solution import goals_without_target, next_action
-from coartic.motion.trials import compiled_task, world_seed, worlds_of
+from coartic.motion.trials import compiled_task, noise_draws, noise_seed
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, in_words
+from coartic.runs.plan import Job, cell_of, describe_parameters
 from coartic.runs.record import Row
 from coartic.tasks.task import check_task
 
@@ -79,7 +79,7 @@ def check_method(
     parameters = trials | info.rules()["quick"]
 
     def applies(task: Task) -> bool:
-        return info.why_not(task, parameters) is None
+        return info.inapplicable_reason(task, parameters) is None
 
     candidates = [*map(load_task, builtin_tasks())] if tasks is None else tasks
     tasks, jobs, runs = list(filter(applies, candidates)), dict[tuple[str, str], Job](), _Runs()
@@ -202,7 +202,7 @@ def _is_best_trial(run: Row) -> bool:
     if len({*rewards}) < 2:
         return False  # there was nothing to choose from
     task, best = run.cell.task, max(rewards)
-    worlds = worlds_of(world_seed(run["seed"]), rewards.index(best))
+    worlds = noise_draws(noise_seed(run["seed"]), rewards.index(best))
     answer = next_action(run.part("solution"))
     (execution,) = execute_many(compiled_task(task, run.cell.model), [answer], worlds)
     return isinstance(execution, Execution) and execution.reward == best
@@ -249,7 +249,7 @@ CHECKS: dict[
     tuple[Callable[[MethodInfo, _Runs], Iterator[str]], Callable[[MethodInfo, _Runs], str]],
 ] = {
     "declaration": (_declaration, lambda info, _: info.title),
-    "parameters": (_parameters, lambda info, _: in_words(info.complete({})) or "none"),
+    "parameters": (_parameters, lambda info, _: describe_parameters(info.complete({})) or "none"),
     "solution": (_solution, _rewards),
     "determinism": (_determinism, _seeds),
     "no hidden state": (
@@ -313,8 +313,10 @@ def check_task_file(path: Path, registered: Registry) -> list[CheckResult]:
         is_solved = trial.completed
     except (NotApplicableError, TaskError) as error:
         finding, is_solved = str(error), False
-    methods = [name for name, info in registered.items() if info.why_not(task) is None]
-    count = f"{counted(len(task.goals), 'goal')}; {counted(len(methods), 'method')} can run on it"
+    methods = [name for name, info in registered.items() if info.inapplicable_reason(task) is None]
+    count = (
+        f"{pluralize(len(task.goals), 'goal')}; {pluralize(len(methods), 'method')} can run on it"
+    )
     return [
         CheckResult("valid", True, f"{task.name}, {count}"),
         CheckResult(

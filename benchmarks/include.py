@@ -26,11 +26,11 @@ from coartic.benchmarks.provenance import made_with
 from coartic.benchmarks.reproduce import compare_runs
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.runs.method_info import MethodInfo
 from coartic.runs.plan import Job, hash_of
 from coartic.runs.shipped import SHIPPED, open_shipped
-from coartic.runs.store import Store, open_store, writing
+from coartic.runs.store import Store, open_store, open_store_for_writing
 
 
 def include_folders(
@@ -109,7 +109,7 @@ def include_folders(
             source.check_file()  # all sources are checked before the first row is copied
         known = methods or {job.cell.method.name: job.cell.method for job in plan}
         joined = _join(plan, sources, tasks, known)
-        target = stack.enter_context(writing(out))
+        target = stack.enter_context(open_store_for_writing(out))
         _check_same_results({str(out): target, **sources})
         target.replace_plan(joined, made_with())
         for source in sources.values():
@@ -152,8 +152,8 @@ def _join(
                 unused[job.cell.method.name] += 1
         for method, count in unused.items():
             warnings.warn(
-                f"{name}: {counted(count, 'run')} of {method} not used, made before its file, or a "
-                "file that it imports or reads, changed",
+                f"{name}: {pluralize(count, 'run')} of {method} not used, made before its file, or "
+                "a file that it imports or reads, changed",
                 stacklevel=3,
             )
     asked = {job.cell.digest: len(job.numbers) for job in plan}
@@ -210,8 +210,8 @@ def _warn_of_gaps(
             )
         if few:
             warnings.warn(
-                f"{name} has fewer than {counted(most_runs, 'run')}, which this command asks for, "
-                f"of {_named(few)}",
+                f"{name} has fewer than {pluralize(most_runs, 'run')}, which this command asks "
+                f"for, of {_named(few)}",
                 stacklevel=4,
             )
 

@@ -23,7 +23,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from coartic.benchmarks.processes import CONTEXT, signal_name
 from coartic.errors import CoarticError
-from coartic.internal.text import LONGEST_LINE, error_line, plain
+from coartic.internal.text import MAX_LINE_LENGTH, error_line, plain
 from coartic.internal.threads import begin_worker
 from coartic.internal.toml_files import read_bytes
 from coartic.internal.user_files import is_users
@@ -49,7 +49,7 @@ def read_file(path: Path) -> list[MethodInfo]:
     A new process imports the file. The same process later answers questions about the methods
     (:data:`READERS`). Raises CoarticError for a file that cannot be used.
     """
-    shown = plain(str(path), LONGEST_LINE)
+    shown = plain(str(path), MAX_LINE_LENGTH)
     read_bytes(path)
     if path.suffix != ".py":
         raise CoarticError(f"{shown}: the name of a method file must end in .py")
@@ -138,7 +138,7 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
         where = f"{shown}: {method.__name__}"
         for attribute in ("name", "title", "citation", "tuned_on"):
             text = getattr(method, attribute, None)
-            if not isinstance(text, str) or plain(text, LONGEST_LINE) != text:
+            if not isinstance(text, str) or plain(text, MAX_LINE_LENGTH) != text:
                 raise CoarticError(
                     f"{where}: {attribute} must be a string of one line, not {text!r}"
                 )

@@ -28,16 +28,16 @@ from coartic.benchmarks.suites import (
     tasks_of,
 )
 from coartic.internal.limits import (
-    MOST_RUNS,
-    MOST_SEED,
+    MAX_RUNS,
+    MAX_SEED,
     check_limits,
     plain_values,
 )
-from coartic.internal.text import counted, unknown
-from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.internal.text import pluralize, unknown
+from coartic.internal.validation import FileData, described_error, explain
 from coartic.model import PAPER, MotionModel, differences
 from coartic.runs.method_info import MethodInfo
-from coartic.runs.plan import Job, cell_of, in_words, tasks_by_name
+from coartic.runs.plan import Job, cell_of, describe_parameters, tasks_by_name
 from coartic.tasks.families import (
     instance_of,
     is_file,
@@ -54,7 +54,7 @@ def _task_or_name(value: Any) -> Task | str:
     """Validate a task: a Task, or a name or path, which is returned as a string."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
-    raise sentence_error(f"task {value!r} must be a name, a path or a Task")
+    raise described_error(f"task {value!r} must be a name, a path or a Task")
 
 
 def _runs_asked(value: Any) -> int | range | None:
@@ -63,11 +63,11 @@ def _runs_asked(value: Any) -> int | range | None:
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:
         if value is not None:
-            check_limits("runs", last, 1, MOST_RUNS)
-            check_limits("its first run", first, 0, MOST_RUNS)
+            check_limits("runs", last, 1, MAX_RUNS)
+            check_limits("its first run", first, 0, MAX_RUNS)
     except ValueError as error:
         example = "range(50, 100), or 50..99 in a command"
-        raise sentence_error(f"{error}, or a range, such as {example}") from None
+        raise described_error(f"{error}, or a range, such as {example}") from None
     return value if is_range or value is None else int(value)
 
 
@@ -95,7 +95,7 @@ class Request(FileData):
     trials: TrialCount | None = None
     """Trials of each run, for methods that have this parameter; by default the number of the
     suite, or else of the method."""
-    seed: Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)] = 0
+    seed: Annotated[int, Field(ge=0, le=MAX_SEED, strict=True)] = 0
     """Seed of the suite."""
     time_limit_s: Seconds | None = None
     """Limit of the CPU time of a job, in s; by default the limit of the suite."""
@@ -176,7 +176,7 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
         if (task.name in own or method.name not in of_suite)
         and (task.name, method.name) not in cells
         and method.refuses(world) is None
-        and method.why_not(task) is None
+        and method.inapplicable_reason(task) is None
     ]
     if wrong := [name for name in names if name not in tasks]:
         hint = " Instances are a range, such as long/v1/i000..i009."
@@ -371,7 +371,7 @@ def _suite_jobs(
             if request.model and worlds:
                 warnings.warn(
                     f"suite {suite.name!r}, block {number}, is left out: it has a world of its own "
-                    f"({', '.join(in_words(differences(world)) for world in worlds)})",
+                    f"({', '.join(describe_parameters(differences(world)) for world in worlds)})",
                     stacklevel=2,
                 )
                 continue
@@ -379,7 +379,7 @@ def _suite_jobs(
                 for values in itertools.product(*block.grid.values()):
                     parameters = block.parameters | dict(zip(block.grid, values, strict=True))
                     chosen = world or _world_of(request)
-                    reason = method.refuses(chosen) or method.why_not(task, parameters)
+                    reason = method.refuses(chosen) or method.inapplicable_reason(task, parameters)
                     if reason is None:
                         yield job(task, method, parameters, block.runs, chosen)
                     elif not is_open:
@@ -434,7 +434,7 @@ def _why_nothing_runs(
     """
     tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
     reasons = dict.fromkeys(
-        method.refuses(_world_of(request)) or method.why_not(task)
+        method.refuses(_world_of(request)) or method.inapplicable_reason(task)
         for task in tasks
         for method in methods
     )
@@ -452,7 +452,7 @@ def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
         if first_job.numbers != job.numbers:
             raise CoarticError(
                 f"{job.cell.label} on {job.cell.task.name}: the suite asks for "
-                f"{counted(len(first_job.numbers), 'run')}, and in a later block for "
+                f"{pluralize(len(first_job.numbers), 'run')}, and in a later block for "
                 f"{len(job.numbers)}; ask for one number of runs"
             )
     return list(distinct.values())

@@ -38,7 +38,7 @@ from coartic.benchmarks.processes import CONTEXT, PROGRAM_CONTEXT, signal_name
 from coartic.benchmarks.worker import answer_of, fail, outcomes_from, perform_job
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
-from coartic.internal.limits import MOST_SECONDS, check_limits
+from coartic.internal.limits import MAX_SECONDS, check_limits
 from coartic.internal.text import error_line, plain
 from coartic.internal.threads import begin_worker, end_with_parent, threads_for
 from coartic.learner.conditions import METHOD_PREFIX
@@ -46,11 +46,11 @@ from coartic.learner.learning import warm_up
 from coartic.runs.plan import Job
 from coartic.runs.record import Outcome
 
-_LONGEST_S = 24 * 3600.0  # CPU time of a job without a limit
-_LEAST_MEMORY = 2**30  # bytes for a process: four times as much as built-in methods need
+_MAX_CPU_S = 24 * 3600.0  # CPU time of a job without a limit
+_MIN_MEMORY = 2**30  # bytes for a process: four times as much as built-in methods need
 _LAST_LINES = 3  # number of last lines of an ended process's errors in a reason
 _LOOK_S = 1.0  # time between looks whether a pool is broken
-_MOST_BROKEN = 5  # pools of a group that may break before a job gets an answer
+_MAX_BROKEN_POOLS = 5  # pools of a group that may break before a job gets an answer
 _REPEATED = (-signal.SIGKILL, 255)  # exit codes of a process that was killed or lost its server
 
 
@@ -107,7 +107,7 @@ class Local:
 
     @checked_arguments
     def __init__(self, jobs: int = -1, *, timeout_s: float = 60.0, verbose: bool = False) -> None:
-        check_limits("timeout_s", timeout_s, 0.0, MOST_SECONDS)
+        check_limits("timeout_s", timeout_s, 0.0, MAX_SECONDS)
         self.workers = threads_for(jobs)
         self.timeout_s = timeout_s
         self.verbose = verbose
@@ -228,13 +228,13 @@ class Local:
                 group.waiting.appendleft((number, job))
                 group.running -= 1
         group.broken_pools += 1
-        if group.broken_pools >= _MOST_BROKEN:
+        if group.broken_pools >= _MAX_BROKEN_POOLS:
             raise BrokenExecutor("processes end before they begin a job") from error
         group.close()
 
     def wall_limit_s(self, job: Job) -> float:
         """Return the limit of wall time for a job, in s."""
-        return 3 * (job.time_limit_s or _LONGEST_S) + self.timeout_s
+        return 3 * (job.time_limit_s or _MAX_CPU_S) + self.timeout_s
 
     def _failure(self, job: Job, error: BaseException, printed: str) -> list[Outcome]:
         """Return the outcomes of a job that gave an error instead of an answer.
@@ -250,7 +250,7 @@ class Local:
         if not isinstance(error, ProcessExpired):
             return fail(job, "crashed", error_line(error))
         if error.exitcode == -signal.SIGPROF:
-            cpu_s = job.time_limit_s or _LONGEST_S
+            cpu_s = job.time_limit_s or _MAX_CPU_S
             return fail(job, "timeout", f"CPU time limit of {cpu_s:g} s exceeded", cpu_s=cpu_s)
         code = error.exitcode
         how = f"killed by {signal_name(-code)}" if code < 0 else f"exit code {code}"
@@ -362,7 +362,7 @@ def _begin(folder: Path, workers: int, verbose: bool) -> None:
         logging.getLogger("coartic").setLevel(logging.DEBUG)
         sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    share = max(total * 8 // (10 * workers), _LEAST_MEMORY)
+    share = max(total * 8 // (10 * workers), _MIN_MEMORY)
     with contextlib.suppress(ValueError):  # a limit from outside is lower
         resource.setrlimit(resource.RLIMIT_DATA, (share, share))
     with contextlib.suppress(OSError):  # the disk is full
@@ -386,7 +386,7 @@ def _answer_to(folder: Path, number: int, job: Job, verbose: bool) -> bytes:
     if not job.cell.method.is_ours:
         check_code(job.cell.method)
     signal.signal(signal.SIGPROF, signal.SIG_DFL)  # an earlier method may have changed it
-    signal.setitimer(signal.ITIMER_PROF, job.time_limit_s or _LONGEST_S)
+    signal.setitimer(signal.ITIMER_PROF, job.time_limit_s or _MAX_CPU_S)
     outcomes = perform_job(job)
     signal.setitimer(signal.ITIMER_PROF, 0)
     with contextlib.suppress(OSError):

@@ -21,7 +21,7 @@ import numpy as np
 import coartic
 from coartic.benchmarks.pool import process_pool
 from coartic.benchmarks.processes import CONTEXT
-from coartic.internal.text import LONGEST_LINE, plain
+from coartic.internal.text import MAX_LINE_LENGTH, plain
 from coartic.internal.threads import threads_for, worker_variables
 from coartic.motion.kernels.compile import PACKAGE, hash_of_files, python_files
 
@@ -62,8 +62,8 @@ def current_environment() -> dict[str, Any]:
         "commit": _commit_of_checkout(),
         "python": platform.python_version(),
         "packages": {name: metadata.version(name) for name in _LIBRARIES},
-        "platform": plain(platform.platform(), LONGEST_LINE),
-        "processor": plain(processor, LONGEST_LINE),
+        "platform": plain(platform.platform(), MAX_LINE_LENGTH),
+        "processor": plain(processor, MAX_LINE_LENGTH),
         "arithmetic": arithmetic(),
         "cores": threads_for(-1),
         "threads": dict(worker_variables()),

@@ -28,17 +28,17 @@ from coartic.benchmarks.time_left import TimeLeft
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.limits import brief_value
-from coartic.internal.text import counted, error_line
+from coartic.internal.text import error_line, pluralize
 from coartic.runs.method_info import VERSION
 from coartic.runs.plan import Cell, Job, size_of, trials_in
 from coartic.runs.record import UNREPEATED, Row
-from coartic.runs.store import Store, writing
+from coartic.runs.store import Store, open_store_for_writing
 
-_LEAST_BATCH = 8
+_MIN_BATCH = 8
 """Smallest number of runs of a job whose method performs runs side by side, if its cell has as
 many."""
-_MOST_TRIALS = 400_000
-"""Largest number of trials of a job with more than :data:`_LEAST_BATCH` runs. They take some
+_MAX_TRIALS = 400_000
+"""Largest number of trials of a job with more than :data:`_MIN_BATCH` runs. They take some
 seconds, which is what an interruption can lose."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
@@ -52,7 +52,7 @@ class Progress:
     """Runs of the plan."""
     present: int = 0
     """Runs of the plan that the folder had before, except runs that are performed again."""
-    stale: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+    outdated: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     """Numbers of runs in the folder that another version or code of their method made. The keys are
     triples: method, version that made the runs, and present version. The runs stay in the folder,
     but reports do not show them."""
@@ -65,7 +65,7 @@ class Progress:
     marks: dict[str, list[str]] = field(default_factory=dict)
     """Dict that maps methods to warnings about their runs in the folder (:meth:`Store.marks`)."""
     others: int = 0
-    """Runs in the folder that the plan does not ask for, without :attr:`stale` runs."""
+    """Runs in the folder that the plan does not ask for, without :attr:`outdated` runs."""
     wall_s: float = 0.0
     """Wall time of the call, in s; 0 until the call ends."""
     time_left: TimeLeft = field(default_factory=TimeLeft)
@@ -87,12 +87,12 @@ class Progress:
 
     @property
     def unused(self) -> Iterator[str]:
-        """Sentences on :attr:`stale` runs, one for each method and version."""
-        for (method, old, new), count in self.stale.items():
+        """Sentences on :attr:`outdated` runs, one for each method and version."""
+        for (method, old, new), count in self.outdated.items():
             origin = f"made by version {old}; its version here is {new}"
             if not (VERSION.fullmatch(old) and VERSION.fullmatch(new)):
                 origin = "made before its file, or a file that it imports or reads, changed"
-            runs = counted(count, "run")
+            runs = pluralize(count, "run")
             yield f"Not used: {runs} of {method}, {origin}. They stay in the folder."
 
     def __str__(self) -> str:
@@ -101,13 +101,13 @@ class Progress:
         long = self.wall_s >= 100
         time_taken = f"{minutes:.0f} min {seconds:.0f} s" if long else f"{self.wall_s:.0f} s"
         count = self.present + self.done
-        runs = counted(count, "run") if count == self.total else f"{count} of {self.total} runs"
+        runs = pluralize(count, "run") if count == self.total else f"{count} of {self.total} runs"
         runs += f" ({self.present} reused)" if self.present else ""
         failed = f"{self.failed} failed" if self.failed else "none failed"
         left_out = [
-            f"{counted(count, 'run')} {what}"
+            f"{pluralize(count, 'run')} {what}"
             for count, what in (
-                (self.stale.total(), "by another version of their method"),
+                (self.outdated.total(), "by another version of their method"),
                 (self.others, "of earlier commands"),
             )
             if count > 0
@@ -234,10 +234,10 @@ def perform(
         raise CoarticError(f"executor is {brief_value(executor)}; it must be a Local or a Dask")
     if not plan:
         raise CoarticError("the plan has no jobs")
-    with writing(folder) as store:
+    with open_store_for_writing(folder) as store:
         store.replace_plan(plan, made_with())
-        progress = Progress(folder, size_of(plan), stale=store.stale())
-        progress.others = store.others() - progress.stale.total()
+        progress = Progress(folder, size_of(plan), outdated=store.count_outdated_runs())
+        progress.others = store.others() - progress.outdated.total()
         progress.marks = store.marks()
         missing = _missing_jobs(plan, store, progress)
         own_methods = {job.cell.method.name: job for job in missing if not job.cell.method.is_ours}
@@ -359,17 +359,17 @@ def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
         for begin in range(0, len(job.numbers), size):
             yield replace(job, numbers=job.numbers[begin : begin + size])
 
-    share = max(math.ceil(size_of(jobs) / workers), _LEAST_BATCH)
+    share = max(math.ceil(size_of(jobs) / workers), _MIN_BATCH)
     parts: list[Job] = []
     for job in jobs:
         method, parameters = job.cell.method, job.cell.parameters
         allowed = method.configure(parameters).max_batch() if method.is_ours else 1
-        quick = max(_MOST_TRIALS // (trials_in(parameters) or 1), _LEAST_BATCH)
+        quick = max(_MAX_TRIALS // (trials_in(parameters) or 1), _MIN_BATCH)
         parts += divide(job, min(allowed, share, quick))
     even = len(parts) - len(parts) % workers
     ordered, last_parts = parts[:even], parts[even:]
     for job in last_parts:
-        size = max(math.ceil(len(job.numbers) * len(last_parts) / workers), _LEAST_BATCH)
+        size = max(math.ceil(len(job.numbers) * len(last_parts) / workers), _MIN_BATCH)
         ordered += divide(job, size)
 
     def trials(job: Job) -> float:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from coartic.benchmarks.provenance import current_environment, now
-from coartic.internal.text import LONGEST_REASON, plain
+from coartic.internal.text import MAX_REASON_LENGTH, plain
 from coartic.model import PAPER, same_world
 from coartic.motion.execution import Execution, execute_noisy
 from coartic.motion.solution import Movement, next_action
@@ -57,7 +57,7 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Row]:
         final = replace(
             outcome,
             status=status,  # type: ignore[arg-type]
-            reason="" if is_ok else plain(reason, LONGEST_REASON) or "it gave no reason",
+            reason="" if is_ok else plain(reason, MAX_REASON_LENGTH) or "it gave no reason",
             parts=asked,
             environment=current_environment() | imports | (outcome.environment or {}),
         )

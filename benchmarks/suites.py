@@ -15,15 +15,15 @@ from pydantic import Field, PlainValidator, ValidationError
 from pydantic_core import PydanticCustomError
 
 from coartic import CoarticError, Task, builtin_tasks, parse_task
-from coartic.internal.limits import MOST_RUNS, MOST_SECONDS, MOST_TRIALS
+from coartic.internal.limits import MAX_RUNS, MAX_SECONDS, MAX_TRIALS
 from coartic.internal.text import Line, plain, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.internal.validation import FileData, described_error, explain
 from coartic.model import WORLD, MotionModel, check_model
 from coartic.robot import Finite
 from coartic.runs.store import RUNS_FILE
 from coartic.tasks.families import named_by, shipped_families
-from coartic.tasks.task import LONGEST_NAME, NAME_PATTERN
+from coartic.tasks.task import MAX_NAME_LENGTH, NAME_PATTERN
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 WILDCARD = "*"
@@ -44,9 +44,9 @@ def _plain_value(value: Any) -> _Plain:
     raise PydanticCustomError("scalar", "{text}", {"text": problem})
 
 
-RunCount = Annotated[int, Field(ge=1, le=MOST_RUNS, strict=True)]
-TrialCount = Annotated[int, Field(ge=1, le=MOST_TRIALS, strict=True)]
-Seconds = Annotated[float, Field(ge=1e-3, le=MOST_SECONDS, strict=True)]
+RunCount = Annotated[int, Field(ge=1, le=MAX_RUNS, strict=True)]
+TrialCount = Annotated[int, Field(ge=1, le=MAX_TRIALS, strict=True)]
+Seconds = Annotated[float, Field(ge=1e-3, le=MAX_SECONDS, strict=True)]
 _Value = Annotated[_Plain, PlainValidator(_plain_value)]
 _SOME = Field(min_length=1)
 _Names = Annotated[tuple[str, ...], _SOME]
@@ -63,14 +63,14 @@ def _worlds(value: Any) -> tuple[MotionModel, ...]:
     if isinstance(value, tuple) and all(isinstance(world, MotionModel) for world in value):
         return value
     if not isinstance(value, Mapping) or not value:
-        raise sentence_error(
+        raise described_error(
             f"model is {value!r}; it must be a table of constants, such as {{ motor_noise = 0.01 }}"
         )
     for name in value:
         if name not in WORLD:
-            raise sentence_error(f"model has no constant {name!r}; it has {', '.join(WORLD)}")
+            raise described_error(f"model has no constant {name!r}; it has {', '.join(WORLD)}")
         if value[name] in ([], ()):
-            raise sentence_error(f"model.{name} is empty; it must be a value or a list of values")
+            raise described_error(f"model.{name} is empty; it must be a value or a list of values")
     lists = [
         value[name] if isinstance(value[name], list | tuple) else [value[name]] for name in value
     ]
@@ -80,7 +80,7 @@ def _worlds(value: Any) -> tuple[MotionModel, ...]:
             for values in itertools.product(*lists)
         )
     except (TypeError, ValueError) as error:
-        raise sentence_error(str(error)) from None
+        raise described_error(str(error)) from None
 
 
 Worlds = Annotated[tuple[MotionModel, ...], PlainValidator(_worlds)]
@@ -127,7 +127,7 @@ class _Block(FileData):
 class Suite(FileData):
     """Content of a suite file."""
 
-    name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=LONGEST_NAME)]
+    name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=MAX_NAME_LENGTH)]
     """Name of the suite; by default the name of its file without ``.toml``."""
     title: Line
     """Title in lists and reports."""

@@ -19,7 +19,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter
 
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.text import counted, error_line
+from coartic.internal.text import error_line, pluralize
 from coartic.method import (
     Information,
     MethodError,
@@ -37,12 +37,12 @@ _log = logging.getLogger(__name__)  # shown by ``coartic check --verbose``
 
 
 _OUTCOMES = TypeAdapter(list[Outcome])
-_LONGEST_DETAILS = 10_000_000
+_MAX_DETAILS_LENGTH = 10_000_000
 _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError, RecursionError
 """Errors that malformed data raises."""
 
 
-def process_peak_mb() -> float:
+def peak_rss_mib() -> float:
     """Return the largest resident memory of this process so far, in MiB."""
     unit = 2**20 if sys.platform == "darwin" else 2**10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
@@ -94,7 +94,7 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
         outcomes = _OUTCOMES.validate_python(content)
         if len(outcomes) == len(job.numbers):
             return outcomes
-        reason = f"{len(outcomes)} for {counted(len(job.numbers), 'run')}"
+        reason = f"{len(outcomes)} for {pluralize(len(job.numbers), 'run')}"
     except _MALFORMED as error:
         reason = error_line(error)
     return fail(job, "crashed", f"its outcomes cannot be read: {reason}")
@@ -127,7 +127,7 @@ def perform_job(job: Job) -> list[Outcome]:
     try:
         method = cell.method.configure(cell.parameters)
         results: Sequence[Any]
-        reason_not = method.refuses(cell.model) or method.why_not(outline_of(cell.task))
+        reason_not = method.refuses(cell.model) or method.inapplicable_reason(outline_of(cell.task))
         if reason_not is not None:
             raise MethodError("infeasible", str(reason_not))
         if len(sessions) == 1:
@@ -137,14 +137,14 @@ def perform_job(job: Job) -> list[Outcome]:
         outside_trials = trials_outside() - outside_trials
         if outside_trials and not cell.method.is_ours:
             raise UndeclaredError(
-                f"the method made {counted(outside_trials, 'trial')} outside its session, which "
+                f"the method made {pluralize(outside_trials, 'trial')} outside its session, which "
                 "are not counted: by coartic.objective, learn, execute or an environment"
             )
     except BaseException as error:
         results = [error] * len(sessions)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     runs = len(sessions)
-    times = Times(wall / runs, cpu / runs, warm, runs, process_peak_mb())
+    times = Times(wall / runs, cpu / runs, warm, runs, peak_rss_mib())
     pairs = zip(results, sessions, strict=True)
     return [_outcome_of(cell.method, result, session, times) for result, session in pairs]
 
@@ -227,8 +227,8 @@ def _plain_details(details: Any) -> dict[str, Any]:
     more than 10,000,000 characters.
     """
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
-    if len(text) > _LONGEST_DETAILS:
+    if len(text) > _MAX_DETAILS_LENGTH:
         raise ValueError(
-            f"details have {len(text):,} characters; at most {_LONGEST_DETAILS:,} are allowed"
+            f"details have {len(text):,} characters; at most {_MAX_DETAILS_LENGTH:,} are allowed"
         )
     return dict(json.loads(text.encode()))

@@ -34,9 +34,9 @@ RESAMPLES = 9_999
 """Default number of resamples: 0.05 and 0.01 of 9,999 + 1 are integers."""
 SEED = 0
 """Seed of resampling."""
-FEWEST = 5
+MIN_VALUES = 5
 """Least number of values, such as runs, in each sample for an interval or a test."""
-FEWEST_TASKS = 3
+MIN_TASKS = 3
 """Least number of random tasks of a family for an interval or a test over tasks."""
 FEWER_RESAMPLES = 1_999
 """Number of resamples where resampling is slow: for large samples, and over instances of
@@ -136,7 +136,7 @@ def mean(values: ArrayLike) -> Estimate:
     -------
     Estimate
         The mean with the interval of :func:`mean_of_means`. The ends of the interval are NaN for
-        fewer than :data:`FEWEST` values.
+        fewer than :data:`MIN_VALUES` values.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def difference_of_means(first: ArrayLike, second: ArrayLike) -> Estimate:
     -------
     Estimate
         The difference with the interval of :func:`mean_of_means`. The ends of the interval are NaN
-        if a sample has fewer than :data:`FEWEST` values.
+        if a sample has fewer than :data:`MIN_VALUES` values.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def mean_of_means(
     Estimate
         The sum with its interval. The interval is chosen by the first rule that applies:
 
-        - no interval, if a sample has fewer than :data:`FEWEST` values;
+        - no interval, if a sample has fewer than :data:`MIN_VALUES` values;
         - the value itself, if no sample varies (although the populations may vary);
         - the normal interval, if a sample has more than :data:`HUGE` values;
         - the percentile interval, if a sample has more than :data:`LARGE` values or BCa is not
@@ -212,7 +212,7 @@ def mean_of_means(
     parts = [*zip(vectors, weights, strict=True)]
     value = float(sum(weight * sample.mean() for sample, weight in parts))
     n = tuple(map(len, vectors))
-    if min(n) < FEWEST:
+    if min(n) < MIN_VALUES:
         return Estimate(value, n=n)
     if not any(map(varies, vectors)):
         return Estimate(value, value, value, n=n)

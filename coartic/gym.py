@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import MissingExtraError, NotApplicableError
 from coartic.estimates import Estimate, mean
-from coartic.internal.limits import MOST_CELLS, brief_value, check_limits, real_array
+from coartic.internal.limits import MAX_CELLS, brief_value, check_limits, real_array
 from coartic.method import Method, MethodError, run_method
 from coartic.method.optimisers import FAILED
 from coartic.model import PAPER, MotionModel, model_from
@@ -36,15 +36,15 @@ from coartic.motion.trials import (
     CompiledTask,
     compiled_task,
     count_trials,
+    noise_draws,
+    noise_seed,
     reach_next,
-    world_seed,
-    worlds_of,
 )
-from coartic.robot import HANDS, LARGEST_FIGURE, Array
+from coartic.robot import HANDS, MAX_NUMBER, Array
 from coartic.tasks.catalogue import as_task, builtin_tasks
 from coartic.tasks.families import LOCKED, instance_names, is_family, load_family
 from coartic.tasks.optima import best_shipped
-from coartic.tasks.task import MOST_GOALS, Split, Task
+from coartic.tasks.task import MAX_GOALS, Split, Task
 
 try:
     import gymnasium
@@ -145,7 +145,7 @@ class TaskEnv(gymnasium.Env):
         model: MotionModel | Mapping[str, Any] = PAPER,
         render_mode: str | None = None,
     ) -> None:
-        check_limits("ahead", ahead, 0, MOST_GOALS)
+        check_limits("ahead", ahead, 0, MAX_GOALS)
         self.model, self.render_mode = model_from(model), render_mode
         instances = {"split": split, "count": count, "year": year}
         self.options = {"task": task, "ahead": ahead, "model": self.model} | instances
@@ -168,7 +168,7 @@ class TaskEnv(gymnasium.Env):
         self._joints += [f"{hand}_{k + 1}" for hand in hands for k in range(links)]
         self._view, joints, self._has_flags = ahead + 1, len(self._joints), fewest < links
         sizes = [self._view, 2 * self._view + joints, joints * self._has_flags]
-        high = np.repeat([1.0, LARGEST_FIGURE, 1.0], sizes).astype(np.float32)
+        high = np.repeat([1.0, MAX_NUMBER, 1.0], sizes).astype(np.float32)
         self.observation_space = Box(np.where(high > 1.0, -high, np.float32(0.0)), high)
         self.action_space = Box(-1.0, 1.0, (len(hands) - 1 + joints,), np.float32)
         self.number, self.going = -1, False
@@ -210,7 +210,7 @@ class TaskEnv(gymnasium.Env):
         """
         super().reset(seed=seed)
         if seed is not None or self.draw < 0:
-            self.world, self.draw = world_seed(max(int(self.np_random_seed), 0)), -1
+            self.world, self.draw = noise_seed(max(int(self.np_random_seed), 0)), -1
         self.draw += 1
         drawn, options = self.np_random.integers(len(self.tasks)), {**(options or {})}
         number = options.pop("task", drawn)
@@ -264,8 +264,7 @@ class TaskEnv(gymnasium.Env):
         count_trials(int(self.goal == 0))
         q, dof = self.q, len(self.q)
         postures = [
-            account["corrected"][:dof] if account["corrections"] else None
-            for account in self._found
+            record["corrected"][:dof] if record["corrections"] else None for record in self._found
         ]
         distances = [math.inf if posture is None else _square(posture - q) for posture in postures]
         hand = int(len(distances) > 1 and (distances[1] < distances[0]) != (entries[0] > 0.5))
@@ -276,14 +275,14 @@ class TaskEnv(gymnasium.Env):
         reached = 1 if self.model.motor_noise > 0.0 else len(self._goals) - self.goal
         targets = self._no_targets[:, :reached].copy()
         targets[0, 0, 0] = target
-        account, *next_account = self._reach(self._compiled, hand, targets)
-        self.q, hit = account["q"][:dof].copy(), account["hit"].item()
+        record, *next_record = self._reach(self._compiled, hand, targets)
+        self.q, hit = record["q"][:dof].copy(), record["hit"].item()
         self.goal += hit
         self.going = hit and self.goal < len(self._goals)
         if self.going:
-            rest = range(len(next_account), len(self._sides))
-            self._found = next_account + self._reached_by(rest)
-        reward = -float(account["ticks"].item() if hit else FAILED)
+            rest = range(len(next_record), len(self._sides))
+            self._found = next_record + self._reached_by(rest)
+        reward = -float(record["ticks"].item() if hit else FAILED)
         self._total += reward
         if not self.going:
             self.outcome = self._total if self._total > -FAILED else np.nan
@@ -341,12 +340,12 @@ class TaskEnv(gymnasium.Env):
         ``compiled`` is the task with or without noise, and ``hand`` the index of a hand in
         ``task.hands``. ``targets`` has shape ``(1, goals, 1, dof)``, for one or two goals; without
         a target (NaN) only the corrective process moves the arm. The first hand of the task reaches
-        for the second goal. Return an account for each goal. Both movements are made in one call,
+        for the second goal. Return a record for each goal. Both movements are made in one call,
         because each call is slow.
         """
         sides = self._sides[hand][:, : targets.shape[1]]
         noisy = compiled.model.motor_noise > 0.0
-        worlds = worlds_of(self.world, self.draw) if noisy else NO_NOISE
+        worlds = noise_draws(self.world, self.draw) if noisy else NO_NOISE
         return reach_next(compiled, self.q[None], sides, targets, self.goal, worlds).goals[0, :, 0]
 
     def _reached_by(self, hands: range) -> list[Any]:
@@ -511,7 +510,7 @@ def score(
     >>> table.reward.to_dict()  # doctest: +ELLIPSIS
     {'policy': -319.0, 'random actions': ..., 'corrective process': -319.0, 'best known': -292.0}
     """
-    check_limits("episodes", episodes, 1, MOST_CELLS)
+    check_limits("episodes", episodes, 1, MAX_CELLS)
     env = gymnasium.make(env, **options) if isinstance(env, str) else env
     inner, wrappers = _layers(env)[-1], _wrappers_of(env)
     if not isinstance(inner, TaskEnv):
@@ -677,7 +676,7 @@ def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int, seed
     seen = []
     for n, robot in enumerate(robots):
         seen.append(robot.reset(options={"task": n // trials})[0])
-        robot.world, robot.draw = world_seed(seed, JUDGE), n % trials
+        robot.world, robot.draw = noise_seed(seed, JUDGE), n % trials
     while going := [n for n, robot in enumerate(robots) if robot.going]:
         actions = np.asarray(act(np.array([seen[n] for n in going])))
         if len(actions) != len(going):
@@ -714,7 +713,7 @@ def _wrapped_trial(
             raise TypeError(
                 "a wrapper of env does not pass the options of reset to the environment"
             )
-        inner.world, inner.draw = world_seed(seed, JUDGE), draw
+        inner.world, inner.draw = noise_seed(seed, JUDGE), draw
         inner.outcome, ended = np.nan, False
         while not ended:
             actions = np.asarray(act(np.asarray(seen)[None] if is_one else seen))

@@ -23,7 +23,7 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.validation import in_sentences
+from coartic.internal.validation import describe_validation_errors
 
 Hand = Literal["left", "right"]
 """Name of a hand: ``"left"`` or ``"right"``."""
@@ -35,15 +35,13 @@ Points = NDArray[np.float64]
 """Points in the plane, shape ``(..., 2)``: x and y in length units."""
 Hands = NDArray[np.int64]
 """Hands as indices in :data:`HANDS`: 0 left, 1 right."""
-LARGEST_ENTRY = 1e5
+MAX_ENTRY = 1e5
 """Largest entry of a configuration or goal, in length units or rad."""
-LARGEST_FIGURE = 1e4  # largest number in a task or a robot, in length units or rad
-MOST_LINKS = 100  # of an arm
-Finite = Annotated[
-    float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST_FIGURE, le=LARGEST_FIGURE)
-]
-Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False, le=LARGEST_FIGURE)]
-_Lengths = Annotated[tuple[Length, ...], Field(min_length=1, max_length=MOST_LINKS)]
+MAX_NUMBER = 1e4  # largest number in a task or a robot, in length units or rad
+MAX_LINKS = 100  # of an arm
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-MAX_NUMBER, le=MAX_NUMBER)]
+Length = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False, le=MAX_NUMBER)]
+_Lengths = Annotated[tuple[Length, ...], Field(min_length=1, max_length=MAX_LINKS)]
 
 HANDS: tuple[Hand, Hand] = ("left", "right")  # the paper's A; at a tie the first hand is chosen
 BASE_DOF = 2
@@ -114,7 +112,7 @@ def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     return -(ys[tip] - ys[joint]), xs[tip] - xs[joint]
 
 
-@in_sentences
+@describe_validation_errors
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class Robot:
     """Geometry and kinematics of a planar robot with two arms, by default the paper's.

@@ -64,7 +64,7 @@ def test_a_method_of_a_file_has_a_short_name_an_algorithm_and_its_works(tmp_path
     cells = [cell_on(load_task("ascending"), methods[name]) for name in names]
     run_and_write(tmp_path / "results", cells, runs=1, trials=40)
     rows = load(tmp_path / "results").methods
-    assert rows.short.to_dict() == {
+    assert rows.short_title.to_dict() == {
         "cma-es/bandit": "CMA-ES", "test/own": "own, short", "test/heir": "test/heir",
     }  # fmt: skip
     assert [*rows.algorithm] == ["CMA-ES", "CMA-ES", "test/heir"]

@@ -18,7 +18,7 @@ from coartic.benchmarks import template
 from coartic.benchmarks.registry import registry
 from coartic.benchmarks.suites import suites
 from coartic.cli import COMMANDS, completion
-from coartic.cli.arguments import methods_meant
+from coartic.cli.arguments import resolve_methods
 from coartic.cli.terminal import complain, say, say_pairs
 from coartic.pictures import film
 from coartic.runs.store import lock, open_store
@@ -354,7 +354,7 @@ def test_a_shell_completes_names_and_prints_no_error(tmp_path):
 
 def test_names_that_are_completed_are_those_that_commands_take():
     registered = registry()
-    taken = methods_meant(completion.methods(), registered)
+    taken = resolve_methods(completion.methods(), registered)
     assert {*taken} == {*registered}
     assert {*completion.suites()} == {*suites()}
     assert {*builtin_tasks()} <= {load_task(name).name for name in completion.tasks()}
@@ -412,7 +412,7 @@ REFUSED = (
 @pytest.mark.usefixtures("in_this_process")
 def test_an_option_that_has_no_effect_is_refused(coartic, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(film, "LONGEST", 3)  # films are short
+    monkeypatch.setattr(film, "MAX_FRAMES", 3)  # films are short
     monkeypatch.setattr(film, "PAUSE", 1)
     monkeypatch.setattr(film, "HOLD", 1)
     Path("near.toml").write_text(NEAR, "utf-8")

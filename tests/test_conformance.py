@@ -167,7 +167,7 @@ def test_each_law_can_be_broken(methods, name, law, finding):
 )  # fmt: skip
 def test_whoever_answers_a_lucky_trial_is_told(methods, name, is_best_trial):
     tasks = [load_task(task) for task in ("ascending", "two-armed-1")]
-    tasks = [task for task in tasks if methods[name].why_not(task) is None]
+    tasks = [task for task in tasks if methods[name].inapplicable_reason(task) is None]
     laws = {each.name: each for each in check_method(methods[name], tasks=tasks)}
     assert laws["motor noise"].passed
     assert ("seems to be its best trial" in laws["motor noise"].finding) == is_best_trial

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from coartic import TaskError, corrective_trial, load_task
 from coartic.benchmarks.runner import run_suite
-from coartic.internal.limits import MOST_CELLS
+from coartic.internal.limits import MAX_CELLS
 from coartic.tasks import families
 from coartic.tasks.families import (
     FAMILY_FOLDER,
-    MOST_ATTEMPTS,
+    MAX_ATTEMPTS,
     broken_rule,
     draft,
     instance,
@@ -50,7 +50,7 @@ def test_every_instance_is_valid(address):
         links = task.robot.left_links if hand == "left" else task.robot.right_links
         assert math.fsum(links) == pytest.approx(4.0, abs=1e-12)
         assert family.links[0] <= len(links) <= family.links[1]
-    drafts = (draft(family, address, attempt) for attempt in range(MOST_ATTEMPTS))
+    drafts = (draft(family, address, attempt) for attempt in range(MAX_ATTEMPTS))
     first = next(draft for draft in drafts if broken_rule(family, draft) is None)
     assert (first.goals, first.start, first.robot) == (task.goals, task.start, task.robot)
 
@@ -124,7 +124,7 @@ def test_splits_share_no_instance():
     ("text", "words"),
     [
         ("long/v1/i003..i001", "goes backwards"),
-        (f"long/v1/i000..i{MOST_CELLS}", "names more than 10,000 instances"),
+        (f"long/v1/i000..i{MAX_CELLS}", "names more than 10,000 instances"),
         ("long/v1/i000..d003", "is not a range of instances"),
     ],
 )
@@ -136,7 +136,7 @@ def test_ranges(text, words):
 
 
 def test_a_family_that_cannot_be_met_ends(monkeypatch):
-    monkeypatch.setattr(families, "MOST_ATTEMPTS", 20)
+    monkeypatch.setattr(families, "MAX_ATTEMPTS", 20)
     message = "20 draws of family 'two-armed/v1' broke a rule, 20 of them 'overlap'"
     with pytest.raises(TaskError, match=message):
         instance_of(of_family(apart=99_000), address_of("two-armed/v1/i000"))

@@ -160,7 +160,7 @@ def test_names_and_looks_tell_methods_apart():
     """The same looks whatever methods from files are there, whose colour no other method has."""
     assert len({title_of(method) for method in KNOWN}) == len(KNOWN)
     alone, both = (
-        study_of([row(method, -300, task="ascending") for method in methods]).methods.look
+        study_of([row(method, -300, task="ascending") for method in methods]).methods["style"]
         for methods in ([*KNOWN_METHODS], ["mine", *KNOWN_METHODS, "theirs"])
     )
     single = [label for label in both.index if not label.startswith("dual-process (")]

@@ -16,7 +16,7 @@ from coartic.benchmarks.planning import plan_suite
 from coartic.benchmarks.runner import perform
 from coartic.runs import shipped
 from coartic.runs.plan import size_of
-from coartic.runs.store import RUNS_FILE, open_store, writing
+from coartic.runs.store import RUNS_FILE, open_store, open_store_for_writing
 from tests.support.suites import (
     KNOWN,
     InProcess,
@@ -120,12 +120,12 @@ def test_two_results_of_one_run(parts, tmp_path):
     downsampled, other = (
         shutil.copytree(parts[0], tmp_path / name) for name in ("downsampled", "other")
     )
-    with writing(downsampled) as store:
+    with open_store_for_writing(downsampled) as store:
         store.write([store.run(run_id).downsample() for run_id in store.ids()])
     assert joined([parts[0], downsampled], tmp_path / "same", LEFT).present == 3
     with open_store(parts[0]) as store:
         first, second = (run for run in map(store.run, store.ids()) if run.rewards)
-    with writing(other) as store:
+    with open_store_for_writing(other) as store:
         named = {name: first[name] for name in ("run_id", "run", "seed")}
         store.write([replace(second, job=first.job).with_values(**named)])
     words = f"run {first['run']} of {EC1} on ascending differs between .*left and .*other "

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from coartic.analysis.optima import gap_share
+from coartic.analysis.optima import relative_gap
 from coartic.analysis.statistics import other_tasks, task_mean
 
 
@@ -61,7 +61,7 @@ def test_the_interval_ends_at_what_runs_can_make():
 
 def test_given_tasks_are_strata():
     """Tasks far apart add no width to the interval of their mean."""
-    assert gap_share([-300, -303], -300).tolist() == [0, 0.01]
+    assert relative_gap([-300, -303], -300).tolist() == [0, 0.01]
     rng = np.random.default_rng(31)
     runs = rng.normal(0, 1, (4, 20))
     mean = task_mean([100 * i + runs[i] for i in range(4)])

@@ -164,7 +164,7 @@ def test_every_method_solves_a_task_in_noise(name):
         parameters["trials"] = 60
     task = tiny_task(goals=[[4.0, 1.0], [3.5, 1.5]])
     made = method(method.Parameters(**parameters))
-    if made.why_not(outline_of(task)) is None:
+    if made.inapplicable_reason(outline_of(task)) is None:
         result, session = run_method(made, task, model=MotionModel(motor_noise=0.01))
         assert execute(task, result.solution).completed
         assert session.model.motor_noise == 0.01

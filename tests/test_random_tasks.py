@@ -7,7 +7,7 @@ import pytest
 from coartic import load_task
 from coartic.analysis import tables
 from coartic.analysis.methods import EC1, EC2, EC3, EC4, RANDOM_SEARCH
-from coartic.analysis.tables import on_instances
+from coartic.analysis.tables import instance_runs
 from coartic.tasks.families import named_by
 from coartic.tasks.optima import KnownOptimum
 from tests.support.made_up import MadeUp, made, runs_of, study_of
@@ -55,7 +55,7 @@ RISING = {INITIAL: ALONE, EC1: -540, EC2: -560, EC3: -550, EC4: -540}
 
 def test_gaps_are_to_the_best_known_reward():
     study = rewarded(RISING, families=ONE + TWO)
-    runs = on_instances(study)
+    runs = instance_runs(study)
     gaps = runs[runs.task == "two-armed/v1/i000"].groupby("method").gap.mean()
     assert gaps["dual-process (EC1, EC4)"] == pytest.approx(40 / 500)
     assert not {EC1, EC4} & {*gaps.index}

@@ -17,12 +17,12 @@ from coartic import (
     load_task,
     movements_of,
 )
-from coartic.runs.record import MOST_STEPS, execute_all
+from coartic.runs.record import MAX_STEPS, execute_all
 from tests.support.strategies import make_trials, posture, tiny_task
 
 
 def test_no_way_is_followed_without_end():
-    far = 0.9 * MOST_STEPS * PAPER.step
+    far = 0.9 * MAX_STEPS * PAPER.step
     task = tiny_task(goals=[[5.5, 0.1], [6.5, 0.1]])
     out, back = planned(posture(far), posture(far)), planned(posture(far), posture(0.0))
     first, second = execute_all(task, [out, back])

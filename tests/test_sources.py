@@ -16,7 +16,7 @@ CODE = {name: info.code for name, info in built_in().items()}
 """Versions of model and method by the id of the method."""
 
 
-def stale(methods):
+def outdated(methods):
     """Return the methods that now have another version; ``methods`` has versions by the first part
     of an id."""
     return [
@@ -54,7 +54,7 @@ def test_program_and_pages_exist(table):
     ids=lambda table: table["files"][0],
 )
 def test_runs_are_of_the_present_versions(table):
-    assert stale(table["methods"]) == []
+    assert outdated(table["methods"]) == []
     for file in table["files"]:
         runs = pd.read_csv(ROOT / file, usecols=lambda name: name in ("run_id", "method"))
         if {*runs} == {"run_id", "method"}:  # the id of a run ends in the version of its method
@@ -64,5 +64,5 @@ def test_runs_are_of_the_present_versions(table):
 
 def test_another_version_of_a_method_makes_its_tables_stale():
     code = CODE["cma-es/bandit"]
-    assert stale({"cma-es": code}) == []
-    assert f"cma-es/bandit is {code}, not 0.9" in stale({"cma-es": "0.9"})
+    assert outdated({"cma-es": code}) == []
+    assert f"cma-es/bandit is {code}, not 0.9" in outdated({"cma-es": "0.9"})

@@ -47,7 +47,7 @@ def share_as_extreme(null, observed, alternative):
 def three_suffice(monkeypatch):
     """Let three values suffice for intervals and tests, so that all resamples can be listed."""
     for module in (statistics, hypotheses):
-        monkeypatch.setattr(module, "FEWEST", 3)
+        monkeypatch.setattr(module, "MIN_VALUES", 3)
 
 
 ALTERNATIVES = "greater", "less", "two-sided"

@@ -23,7 +23,7 @@ from coartic.benchmarks.scoring import score
 from coartic.benchmarks.worker import fail, perform_job
 from coartic.runs import store as store_module
 from coartic.runs.record import movement_data
-from coartic.runs.store import FORMAT, RUNS_FILE, open_store, writing
+from coartic.runs.store import FORMAT, RUNS_FILE, open_store, open_store_for_writing
 from tests.support.processes import started
 from tests.support.strategies import failing_task, tiny_task
 from tests.support.suites import (
@@ -62,7 +62,7 @@ def written(tmp_path_factory):
     """Runs as they were written, by their ids, and a study of them."""
     folder, plan = tmp_path_factory.mktemp("written"), planned(CELLS, trials=40)
     runs = [run for job in plan for run in score(job, perform_job(job))]
-    with writing(folder) as store:
+    with open_store_for_writing(folder) as store:
         store.replace_plan(plan, made_with())
         store.write(runs)
     return {run["run_id"]: run for run in runs}, load(folder)
@@ -147,7 +147,7 @@ def test_a_batch_is_there_whole_or_not_at_all(written, tmp_path):
         yield run
         raise KeyboardInterrupt
 
-    with writing(tmp_path) as store:
+    with open_store_for_writing(tmp_path) as store:
         store.replace_plan(planned(CELLS, trials=40), made_with())
         with pytest.raises(KeyboardInterrupt):
             store.write(some())
@@ -211,7 +211,7 @@ def test_a_process_that_is_killed_at_any_moment_loses_nothing(tmp_path):
 
 
 def test_one_writes_and_nobody_else_meanwhile(undisturbed):
-    with writing(undisturbed.folder):
+    with open_store_for_writing(undisturbed.folder):
         with pytest.raises(CoarticError, match=r"another `coartic run` uses.*wait"):
             perform_here(undisturbed.folder)
         same_results(load(undisturbed.folder), undisturbed)  # readers do no harm
@@ -224,7 +224,7 @@ def test_a_run_waits_for_a_reader_and_the_reader_reads(written, tmp_path, begin,
     waits."""
     counts = []
     monkeypatch.setattr(store_module, "WAIT_S", 0.05)
-    with writing(tmp_path) as store:
+    with open_store_for_writing(tmp_path) as store:
         store.replace_plan(planned(CELLS, trials=40), made_with())
         reader = sqlite3.connect(tmp_path / RUNS_FILE, isolation_level=None)
 

@@ -164,11 +164,11 @@ def test_whole_ticks_are_what_is_executed():
         execution = execute(task, solution)
         assert execution.corrections == 0
         assert execution.ticks <= rounded.ticks
-        assert rounding.least(plan) <= rounded.ticks <= rounding.least(plan) + 1
+        assert rounding.estimated_ticks(plan) <= rounded.ticks <= rounding.estimated_ticks(plan) + 1
         assert other_arm_travel(task, sequence, execution.configurations) == 0.0
         exact = plan.lengths()[:-1] / PAPER.step
         choices = itertools.product(*[(math.floor(steps), math.ceil(steps)) for steps in exact])
-        every = list(rounding.every(plan))
+        every = list(rounding.iter_roundings(plan))
         assert min(each.ticks for each in every) <= rounded.ticks
         nearest_first = sorted(choices, key=lambda steps: np.abs(steps - exact).sum())
         assert [each.steps[:-1] for each in every] == nearest_first
@@ -180,7 +180,7 @@ def test_goals_that_one_posture_hits_are_merged_in_every_way():
     problem = trajectory_problem(task.robot, task.hands, 3, "path-length")
     plan = problem.solve(instance, corrective_trial(task, "RRR").configurations)
     rounding = Rounding(Session(task, 0, ()), problem, instance)
-    plans = dict(rounding.plans(plan, task, lambda ticks: True))
+    plans = dict(rounding.iter_plans(plan, task, lambda ticks: True))
     assert list(plans) == [(), (1,), (2,), (1, 2)]
     for merged, merger in plans.items():
         np.testing.assert_allclose(merger.lengths()[list(merged)], 0.0, atol=1e-9)

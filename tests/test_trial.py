@@ -19,9 +19,9 @@ from coartic.motion.trials import (
     ALL_MOVE,
     NO_WAYPOINTS,
     compiled_task,
+    noise_draws,
     reach,
     reach_goals,
-    worlds_of,
 )
 from coartic.robot import HANDS
 from coartic.tasks.task import hands_of
@@ -157,8 +157,8 @@ def test_counts_of_trials_with_several_targets_for_a_goal():
     hands, targets = sample(task, 12, 0.3, seed=5)
     twice = np.stack([targets, targets[::-1]], axis=2)
     codes = [[HANDS.index(hand) for hand in hands_of(letters)] for letters in hands]
-    accounts = trials.make_trials(compiled_task(task, model), np.array(codes), twice)
-    for letters, rows, counts, reward in zip(hands, twice, *accounts[1:], strict=True):
+    records = trials.make_trials(compiled_task(task, model), np.array(codes), twice)
+    for letters, rows, counts, reward in zip(hands, twice, *records[1:], strict=True):
         solution = [
             Movement(goal, hand, "learned", target)
             for goal, (hand, both) in enumerate(zip(hands_of(letters), rows, strict=True), 1)
@@ -198,7 +198,7 @@ def test_kernels_end_whatever_they_get(bad, where):
     q, targets = np.tile(BOTH.q0, (5, 1)), np.tile(BOTH.q0 + 0.5, (5, 1))
     goals = np.tile(BOTH.goal_array[0], (5, 1))
     {"start": q, "target": targets, "goal": goals}[where][::2, 0] = bad
-    hands, worlds = np.arange(5)[:, None] % 2, worlds_of(np.arange(5), 0)
+    hands, worlds = np.arange(5)[:, None] % 2, noise_draws(np.arange(5), 0)
     for given, model in itertools.product((targets, targets * np.nan), (PAPER, NOISY)):
         arms = (q, hands, given[:, None, None], ALL_MOVE, NO_WAYPOINTS, goals[:, None], 0, worlds)
         assert (

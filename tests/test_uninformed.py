@@ -10,7 +10,7 @@ import pytest
 from coartic import MotionModel, corrective_trial, execute_noisy, hand_sequences, load_task
 from coartic.baselines import cma_es
 from coartic.baselines.cma_es import CMAES, GoalByGoal, Strategy
-from coartic.baselines.evolution import EvolutionStrategy
+from coartic.baselines.cma_strategy import EvolutionStrategy
 from coartic.baselines.hill_climbing import HillClimbing
 from coartic.baselines.policy_gradient import PolicyGradient
 from coartic.baselines.random_search import RandomSearch, RandomSearchHands

@@ -35,7 +35,7 @@ def test_runs_of_another_version_are_kept_and_made_again(old, coartic, in_this_p
     now = planned([cell_on(load_task("ascending"), EC1)], **SMALL)
     progress = perform(now, old, executor=InProcess())
     assert (progress.present, progress.done) == (0, 3)
-    assert dict(progress.stale) == {(EC1.name, "1.0", EC1.code): 3}
+    assert dict(progress.outdated) == {(EC1.name, "1.0", EC1.code): 3}
     after = load(old).runs
     assert after.reward.tolist() == before.reward.tolist()
     assert {run_id[:16] for run_id in after.run_id} == {run_id[:16] for run_id in before.run_id}

@@ -56,18 +56,18 @@ from coartic.analysis.standings import ranked_tasks, reference, runs_on, standin
 from coartic.analysis.statistics import other_tasks
 from coartic.analysis.study import Study, solved
 from coartic.analysis.tables import (
-    by_family,
+    gaps_by_family,
     gaps_of_settings,
+    instance_runs,
     list_contexts,
     list_parameters,
     list_runtimes,
     list_saved,
-    on_instances,
     values_of_parameters,
 )
 from coartic.analysis.words import capital, interval, listed, marked, number, titled_apart
-from coartic.estimates import FEWEST, Estimate
-from coartic.internal.text import counted
+from coartic.estimates import MIN_VALUES, Estimate
+from coartic.internal.text import pluralize
 from coartic.pictures.drawing import MARKERS, box, circle_goals, draw_robot
 from coartic.robot import Array
 from coartic.tasks.task import shipped_tasks
@@ -97,7 +97,7 @@ def _draw_parameters(study: Study) -> Parts | None:
     shown = [*dict.fromkeys(rows.parameter)]
     shape = style.grid(len(shown))
     size = (style.TWO if len(shown) > 1 else style.ONE), 2.1 * shape[0] + 0.2
-    drawing, panels = style.panels(shape, size, len(shown), style.LEAST_SMALL_PANEL, sharey=True)
+    drawing, panels = style.panels(shape, size, len(shown), style.MIN_SMALL_PANEL, sharey=True)
     is_alone, is_few = len(values) == 1, False
     thin: Any = {"color": style.GREY, "linewidth": 0.8, "zorder": 1}
     for place, (axes, parameter) in enumerate(zip(panels, shown, strict=True)):
@@ -118,7 +118,7 @@ def _draw_parameters(study: Study) -> Parts | None:
             axes.plot(at, 100 * of_parameter.at_best, "--", **thin)
         by_value = [gaps_of_settings(study, value.labels) for value in values[parameter]]
         for x, gaps in zip(at, by_value, strict=True):
-            few = 1 < int(gaps.groupby("task").size().min()) < FEWEST
+            few = 1 < int(gaps.groupby("task").size().min()) < MIN_VALUES
             by_run = 100 * gaps.groupby("run").mean() if few else gaps[:0]
             axes.plot([x] * len(by_run), by_run, ".", **_FEW, color=style.BLUE)
             is_few |= few
@@ -146,7 +146,7 @@ def _draw_parameters(study: Study) -> Parts | None:
         + ". n = {n} runs of a value."
         + " Dashed: the gap at the best setting of the other parameters." * has_thin
         + " Thin: the gap on each task." * (is_alone and 1 < len(tasks) <= 8)
-        + f" Small points: runs, if there are fewer than {FEWEST}." * is_few
+        + f" Small points: runs, if there are fewer than {MIN_VALUES}." * is_few
         + " A circle marks the default." * bool((rows.default != "").any())
     )
     return drawing, rows, f"{alt}.", more
@@ -191,7 +191,7 @@ def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
     """
     runs = runs_on(study, str(row["method"]), ranked_tasks(study))
     gaps = 100 * runs.groupby("run").gap.mean()
-    return list(gaps) if 1 < runs.groupby("task").size().min() < FEWEST else []
+    return list(gaps) if 1 < runs.groupby("task").size().min() < MIN_VALUES else []
 
 
 def _draw_gaps(study: Study) -> Parts | None:
@@ -248,7 +248,9 @@ def _draw_gaps(study: Study) -> Parts | None:
         mark, size = looks[row["method"]]["marker"], looks[row["method"]]["markersize"]
         (dot,) = axes.plot(row["gap"], y, mark, markersize=size, markeredgewidth=0, **look)
         name = row["title"]
-        style.tip(dot, f"{name}: {interval(row, 'gap', unit=' %')}, {counted(row['runs'], 'run')}")
+        style.tip(
+            dot, f"{name}: {interval(row, 'gap', unit=' %')}, {pluralize(row['runs'], 'run')}"
+        )
         label.set_fontweight("bold" if learner or not row["built_in"] else "normal")
     axes.spines["left"].set_visible(False)
     to = reference(study, tasks)
@@ -262,7 +264,7 @@ def _draw_gaps(study: Study) -> Parts | None:
     more += " Grey lines: the gap on each task." * bool(on_tasks)
     more += " The axis is logarithmic from 0.1 % on." * is_log
     more += " Methods that are run once have no interval." * (not all(rows.stochastic))
-    more += f" Small points: runs, if there are fewer than {FEWEST}." * any(few.values())
+    more += f" Small points: runs, if there are fewer than {MIN_VALUES}." * any(few.values())
     return drawing, rows, alt, more + (f" Bold: {listed(bold)}." if bold else "")
 
 
@@ -629,7 +631,7 @@ def draw_learning_curves(study: Study) -> Parts | None:
     size = _width_of((rows, columns)), min(2.2 * rows + 0.5, style.TALLEST)
     if style.is_narrow():
         size = style.ONE, 1.4 * rows + 0.4
-    drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
+    drawing, panels = style.panels((rows, columns), size, len(tasks), style.MIN_SMALL_PANEL)
     looks = looks_in(study, labels)
     for place, (axes, task) in enumerate(zip(panels, tasks, strict=True)):
         of_task = data[data.task == task.name]
@@ -745,7 +747,7 @@ def _runs_with_curves(
         if task in study.individual_tasks and len(runs := solved(cell[cell.run_id.isin(run_ids)]))
     }
     rows = study.methods[study.methods.index.isin([label for _, label in cells])]
-    drawn = headline_methods(rows[rows.base.isin(CURVES) | ~rows.built_in])
+    drawn = headline_methods(rows[rows.method_id.isin(CURVES) | ~rows.built_in])
     for task, label in itertools.product(study.individual_tasks, drawn):
         two_armed = any((task, learner) in cells for learner in LEARNERS[1:])
         if (task, label) in cells and not (two_armed and label == EC1):
@@ -766,14 +768,14 @@ def draw_gaps_by_family(study: Study) -> Parts | None:
     instance that the method solved in all runs. Settings of methods that are drawn are left out.
     Returns None if there is nothing to draw.
     """
-    runs, rows = on_instances(study), study.methods
+    runs, rows = instance_runs(study), study.methods
     methods = without_settings(rows[rows.index.isin(runs.method)])
     runs = runs[runs.method.isin(methods.index)]
     if not len(runs):
         return None
     parts = []
     for (method, family), part in runs.groupby(["method", "family"], sort=False):
-        scores = by_family(study, part)
+        scores = gaps_by_family(study, part)
         mean = (other_tasks(scores) if scores else Estimate(math.nan)).columns("mean")
         dots = part.groupby("task", sort=False).gap.mean().reset_index()
         dots = dots.assign(method=str(method), family=str(family), **mean, instances=len(dots))
@@ -864,7 +866,7 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
     size = style.ONE if size[0] <= style.ONE else style.TWO, size[1]  # one column, or two
     if style.is_narrow():
         size = style.ONE, size[1] * style.ONE / size[0] + 0.4 * rows
-    drawing, panels = style.panels((rows, columns), size, len(tasks), style.LEAST_SMALL_PANEL)
+    drawing, panels = style.panels((rows, columns), size, len(tasks), style.MIN_SMALL_PANEL)
     drawing.set_layout_engine("compressed")  # otherwise a title can extend beyond the edge
     for axes, task, corners in zip(panels, tasks, boxes, strict=True):
         draw_robot(axes, task, task.q0, colour=style.GREY)

@@ -22,19 +22,19 @@ from matplotlib.figure import Figure
 
 from coartic.analysis.figures import style
 from coartic.analysis.figures.style import RC, drawn_at
-from coartic.analysis.methods import COLORS, MARK, MARKS, default_name, values_in_words
+from coartic.analysis.methods import COLORS, MARK, MARKS, default_name, describe_values
 from coartic.analysis.standings import reference
 from coartic.analysis.study import Study, check_study
 from coartic.analysis.words import RECONSTRUCTED, ending_of, id_of, number
 from coartic.errors import CoarticError
-from coartic.internal.files import errors_in_words
+from coartic.internal.files import describe_os_errors
 from coartic.internal.limits import brief_value
 from coartic.internal.text import one_line
 from coartic.internal.threads import environment
 from coartic.runs.plan import world_title
 
 FORMATS = (".svg", ".pdf", ".png")
-_LONGEST_NAME = 48  # longest line of a name, in characters; half as many in a narrow figure
+_MAX_NAME_LENGTH = 48  # longest line of a name, in characters; half as many in a narrow figure
 _NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # replaces the user's value, so that no date is written
 
 
@@ -58,7 +58,7 @@ class Plot:
         Raises CoarticError for another suffix, and if the file cannot be written.
         """
         path = Path(path)
-        with errors_in_words(path):
+        with describe_os_errors(path):
             path.write_bytes(picture(self.figure, path.suffix))
 
     def _repr_html_(self) -> str:
@@ -132,7 +132,7 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     """
     looks: dict[str, style.Look] = {}
     for label, row in study.methods.loc[[*labels]].iterrows():
-        color, mark = row.look
+        color, mark = row["style"]
         width, size = (1.2, 4.2) if row.built_in else (2.4, 7.0)
         looks[str(label)] = {
             "color": COLORS[color], "marker": MARKS[mark][0], "linestyle": MARKS[mark][1],
@@ -142,7 +142,7 @@ def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
     return looks
 
 
-def name_in_figure(study: Study, method: str, longest: int = _LONGEST_NAME) -> str:
+def name_in_figure(study: Study, method: str, longest: int = _MAX_NAME_LENGTH) -> str:
     """Return the name of a method (a label) for the figure that is being drawn.
 
     It is the method's title, or its short name in a narrow figure. A name of more than ``longest``
@@ -152,13 +152,15 @@ def name_in_figure(study: Study, method: str, longest: int = _LONGEST_NAME) -> s
     if method in study.varied.index:
         row = study.methods.loc[method]
         values = study.varied.loc[method].items()
-        words = values_in_words({str(name): value for name, value in values})
-        words += f", {default_name(str(row.base))}" * (not row.setting) + MARK * row.title.endswith(
-            MARK
+        words = describe_values({str(name): value for name, value in values})
+        words += f", {default_name(str(row.method_id))}" * (
+            not row.setting
+        ) + MARK * row.title.endswith(MARK)
+        return "\n".join(
+            textwrap.wrap(words, _MAX_NAME_LENGTH // 2 if style.is_narrow() else longest)
         )
-        return "\n".join(textwrap.wrap(words, _LONGEST_NAME // 2 if style.is_narrow() else longest))
     if style.is_narrow():
-        return "\n".join(textwrap.wrap(study.methods.short[method], _LONGEST_NAME // 2))
+        return "\n".join(textwrap.wrap(study.methods.short_title[method], _MAX_NAME_LENGTH // 2))
     return "\n".join(textwrap.wrap(study.methods.title[method], longest))
 
 

@@ -38,7 +38,7 @@ TALLEST = 225 / INCH
 _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Settings of Matplotlib for all figures."""
-LEAST_PANEL, LEAST_SMALL_PANEL, LEAST_DOTS = 2.2, 1.6, 0.8
+MIN_PANEL, MIN_SMALL_PANEL, MIN_DOTS = 2.2, 1.6, 0.8
 """Smallest widths (in inches) of panels side by side, if the width of a figure is set: of panels
 with names next to them, of panels without names, and of the panels of a dot plot, which share
 their names."""
@@ -110,7 +110,7 @@ def panels(
     shape: tuple[int, int],
     size: tuple[float, float],
     used: int | None = None,
-    least: float = LEAST_PANEL,
+    least: float = MIN_PANEL,
     **subplots: Any,
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with panels.
@@ -255,7 +255,7 @@ def dots(
     """
     height = 0.55 + (0.135 if is_narrow() else 0.165) * len(rows)
     size = TWO, height + 0.1 * sum(name.count("\n") for name in rows.name)
-    drawing, all_axes = panels((1, len(quantities)), size, None, LEAST_DOTS, sharey=True)
+    drawing, all_axes = panels((1, len(quantities)), size, None, MIN_DOTS, sharey=True)
     for axes, (name, label) in zip(all_axes, quantities.items(), strict=True):
         axes.axvline(0, color=GREY, linewidth=0.5)
         axes.grid(axis="y", color=GREY, alpha=0.3, linewidth=0.5)

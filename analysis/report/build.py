@@ -34,7 +34,7 @@ from coartic.analysis.tables import (
     list_ranking,
 )
 from coartic.analysis.words import ending_of, id_of, listed, marked, number
-from coartic.internal.files import check_inside, errors_in_words, make_folder, publish
+from coartic.internal.files import check_inside, describe_os_errors, make_folder, publish
 from coartic.play.page import part_of_page
 from coartic.runs.plan import hash_of, world_title
 from coartic.runs.store import lock
@@ -97,7 +97,7 @@ def write_report(
         if study.folder.absolute() in folder.absolute().parents:
             check_inside(study.folder, folder)
         else:
-            with errors_in_words(report):
+            with describe_os_errors(report):
                 head = report.read_text("utf-8").partition("<title>")[0] if report.exists() else ""
             if head and f'-results" content="{home}"' not in html.unescape(head):
                 raise CoarticError(

@@ -9,7 +9,7 @@ from typing import Any
 from coartic.analysis.control import contexts_of_control, shared_goal
 from coartic.analysis.methods import EC1, EC4
 from coartic.analysis.standings import cells_of, runs_by_method, standings
-from coartic.analysis.study import MOST_EXECUTED, CellKey, Study, solved, typical_run
+from coartic.analysis.study import MAX_EXECUTED, CellKey, Study, solved, typical_run
 from coartic.analysis.tables import SHORT_ID, list_not_ranked, list_ranking, shown_columns
 from coartic.play.page import player_figure, preset_of
 from coartic.robot import HANDS
@@ -125,7 +125,7 @@ def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
     one of its first 500 solutions follows a path.
     """
     cell = study.cells.get(key)
-    if cell is None or not len(good := solved(cell)[:MOST_EXECUTED]):
+    if cell is None or not len(good := solved(cell)[:MAX_EXECUTED]):
         return {}
     run, stored = typical_run(good), study.movements("solution")
     if any(movement.kind == "path" for run_id in good.run_id for movement in stored[run_id]):

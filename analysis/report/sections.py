@@ -73,15 +73,15 @@ from coartic.analysis.words import (
     p_value,
 )
 from coartic.errors import CoarticError
-from coartic.estimates import FEWEST
-from coartic.internal.text import counted, error_line, one_line
+from coartic.estimates import MIN_VALUES
+from coartic.internal.text import error_line, one_line, pluralize
 from coartic.method import TRIALS
 from coartic.runs.plan import world_title
 
 Made = TypeVar("Made")
 RUNS = 20
 """Number of runs of each experiment of the paper."""
-NEEDS_RUNS = f"An interval or a test needs {FEWEST} runs; figures show fewer runs as points."
+NEEDS_RUNS = f"An interval or a test needs {MIN_VALUES} runs; figures show fewer runs as points."
 
 
 IN_NOISE = (
@@ -476,7 +476,8 @@ def failed_methods(study: Study) -> list[str]:
     rows = standings(study).query("why != '' and failed > 0")
     where = f" in {world_title(study.world)}" if study.world else ""
     return [
-        f"{row.failed} of {counted(row.runs, 'run')} failed ({row.title}){where}: it is not ranked."
+        f"{row.failed} of {pluralize(row.runs, 'run')} failed ({row.title}){where}: "
+        "it is not ranked."
         for _, row in rows.iterrows()
     ]
 

@@ -10,9 +10,9 @@ import pandas as pd
 from coartic.analysis.methods import (
     are_numbers,
     default_name,
+    describe_values,
     subject_of,
     title_of,
-    values_in_words,
 )
 from coartic.analysis.standings import (
     has_few_runs,
@@ -24,10 +24,10 @@ from coartic.analysis.standings import (
 from coartic.analysis.study import Study
 from coartic.analysis.tables import list_differences, list_parameters, values_of_parameters
 from coartic.analysis.words import interval, listed, number
-from coartic.estimates import FEWEST, LEVEL
+from coartic.estimates import LEVEL, MIN_VALUES
 
-TOO_FEW = f" (too few runs to test, which needs {FEWEST})"
-MOST_NAMED = 3
+TOO_FEW = f" (too few runs to test, which needs {MIN_VALUES})"
+MAX_NAMED = 3
 """Most settings that are named because they cannot be told apart from the best."""
 
 
@@ -53,7 +53,7 @@ def answer_on_parameters(study: Study) -> list[str]:
 
 def _best_setting(study: Study, rows: pd.DataFrame) -> str:
     """Return sentences on the best of the ranked settings ``rows``, the first of them."""
-    best, base = str(rows.index[0]), str(rows.base.iloc[0])
+    best, base = str(rows.index[0]), str(rows.method_id.iloc[0])
     method = {**rows.iloc[0], "title": title_of(study.declared[base])}
     others = list_differences(study)
     is_alike = (others.p_holm >= LEVEL) | (others.difference == 0)
@@ -63,10 +63,10 @@ def _best_setting(study: Study, rows: pd.DataFrame) -> str:
         f"to the {reference(study, ranked_tasks(study))} is "
         f"{interval(rows.loc[best], 'gap', scale=100, unit=' %')}."
     ]
-    named = alike[:MOST_NAMED] or unlike[:1]
+    named = alike[:MAX_NAMED] or unlike[:1]
     with_gaps = [f"{_words(study, label)} ({_gap_of(rows.gap[label])})" for label in named]
     if alike:
-        if more := alike[MOST_NAMED:]:
+        if more := alike[MAX_NAMED:]:
             with_gaps.append(f"and {len(more)} more (up to {_gap_of(max(rows.gap[more]))})")
         sentences.append(f"It cannot be told apart from {'; '.join(with_gaps)}.")
     elif unlike:
@@ -143,7 +143,7 @@ def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
 
 def _words(study: Study, label: str) -> str:
     """Return the varied values of a setting in words."""
-    return values_in_words(dict(zip(study.varied.columns, study.varied.loc[label], strict=True)))
+    return describe_values(dict(zip(study.varied.columns, study.varied.loc[label], strict=True)))
 
 
 def _gap_of(gap: float) -> str:

@@ -20,7 +20,7 @@ import coartic
 from coartic.cli import read, run
 from coartic.cli.terminal import complain
 from coartic.errors import CoarticError
-from coartic.internal.text import LONGEST_LINE, plain
+from coartic.internal.text import MAX_LINE_LENGTH, plain
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -100,6 +100,6 @@ def main() -> None:
     except BrokenPipeError:  # the reader, such as head, has ended: typer exits without a message
         raise
     except OSError as error:
-        file = f": {plain(str(error.filename), LONGEST_LINE)}" if error.filename else ""
+        file = f": {plain(str(error.filename), MAX_LINE_LENGTH)}" if error.filename else ""
         complain("Error", f"{error.strerror or error}{file}")
         sys.exit(1)

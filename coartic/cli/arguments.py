@@ -58,12 +58,12 @@ MethodFiles = Annotated[
 ]
 
 
-def within(option: str, what: str, least: float, most: float) -> Any:
+def ranged_option(option: str, what: str, least: float, most: float) -> Any:
     """Make a command-line option, with the flag ``option``, for a number in a range."""
     return typer.Option(option, min=least, max=most, metavar="N", help=what)
 
 
-def runs_named(text: str) -> Any:
+def parse_run_range(text: str) -> Any:
     """Parse a number of runs, such as ``20``, or a range with both ends, such as ``50..99``.
 
     Any other string is returned unchanged; the plan refuses it. Raises CoarticError for a range
@@ -77,7 +77,7 @@ def runs_named(text: str) -> Any:
     return text
 
 
-def names_in(texts: Sequence[str] | None) -> list[str]:
+def split_names(texts: Sequence[str] | None) -> list[str]:
     """Split the values of an option at commas, and strip blanks.
 
     None (the option was not given) gives an empty list.
@@ -113,7 +113,9 @@ def method_titles(registered: Registry) -> dict[str, str]:
     return {name: title if title != name else "" for name, title in titles.items()}
 
 
-def methods_meant(names: Sequence[str], registered: Registry, *, expand: bool = True) -> list[str]:
+def resolve_methods(
+    names: Sequence[str], registered: Registry, *, expand: bool = True
+) -> list[str]:
     """Return the ids of the methods that a user names.
 
     Parameters

@@ -19,8 +19,8 @@ from coartic.cli.terminal import Display, complain, say, say_pairs, say_table
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
-from coartic.internal.limits import MOST_RUNS
-from coartic.internal.text import counted, one_line
+from coartic.internal.limits import MAX_RUNS
+from coartic.internal.text import one_line, pluralize
 
 if TYPE_CHECKING:
     from coartic.analysis.study import Study
@@ -40,7 +40,9 @@ def report(
     ] = False,
     width: Annotated[
         float | None,
-        given.within("--width", "Width of these figures in inches: 3.4 for one column.", 2.5, 20),
+        given.ranged_option(
+            "--width", "Width of these figures in inches: 3.4 for one column.", 2.5, 20
+        ),
     ] = None,
     against: Annotated[
         str | None,
@@ -79,9 +81,9 @@ def report(
             study, out, for_paper=for_paper, width=width, watch=display.show
         )
     counts = Counter(Path(name).suffix for name in files)
-    figures = f" and {counted(counts['.svg'], 'figure')}" * for_paper
+    figures = f" and {pluralize(counts['.svg'], 'figure')}" * for_paper
     say(f"{out / 'report.html'}: made in {time.monotonic() - started:.0f} s, with "
-        f"{counted(counts['.csv'], 'table')}{figures}.")  # fmt: skip
+        f"{pluralize(counts['.csv'], 'table')}{figures}.")  # fmt: skip
     for part, reason in failures.items():
         complain("Error", f"{part} could not be made, because of a bug in coartic: {reason}")
     if failures:
@@ -116,7 +118,7 @@ def _say_ranking_of_world(study: Study) -> None:
     from coartic.analysis.report.sections import SECTIONS, finding, limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
     from coartic.analysis.words import interval, listed, number
-    from coartic.estimates import FEWEST
+    from coartic.estimates import MIN_VALUES
     from coartic.runs.record import MOTOR_NOISE
 
     methods, notes = standings(study), limits(study)
@@ -125,7 +127,7 @@ def _say_ranking_of_world(study: Study) -> None:
         row.title
         if row.built_in
         else "> " * has_others
-        + (row.title if row.title.startswith(row.base) else f"{row.base}: {row.title}")
+        + (row.title if row.title.startswith(row.method_id) else f"{row.method_id}: {row.title}")
         for _, row in methods.iterrows()
     ]
     methods = methods.assign(name=names)
@@ -165,19 +167,23 @@ def _say_ranking_of_world(study: Study) -> None:
         pairs.append(("", f"for {listed(notes['unknown'])} no reward is known"))
     stochastic = study.methods.stochastic
     counts = [len(of) for (_, label), of in study.cells.items() if stochastic[label]]
-    if notes["failed"] < notes["runs"] and min(counts, default=FEWEST) < FEWEST:
-        enough = max(FEWEST, *counts)  # fewer would leave out runs of this folder
+    if notes["failed"] < notes["runs"] and min(counts, default=MIN_VALUES) < MIN_VALUES:
+        enough = max(MIN_VALUES, *counts)  # fewer would leave out runs of this folder
         pairs.append(("Intervals", f"too few runs to test: make {enough} (--runs {enough})"))
     if notes["failed"]:
         reasons = "; ".join(notes["reasons"])
-        pairs.append(("Failed", f"{notes['failed']} of {counted(notes['runs'], 'run')}: {reasons}"))
+        pairs.append(
+            ("Failed", f"{notes['failed']} of {pluralize(notes['runs'], 'run')}: {reasons}")
+        )
     pairs += [("‡", sentence) for sentence in notes["late"]]
     say_pairs(pairs)
 
 
 def verify(
     folder: given.ResultsFolder,
-    again: Annotated[int, given.within("--again", "Also perform N runs again.", 0, MOST_RUNS)] = 0,
+    again: Annotated[
+        int, given.ranged_option("--again", "Also perform N runs again.", 0, MAX_RUNS)
+    ] = 0,
     run: Annotated[
         list[str] | None,
         given.option(
@@ -221,9 +227,9 @@ def verify(
                 executed, wrong = execute_with_noise_again(folder, every=noise)
         is_right = not (wrong or report.unfinished)
         say(
-            f"{counted(report.runs, 'run')} checked, "
-            f"{counted(report.movements, 'movement')} executed.",
-            *[f"{counted(executed, 'solution')} executed with motor noise."] * bool(executed),
+            f"{pluralize(report.runs, 'run')} checked, "
+            f"{pluralize(report.movements, 'movement')} executed.",
+            *[f"{pluralize(executed, 'solution')} executed with motor noise."] * bool(executed),
             *(wrong or ["Nothing differs."]),
             *report.unfinished,
         )
@@ -258,14 +264,16 @@ def _perform_again(
         _describe_run(run, registered[run.cell.method.name].code)
     differing = 0
     with Display() as display:
-        display.show(f"Performing {counted(len(runs), 'run')} again")
+        display.show(f"Performing {pluralize(len(runs), 'run')} again")
         for number, (stored, new) in enumerate(perform_runs_again(runs, registered), 1):
             differences = compare_runs(stored, new)
             differing += bool(differences)
             for difference in differences:
                 say(f"Run {stored['run_id']}, performed again: {difference}")
-            display.show(f"Performed {number} of {counted(len(runs), 'run')} again")
-    say(f"{counted(len(runs), 'run')} performed again: {differing or 'none'} with another result.")
+            display.show(f"Performed {number} of {pluralize(len(runs), 'run')} again")
+    say(
+        f"{pluralize(len(runs), 'run')} performed again: {differing or 'none'} with another result."
+    )
     return differing
 
 
@@ -277,7 +285,7 @@ def _describe_run(run: Row, code: str) -> None:
     """
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
-    from coartic.runs.plan import in_words
+    from coartic.runs.plan import describe_parameters
 
     cell, result = run.cell, f"{run['status']}: {run['reason']}"
     if run["reward"] is not None:
@@ -292,7 +300,7 @@ def _describe_run(run: Row, code: str) -> None:
                 f"{run['run_id']}: {cell.task.label}, {title_of(cell.method)}, run {run['run']}",
             ),
             ("Seed", str(run["seed"])),
-            ("Parameters", in_words(cell.parameters)),
+            ("Parameters", describe_parameters(cell.parameters)),
             *world,
             ("Result", result),
         ]
@@ -363,7 +371,7 @@ def draw(
     ] = False,
     width: Annotated[
         int | None,
-        given.within("--width", "Width of the film in pixels; by default 800.", 200, 3840),
+        given.ranged_option("--width", "Width of the film in pixels; by default 800.", 200, 3840),
     ] = None,
     out: Annotated[
         Path | None,
@@ -427,7 +435,7 @@ def draw(
         files |= {"tasks.svg": picture(drawing, ".svg")}
         publish(out, files)
     drawn = f"; the first {_PICTURED} are drawn" if len(chosen) > _PICTURED else ""
-    return say(f"{out}: {counted(len(chosen), 'task')}{drawn}.")
+    return say(f"{out}: {pluralize(len(chosen), 'task')}{drawn}.")
 
 
 def _film(

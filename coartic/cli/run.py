@@ -18,8 +18,8 @@ from coartic.cli.terminal import Display, say, say_pairs, say_table
 from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.internal.interruption import interruptible
-from coartic.internal.text import counted, one_line, unknown
-from coartic.internal.threads import MOST_JOBS
+from coartic.internal.text import one_line, pluralize, unknown
+from coartic.internal.threads import MAX_JOBS
 
 if TYPE_CHECKING:
     from coartic.benchmarks.conformance import CheckResult
@@ -45,7 +45,7 @@ def run(
     runs: Annotated[
         Any,
         typer.Option(
-            parser=given.runs_named,
+            parser=given.parse_run_range,
             metavar="N",
             help="Runs of each method on each task, or a part of them, such as 50..99.",
         ),
@@ -56,7 +56,9 @@ def run(
     ] = None,
     jobs: Annotated[
         int | None,
-        given.within("--jobs", "Number of processes; by default one for each core.", 1, MOST_JOBS),
+        given.ranged_option(
+            "--jobs", "Number of processes; by default one for each core.", 1, MAX_JOBS
+        ),
     ] = None,
     tasks: Annotated[
         list[str] | None,
@@ -125,22 +127,22 @@ def run(
     def saved() -> str:
         runs_stored = "no run yet"
         with suppress(CoarticError), open_store(out) as store:
-            runs_stored = counted(len(store.present()), "run")
+            runs_stored = pluralize(len(store.present()), "run")
         return one_line(f"Stored in {out}: {runs_stored}; repeat the command to resume.")
 
     with interruptible(saved), display:
         display.show(f"Planning the runs of {chosen.name}")
         registered = registry(method_file or ())
-        names = given.methods_meant(given.names_in(methods), registered, expand=False)
+        names = given.resolve_methods(given.split_names(methods), registered, expand=False)
         if include and not names:  # only the user's own methods
             names = [name for name, info in registered.items() if info.where.endswith(".py")]
         request = request_for(
-            tasks=given.names_in(tasks),
+            tasks=given.split_names(tasks),
             methods=names,
             family_files=family_file or (),
             **{"runs": runs, "trials": trials, "seed": seed},
             **{"time_limit_s": time_limit, "trial_budget": trial_budget},
-            model=given.constants_in(given.names_in(model)),
+            model=given.constants_in(given.split_names(model)),
         )
         asked = plan(chosen, request, registered)
         if include:
@@ -212,7 +214,7 @@ def list_(
         pairs = _describe_family(family, family.name)
     else:
         try:
-            methods = given.methods_meant([name], registered)
+            methods = given.resolve_methods([name], registered)
         except CoarticError as error:
             if Path(name).is_dir():
                 return _list_runs(Path(name))  # explains what the folder lacks
@@ -270,7 +272,7 @@ def _list_runs(folder: Path) -> None:
     if runs.mean_ticks.notna().any():
         columns.insert(-1, "mean_ticks")
     say_table(columns, runs[columns].astype("string").fillna("").to_numpy().tolist())
-    say(f"{folder}: {counted(len(runs), 'run')}.")
+    say(f"{folder}: {pluralize(len(runs), 'run')}.")
 
 
 def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
@@ -287,13 +289,15 @@ def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
     """Yield a description of a method, as pairs for :func:`.say_pairs`."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
-    from coartic.runs.plan import in_words
+    from coartic.runs.plan import describe_parameters
 
-    applies = (task for task in builtin_tasks() if info.why_not(load_task(task)) is None)
+    applies = (
+        task for task in builtin_tasks() if info.inapplicable_reason(load_task(task)) is None
+    )
     yield "Method", f"{info.name}: {info.title}"
     yield "Called", title_of(info)
     yield "Information", ", ".join(info.information)
-    yield "Parameters", in_words(info.defaults) or "none"
+    yield "Parameters", describe_parameters(info.defaults) or "none"
     yield "Tasks", ", ".join(applies) or "none of the paper's tasks"
     yield "Runs", "depend on the seed" if info.stochastic else "do not depend on the seed"
     yield "Tuned on", info.tuned_on or "not stated"
@@ -343,7 +347,7 @@ def check(
             results = check_task_file(Path(subject), registered)
         broken = _show_results(subject, results)
     else:
-        names = given.methods_meant([subject], registered)
+        names = given.resolve_methods([subject], registered)
         given.check_used(method_file, registered, names)
         broken = 0
         for name in names:
@@ -361,7 +365,7 @@ def _show_results(name: str, results: Sequence[CheckResult]) -> int:
     for result in results:
         say(f"{words[result.passed]}  {result.name}: {result.finding}")
     passed = sum(result.passed is True for result in results)
-    say(f"{name}: {passed} of {counted(len(results), 'check')} passed.")
+    say(f"{name}: {passed} of {pluralize(len(results), 'check')} passed.")
     return len(results) - passed
 
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TextIO
 
 from coartic.errors import CoarticError
-from coartic.internal.text import counted, one_line
+from coartic.internal.text import one_line, pluralize
 
 if TYPE_CHECKING:
     from coartic.benchmarks.runner import Progress
@@ -182,7 +182,7 @@ class Display:
         failed = f"{progress.failed} failed" * bool(progress.failed)
         repeats = ""
         if progress.repeats:
-            repeats = f"{counted(progress.repeats, 'run')} again, to see whether results repeat"
+            repeats = f"{pluralize(progress.repeats, 'run')} again, to see whether results repeat"
         parts = [f"Runs: {finished}/{progress.total}", failed, repeats]
         self._show(
             lambda: "  ".join(filter(None, [*parts, _time_left(progress.time_left.seconds)])),
@@ -192,13 +192,13 @@ class Display:
     def _say_present(self, progress: Progress) -> None:
         self.line(*progress.unused)
         if progress.others > 0:
-            others = counted(progress.others, "run")
+            others = pluralize(progress.others, "run")
             self.line(
                 f"{progress.folder} also has {others} of earlier commands, which this command "
                 "does not report."
             )
         if progress.present:
-            missing = counted(progress.total - progress.present, "run")
+            missing = pluralize(progress.total - progress.present, "run")
             self.line(
                 f"Already stored: {progress.present} of {progress.total}; missing: {missing}."
             )

@@ -53,7 +53,7 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
     def list_files(names: Collection[str]) -> None:
         write_atomically(folder / LISTING, "".join(f"{name}\n" for name in sorted(names)).encode())
 
-    with errors_in_words(folder):
+    with describe_os_errors(folder):
         for parent in {folder, *((folder / name).parent for name in {*old_files, *files})}:
             parent.mkdir(parents=True, exist_ok=True)
             for part in parent.glob(f"{_PART}[0-9]*"):  # of a command that was killed
@@ -92,7 +92,7 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
         - a path leads out of the folder.
     """
     listing = folder / LISTING
-    with errors_in_words(folder):
+    with describe_os_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
@@ -126,7 +126,7 @@ def write_output(path: Path, data: bytes, *, replace: bool) -> None:
     Raises CoarticError if the file exists and ``replace`` is False, or if writing fails.
     """
     check_output(path, replace=replace)
-    with errors_in_words(path):
+    with describe_os_errors(path):
         write_atomically(path, data)
 
 
@@ -143,7 +143,7 @@ def check_output(path: Path, *, replace: bool) -> None:
 
     This is so if the file's folder is missing, or if the file exists and ``replace`` is False.
     """
-    with errors_in_words(path):
+    with describe_os_errors(path):
         if not path.parent.is_dir():
             raise CoarticError(f"{path} cannot be written: the folder {path.parent} does not exist")
         if path.exists() and not replace:
@@ -164,7 +164,7 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
 
 
 @contextlib.contextmanager
-def errors_in_words(path: Path) -> Iterator[None]:
+def describe_os_errors(path: Path) -> Iterator[None]:
     """Turn an OSError of the block into a CoarticError which says that ``path`` cannot be
     written."""
     try:

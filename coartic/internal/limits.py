@@ -12,17 +12,17 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-MOST_CELLS = 10_000
+MAX_CELLS = 10_000
 """Largest number of cells of a suite."""
-MOST_RUNS = 1_000_000
+MAX_RUNS = 1_000_000
 """Largest number of runs of a cell."""
-MOST_TRIALS = 10_000_000
+MAX_TRIALS = 10_000_000
 """Largest number of trials of a run. The rewards of all trials are stored."""
-MOST_SECONDS = 1_000_000
+MAX_SECONDS = 1_000_000
 """Longest time limit (in s). Operating systems can wait for about twice this time."""
-MOST_SEED = 2**63 - 1
+MAX_SEED = 2**63 - 1
 """Largest seed of a suite."""
-MOST_RUN_SEED = 2**128 - 1
+MAX_RUN_SEED = 2**128 - 1
 """Largest seed of a run."""
 WIDTHS = (1e-9, 100.0)
 """Least and greatest half width of a box of targets, in length units (base) and rad (joints)."""

@@ -15,14 +15,14 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-LONGEST_LINE = 500
+MAX_LINE_LENGTH = 500
 """Largest number of characters of a title, a description or a citation."""
-LONGEST_REASON = 2000
+MAX_REASON_LENGTH = 2000
 """Largest number of characters of a stored reason."""
-_MOST_NAMED = 12  # largest number of names in a sentence
+_MAX_NAMED = 12  # largest number of names in a sentence
 
 
-def plain(text: str, most: int = LONGEST_REASON) -> str:
+def plain(text: str, most: int = MAX_REASON_LENGTH) -> str:
     """Return a string as one printable line (:func:`one_line`) of at most ``most`` characters.
 
     Blanks at both ends are removed. A longer line is cut and ends in ``…``.
@@ -59,7 +59,7 @@ def escape(c: str) -> str:
     return c if prints(c) else c.encode("unicode_escape").decode()
 
 
-def counted(count: int, thing: str) -> str:
+def pluralize(count: int, thing: str) -> str:
     """Return a count with its noun, such as ``1 run`` or ``2 runs``."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
@@ -93,7 +93,7 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
     if not path.lower().endswith(FOREIGN):
         return ""
     ending = path.lower().rpartition(".")[2]
-    return f"{plain(path, LONGEST_LINE)}: coartic does not read .{ending} files; {wanted}"
+    return f"{plain(path, MAX_LINE_LENGTH)}: coartic does not read .{ending} files; {wanted}"
 
 
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
@@ -107,10 +107,10 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     if isinstance(name, str) and (sentence := foreign_file(name)):
         return f"{sentence}."
     known = list(names)
-    end = ", ...; `coartic list` shows all." if len(known) > _MOST_NAMED else "."
-    listed = f". Known: {', '.join(known[:_MOST_NAMED])}{end}"
+    end = ", ...; `coartic list` shows all." if len(known) > _MAX_NAMED else "."
+    listed = f". Known: {', '.join(known[:_MAX_NAMED])}{end}"
     hint = (did_you_mean(name, known) if isinstance(name, str) else "") or listed
-    return f"unknown {kind} {plain(repr(name), LONGEST_LINE)}{hint}"
+    return f"unknown {kind} {plain(repr(name), MAX_LINE_LENGTH)}{hint}"
 
 
 def _refuse_unprintable(text: str) -> str:
@@ -123,5 +123,5 @@ def _refuse_unprintable(text: str) -> str:
 
 printable = AfterValidator(_refuse_unprintable)
 """Validator that refuses strings that are not one printable line."""
-Line = Annotated[str, Field(max_length=LONGEST_LINE), printable]
-"""Printable line, such as a title, of at most :data:`LONGEST_LINE` characters."""
+Line = Annotated[str, Field(max_length=MAX_LINE_LENGTH), printable]
+"""Printable line, such as a title, of at most :data:`MAX_LINE_LENGTH` characters."""

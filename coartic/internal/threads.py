@@ -20,7 +20,7 @@ from pathlib import Path
 
 from coartic.internal.interruption import ENDING
 
-MOST_JOBS = 10_000
+MAX_JOBS = 10_000
 _POOLS = "OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "NUMBA_NUM", "VECLIB_MAXIMUM"
 _environment_lock = threading.RLock()
 ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
@@ -53,7 +53,7 @@ def threads_for(jobs: int) -> int:
     if not (isinstance(jobs, Integral) and jobs == -1):
         from coartic.internal.limits import check_limits  # imports NumPy
 
-        check_limits("jobs", jobs, 1, MOST_JOBS)
+        check_limits("jobs", jobs, 1, MAX_JOBS)
         return jobs
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

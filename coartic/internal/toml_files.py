@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from coartic.errors import CoarticError
-from coartic.internal.text import LONGEST_LINE, plain
+from coartic.internal.text import MAX_LINE_LENGTH, plain
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
@@ -19,7 +19,7 @@ def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> 
         return tomllib.loads(read_bytes(path, error=error).decode("utf-8-sig"))
     except ValueError as failure:
         form = "UTF-8" if isinstance(failure, UnicodeError) else "valid TOML"
-        shown = plain(str(path), LONGEST_LINE)
+        shown = plain(str(path), MAX_LINE_LENGTH)
         raise error(f"{shown} is not {form}: {plain(str(failure), 80)}") from None
 
 
@@ -31,5 +31,5 @@ def read_bytes(path: str | Path, *, error: type[CoarticError] = CoarticError) ->
     try:
         return Path(path).read_bytes()
     except OSError as failure:
-        shown = plain(str(path), LONGEST_LINE)
+        shown = plain(str(path), MAX_LINE_LENGTH)
         raise error(f"{shown} cannot be read: {failure.strerror}") from None

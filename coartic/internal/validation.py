@@ -18,7 +18,7 @@ T = TypeVar("T")
 _UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 
-def in_sentences(kind: type[T]) -> type[T]:
+def describe_validation_errors(kind: type[T]) -> type[T]:
     """Decorate a pydantic class to raise ValueError with one sentence for invalid data.
 
     Calling the decorated class with invalid data raises a ValueError with the sentence of
@@ -62,7 +62,7 @@ def equal_contents(a: Any, b: Any) -> Any:
     return all(plain(getattr(a, name)) == plain(getattr(b, name)) for name in named)
 
 
-@in_sentences
+@describe_validation_errors
 class FileData(BaseModel):
     """Base of the contents of files: immutable, and without unknown keys."""
 
@@ -114,6 +114,6 @@ def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool =
     return plain(message)
 
 
-def sentence_error(text: str) -> PydanticCustomError:
+def described_error(text: str) -> PydanticCustomError:
     """Return a validation error whose message is ``text``, without key and value."""
     return PydanticCustomError("sentence", "{text}", {"text": text})

@@ -47,7 +47,7 @@ from pydantic.dataclasses import dataclass
 from coartic.errors import CoarticError
 from coartic.internal.limits import brief_value
 from coartic.internal.text import unknown
-from coartic.internal.validation import in_sentences, sentence_error
+from coartic.internal.validation import describe_validation_errors, described_error
 from coartic.robot import HANDS, Hand
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 METHOD_PREFIX = "dual-process/"
 """Prefix of the names of the learner's methods; the id of the exploration condition follows."""
-MOST_NOISE = 100.0
+MAX_NOISE = 100.0
 """Largest standard deviation of noise that is accepted, in length units and rad."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Drift = Annotated[float, Field(ge=0, le=10)]
@@ -70,7 +70,7 @@ def _one_or_many(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
     try:
         return validate(value)
     except ValidationError:
-        raise sentence_error(
+        raise described_error(
             f"drift is {brief_value(value)}; it must be a number from 0 to 10, or a list of such "
             "numbers"
         ) from None
@@ -82,7 +82,7 @@ Drifts = Annotated[
 ]
 
 
-@in_sentences
+@describe_validation_errors
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class ExplorationCondition:
     """Rules of the learner's exploration and learning (paper, section *Experiments*).
@@ -114,7 +114,7 @@ class ExplorationCondition:
     """
     epsilon: Share = 0.2
     """ε: probability with which the hand for a goal is explored (published)."""
-    noise_sd: Annotated[float, Field(ge=0, le=MOST_NOISE, allow_inf_nan=False)] = 0.05
+    noise_sd: Annotated[float, Field(ge=0, le=MAX_NOISE, allow_inf_nan=False)] = 0.05
     """Standard deviation of the noise η (published), in length units (base) and rad (joints)."""
     corrects: bool = True
     """True if the corrective process **A** acts when a movement to a stored target misses its goal.
@@ -183,7 +183,7 @@ class ExplorationCondition:
         """True if ``drift`` or ``pull`` is not 0, so that a preferred posture is used."""
         return any(self.drifts) or self.pull > 0
 
-    def why_not(self, task: Task | Outline) -> str | None:
+    def inapplicable_reason(self, task: Task | Outline) -> str | None:
         """Return why the condition does not apply to a task's hands; None if it applies."""
         missing = [hand for hand in self.hands if hand not in task.hands]
         if missing:

@@ -12,8 +12,8 @@ One call of a compiled kernel, by :mod:`coartic.learner.learning`, makes many ru
 goal by goal and trial by trial. Each run draws from its own NumPy generator (``default_rng(seed)``,
 PCG64), in this order:
 
-1. if the condition has several drifts, at the beginning of each trial after trial 0: a uniform
-   number that chooses a drift;
+1. if the condition has several values of ``drift``, at the beginning of each trial after trial 0: a
+   uniform number that chooses one;
 2. for each goal of each trial after trial 0, if hands are explored: a uniform number that is
    compared with ε;
 3. if that number is below ε and a hand is chosen at random: a uniform number that chooses the hand;
@@ -43,7 +43,12 @@ from coartic.motion.kernels.compile import (
     joint_lever,
     record_type,
 )
-from coartic.motion.kernels.correct import correct_runs, correct_slots, project, pull_runs
+from coartic.motion.kernels.correct import (
+    correct_runs,
+    correct_runs_informed,
+    correct_slots,
+    project,
+)
 from coartic.motion.kernels.move import MOVE, move_runs
 from coartic.motion.kernels.slots import (
     Batch,
@@ -60,9 +65,9 @@ from coartic.motion.kernels.trial import (
     COUNTED,
     ITERATIONS,
     TICKS,
-    account,
     begin,
     count_goal,
+    record_goal,
     set_off,
 )
 from coartic.motion.kernels.trial import aim as aim_at
@@ -118,9 +123,9 @@ class LearnerParameters(NamedTuple):
     """γ of the return of a goal."""
     counts_earlier: bool
     """True if the return of a goal includes the rewards of earlier goals."""
-    drifts: Array
+    nullspace_exploration_gains: Array
     """Values of κ, shape ``(K,)``; if K > 1, each trial draws one."""
-    pull: float
+    nullspace_correction_gain: float
     """β: fraction of the null-space distance to the preferred posture that an iteration of **A**
     adds."""
     direction: int
@@ -146,7 +151,7 @@ class Results(NamedTuple):
     """Per-goal records of trial 0, if it was completed, shape ``(N, G)``."""
     best_accounts: NDArray[np.void]
     """Per-goal records of the best trial, if there is one, shape ``(N, G)``."""
-    last_accounts: NDArray[np.void]
+    last_records: NDArray[np.void]
     """Per-goal records of the latest trial, shape ``(N, G)``. After the last call this is the
     replay."""
 
@@ -202,8 +207,8 @@ def learner_parameters(
         by_subtask=condition.credit == "subtask",
         discount=condition.discount,
         counts_earlier=condition.counted == "all",
-        drifts=np.array(condition.drifts if condition.is_informed else (0.0,)),
-        pull=condition.pull,
+        nullspace_exploration_gains=np.array(condition.drifts if condition.is_informed else (0.0,)),
+        nullspace_correction_gain=condition.pull,
         direction=_DIRECTION[condition.direction],
     )
 
@@ -332,9 +337,9 @@ def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) 
 
     ``number`` is the index of the goal, from 0. ``table`` is an array of records with the fields
     ``value`` and ``target``, shape ``(G, 3, 2)``; its axes are goal, previous hand (0 left, 1
-    right, 2 none) and hand. If drift and pull are 0, the function changes nothing.
+    right, 2 none) and hand. If both gains are 0, the function changes nothing.
     """
-    if run.drift == 0.0 and run.pull == 0.0:
+    if run.nullspace_exploration_gain == 0.0 and run.nullspace_correction_gain == 0.0:
         return
     fill_row(run.preferred, run.q)
     if learner.direction == _NEXT_GOAL:
@@ -350,16 +355,17 @@ def prefer(run: RunRecord, number: int, table: Any, learner: LearnerParameters) 
 
 
 @inner
-def drift(
+def explore_nullspace(
     run: RunRecord, robot: RobotRecord, learner: LearnerParameters, workspace: _Workspace
 ) -> None:
     """Move the mean of exploration, the run's ``target`` t, in place.
 
     Base and chosen arm move by κ N(t) (p − t), and an idle arm that is explored moves by κ (p − t).
-    κ is the run's drift, p the preferred posture, and N projects onto the null space of the hand's
-    Jacobian. Entries that are not explored do not change; nothing changes if κ is 0.
+    κ is the run's ``nullspace_exploration_gain``, p the preferred posture, and N projects onto the
+    null space of the hand's Jacobian. Entries that are not explored do not change; nothing
+    changes if κ is 0.
     """
-    if run.drift == 0.0:
+    if run.nullspace_exploration_gain == 0.0:
         return
     x, y, v = workspace.jacobian
     arm = arm_of(robot, run.hand)
@@ -378,10 +384,10 @@ def drift(
                 x[j], y[j] = joint_lever(workspace.xs, workspace.ys, k, tip)
                 v[j] = change
             else:
-                run.target[j] += run.drift * change
+                run.target[j] += run.nullspace_exploration_gain * change
     project(v, x, y)
     for j in range(len(run.q)):
-        run.target[j] += run.drift * v[j]
+        run.target[j] += run.nullspace_exploration_gain * v[j]
 
 
 @inlined
@@ -415,7 +421,7 @@ def aim(
         for j in range(len(run.q)):
             run.target[j] = run.q[j] if learner.follows[run.hand, j] else stored.target[j]
         if explore:
-            drift(run, robot, learner, workspace)
+            explore_nullspace(run, robot, learner, workspace)
         for j in range(len(run.q)):
             if explore and learner.explored[run.hand, j]:
                 run.target[j] += learner.noise_sd * rng.standard_normal()
@@ -428,7 +434,7 @@ def make_trial(
     robot: RobotRecord,
     learner: LearnerParameters,
     tables: Any,
-    accounts: Any,
+    records: Any,
     rngs: Any,
     seeds: Any,
     workspace: _Workspace,
@@ -436,7 +442,7 @@ def make_trial(
     """Make trial number ``trial``, from 0, in each of N runs.
 
     A trial ends at the first goal that is missed. This function fills the per-goal records
-    ``accounts``, shape ``(N, G)``, and the counts in ``workspace``. Trial 0 has
+    ``records``, shape ``(N, G)``, and the counts in ``workspace``. Trial 0 has
     the hands and targets of ``learner``. If ``explore`` is False, the trial is greedy, without
     drift and noise of exploration. Other arguments are as in :func:`learn_kernel`.
     """
@@ -444,9 +450,10 @@ def make_trial(
     for n in range(runs):
         set_off(batch.runs[n], learner.start, seeds[n], trial, robot)
         if explore and not initial:
-            choices, rng = len(learner.drifts), generator_at(rngs, n)
-            kappa = learner.drifts[int(rng.random() * choices) if choices > 1 else 0]
-            batch.runs[n].drift, batch.runs[n].pull = kappa, learner.pull
+            gains, rng = learner.nullspace_exploration_gains, generator_at(rngs, n)
+            choice = int(rng.random() * len(gains)) if len(gains) > 1 else 0
+            batch.runs[n].nullspace_exploration_gain = gains[choice]
+            batch.runs[n].nullspace_correction_gain = learner.nullspace_correction_gain
         for k in range(counts.shape[1]):
             counts[n, k] = 0
     for number in range(len(learner.goals)):
@@ -458,21 +465,21 @@ def make_trial(
                 if run.going:
                     aim_at(run, learner.first_targets[number])
             elif run.going:
-                previous = accounts[n, number - 1].hand if number > 0 else NO_HAND
+                previous = records[n, number - 1].hand if number > 0 else NO_HAND
                 rng = generator_at(rngs, n)
                 aim(n, number, previous, tables[n], explore, robot, learner, rng, workspace)
         move_runs(runs, robot, batch)
         for n in range(runs):
-            accounts[n, number].moved = batch.runs[n].ticks
+            records[n, number].moved = batch.runs[n].ticks
             if batch.runs[n].action == MOVE:
-                fill_row(accounts[n, number].target, batch.runs[n].target)
-        if initial or learner.pull == 0.0:
+                fill_row(records[n, number].target, batch.runs[n].target)
+        if initial or learner.nullspace_correction_gain == 0.0:
             correct_runs(runs, robot, batch)
         else:
-            pull_runs(runs, robot, batch)
+            correct_runs_informed(runs, robot, batch)
         for n in range(runs):
-            account(batch.runs[n], accounts[n, number].moved, accounts[n, number])
-            count_goal(accounts[n, number], counts[n])
+            record_goal(batch.runs[n], records[n, number].moved, records[n, number])
+            count_goal(records[n, number], counts[n])
 
 
 @inlined
@@ -517,7 +524,7 @@ def _learn_from(
     later_trials = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // later_trials
     for n in range(len(tables)):
-        trial, counts = results.last_accounts[n], workspace.counts[n]
+        trial, counts = results.last_records[n], workspace.counts[n]
         completed = workspace.batch.runs[n].going
         for k in range(len(counts)):
             results.counts[n, k] += counts[k]
@@ -565,14 +572,14 @@ def learn_kernel(
     rngs
         The runs' own generators (:func:`addresses`).
     seeds
-        Seed of the motor noise of each run (:func:`.world_seed`), shape ``(N,)``. Trial k has noise
+        Seed of the motor noise of each run (:func:`.noise_seed`), shape ``(N,)``. Trial k has noise
         draw k. The replay has the draw after that of the last trial.
     workspace
         From :func:`workspace_for`.
     """
     trials = results.rewards.shape[1]
     for number in range(trials + 1):  # the last trial is the replay, which is not part of the runs
-        explore, accounts = number < trials, results.last_accounts
-        make_trial(number, explore, robot[0], learner, tables, accounts, rngs, seeds, workspace)
+        explore, records = number < trials, results.last_records
+        make_trial(number, explore, robot[0], learner, tables, records, rngs, seeds, workspace)
         if number < trials:
             _learn_from(number, learner, tables, results, workspace)

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError
 from coartic.internal.limits import (
-    MOST_RUN_SEED,
-    MOST_RUNS,
-    MOST_TRIALS,
+    MAX_RUN_SEED,
+    MAX_RUNS,
+    MAX_TRIALS,
     brief_value,
     check_limits,
 )
@@ -42,15 +42,15 @@ from coartic.motion.solution import Movement, corrective_movements, hands_in, mo
 from coartic.motion.trials import (
     compiled_task,
     count_trials,
-    empty_accounts,
+    empty_records,
     make_trials,
-    world_seed,
+    noise_seed,
 )
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands, letters_of
 
-_MOST_STORED = 200_000_000  # trials of one call; each takes 9 bytes
-_MOST_IN_BATCH = 4_000_000  # trials of runs whose rewards fit into one answer of a worker
+_MAX_STORED_TRIALS = 200_000_000  # trials of one call; each takes 9 bytes
+_MAX_BATCH_TRIALS = 4_000_000  # trials of runs whose rewards fit into one answer of a worker
 
 
 def runs_at_once(trials: int) -> int:
@@ -59,7 +59,7 @@ def runs_at_once(trials: int) -> int:
     The number is chosen so that the runs together make at most 4,000,000 trials; it is at least 1
     and at most 72.
     """
-    return max(1, min(SLOTS, _MOST_IN_BATCH // trials))
+    return max(1, min(SLOTS, _MAX_BATCH_TRIALS // trials))
 
 
 def learn(
@@ -184,12 +184,12 @@ def learn_many(
     """
     task = as_task(task)
     condition = load_condition(condition)
-    if reason := condition.why_not(task):
+    if reason := condition.inapplicable_reason(task):
         raise NotApplicableError(reason)
-    check_limits("trials", trials, 1, MOST_TRIALS)
+    check_limits("trials", trials, 1, MAX_TRIALS)
     if isinstance(seeds, str | bytes) or not isinstance(seeds, Iterable):
         raise TypeError(f"seeds is {brief_value(seeds)}; it must be a list of integers")
-    trials, limit = int(trials), min(MOST_RUNS, _MOST_STORED // trials)
+    trials, limit = int(trials), min(MAX_RUNS, _MAX_STORED_TRIALS // trials)
     ordered = [*islice(seeds, limit + 1)]
     if len(ordered) > limit:
         raise ValueError(
@@ -197,7 +197,7 @@ def learn_many(
             "because all rewards are stored. Run some seeds in another call"
         )
     for seed in ordered:
-        check_limits("seed", seed, 0, MOST_RUN_SEED)
+        check_limits("seed", seed, 0, MAX_RUN_SEED)
     ordered = [int(seed) for seed in ordered]
     if len({*ordered}) < len(ordered):
         duplicate = next(seed for seed in ordered if ordered.count(seed) > 1)
@@ -243,7 +243,7 @@ def _learn_together(
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
-    empty = np.zeros_like(empty_accounts(task.robot, runs, len(task.goals)).goals[..., 0])
+    empty = np.zeros_like(empty_records(task.robot, runs, len(task.goals)).goals[..., 0])
     results = Results(
         rewards=np.zeros((runs, trials), dtype=np.int64),
         completed=np.zeros((runs, trials), dtype=np.bool_),
@@ -252,11 +252,11 @@ def _learn_together(
         corrections=np.zeros((runs, 1 + TENTHS), dtype=np.int64),
         initial_accounts=empty,
         best_accounts=empty.copy(),
-        last_accounts=empty.copy(),
+        last_records=empty.copy(),
     )
     generators = [np.random.default_rng(seed) for seed in seeds]
     learner, rngs = learner_parameters(compiled, condition, initial), addresses(generators)
-    workspace, worlds = workspace_for(runs, task), np.array([*map(world_seed, seeds)], np.uint64)
+    workspace, worlds = workspace_for(runs, task), np.array([*map(noise_seed, seeds)], np.uint64)
     count_trials(runs * trials)
     clock = time.perf_counter()
     learn_kernel(compiled.parameters, learner, tables, results, rngs, worlds, workspace)
@@ -264,13 +264,13 @@ def _learn_together(
 
     requested = [[[Movement(1, "right", "learned")]] * len(task.goals)] * runs
 
-    def movements(accounts: NDArray[np.void]) -> list[tuple[Movement, ...]]:
-        trials = zip(movements_in(accounts[..., None], dof, requested), accounts, strict=True)
+    def movements(records: NDArray[np.void]) -> list[tuple[Movement, ...]]:
+        trials = zip(movements_in(records[..., None], dof, requested), records, strict=True)
         return [tuple(trial) if goals["hit"][-1] else () for trial, goals in trials]
 
     initial_trials = movements(results.initial_accounts)
     best_trials = movements(results.best_accounts)
-    replays = movements(results.last_accounts)
+    replays = movements(results.last_records)
     return [
         LearningRun(
             task=task,
@@ -283,7 +283,7 @@ def _learn_together(
             initial=initial_trials[n],
             solution=best_trials[n],
             replay=replays[n],
-            replay_reward=-int(results.last_accounts["ticks"][n].sum()) if replays[n] else None,
+            replay_reward=-int(results.last_records["ticks"][n].sum()) if replays[n] else None,
             values=np.ascontiguousarray(tables[n]["value"]),
             targets=np.ascontiguousarray(tables[n]["target"][..., :dof]),
             corrections=results.corrections[n],

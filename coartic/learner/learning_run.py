@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import CoarticError
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.internal.validation import equal_contents
 from coartic.learner.conditions import ExplorationCondition
 from coartic.method import Meter
@@ -126,7 +126,7 @@ class LearningRun:
         if self.best_trial is not None:
             return "the replay of what was learned did not hit every goal"
         return (
-            f"the corrective process failed in all {counted(self.counters.trials, 'trial')}; "
+            f"the corrective process failed in all {pluralize(self.counters.trials, 'trial')}; "
             "no trial hit every goal"
         )
 

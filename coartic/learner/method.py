@@ -83,9 +83,9 @@ class DualProcess(Method):
         """Return the method's exploration condition with the values of its parameters."""
         return _condition_of(self.condition, self.parameters)
 
-    def why_not(self, task: Outline) -> str | None:
+    def inapplicable_reason(self, task: Outline) -> str | None:
         """Return why the condition does not apply to a task's hands; None if it applies."""
-        return self.rules().why_not(task)
+        return self.rules().inapplicable_reason(task)
 
     def solve(self, session: Session) -> Result:
         """Run the learner, and return the movements of its learned solution.

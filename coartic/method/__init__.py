@@ -22,8 +22,8 @@ from coartic.method.base import (
     run_method,
 )
 from coartic.method.session import (
+    MAX_COUNT,
     METERED,
-    MOST_COUNT,
     BudgetError,
     Information,
     Meter,
@@ -34,9 +34,9 @@ from coartic.method.session import (
 
 __all__ = [
     "CORRECTIONS_BY_TENTH",
+    "MAX_COUNT",
     "METERED",
     "MODULES",
-    "MOST_COUNT",
     "TRIALS",
     "BudgetError",
     "Facts",

@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.dataclasses import dataclass as checked_dataclass
 
 from coartic.errors import NotApplicableError
-from coartic.internal.limits import MOST_RUN_SEED, check_limits
-from coartic.internal.validation import in_sentences
+from coartic.internal.limits import MAX_RUN_SEED, check_limits
+from coartic.internal.validation import describe_validation_errors
 from coartic.method.session import Information, MethodError, Session
 from coartic.model import PAPER, WORLD, MotionModel, check_model, differences
 from coartic.motion.initial_hands import too_many_sequences
@@ -31,7 +31,7 @@ CORRECTIONS_BY_TENTH = "corrections"
 each tenth of the later trials."""
 
 
-@in_sentences
+@describe_validation_errors
 class Parameters(BaseModel):
     """Base class of the parameters of methods: typed, validated, immutable, plain data."""
 
@@ -81,7 +81,7 @@ class Outline(NamedTuple):
     """The properties of a task by which a method decides whether it applies."""
 
     name: str
-    """Name of the task, for the sentence of :meth:`Method.why_not`."""
+    """Name of the task, for the sentence of :meth:`Method.inapplicable_reason`."""
     goals_count: int
     """Number of goals."""
     dof: int
@@ -108,7 +108,7 @@ def outline_of(task: Task) -> Outline:
     return Outline(task.name, len(task.goals), task.robot.dof, task.hands, task.initial_hands)
 
 
-@in_sentences
+@describe_validation_errors
 @checked_dataclass(frozen=True)
 class Facts:
     """Citations and names of a method for figures, tables and the bibliography.
@@ -188,7 +188,7 @@ class Method(ABC):
     def __init__(self, parameters: Any = None) -> None:
         self.parameters: Any = self.Parameters() if parameters is None else parameters
 
-    def why_not(self, task: Outline) -> str | None:
+    def inapplicable_reason(self, task: Outline) -> str | None:
         """Return why the method does not apply to a task; None if it applies.
 
         By default a method applies to every task.
@@ -332,12 +332,12 @@ def run_method(
     """
     chosen = as_task(task)
     check_model(model, radius=chosen.radius)
-    reason = method.refuses(model) or method.why_not(outline_of(chosen))
+    reason = method.refuses(model) or method.inapplicable_reason(outline_of(chosen))
     if reason is not None:
         raise NotApplicableError(reason)
     built_in = (getattr(sys.modules.get(module), "METHODS", ()) for module in MODULES)
     is_ours = any(type(method) in methods for methods in built_in)
-    check_limits("seed", seed, 0, MOST_RUN_SEED)
+    check_limits("seed", seed, 0, MAX_RUN_SEED)
     session = Session(chosen, int(seed), method.information, model=model, trusted=is_ours)
     result = method.solve(session)
     session.check_solution(result.solution)

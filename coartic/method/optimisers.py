@@ -18,16 +18,16 @@ from pydantic import Field
 
 from coartic.errors import CoarticError
 from coartic.internal.limits import (
-    MOST_RUN_SEED,
-    MOST_TRIALS,
+    MAX_RUN_SEED,
+    MAX_TRIALS,
     WIDTHS,
     brief_value,
     check_limits,
     real_array,
 )
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.method import (
-    MOST_COUNT,
+    MAX_COUNT,
     TRIALS,
     BudgetError,
     Information,
@@ -41,8 +41,8 @@ from coartic.method import (
 from coartic.model import PAPER, MotionModel
 from coartic.motion.initial_hands import sequences_with, too_many_sequences
 from coartic.motion.solution import Movement, movements_of
-from coartic.motion.trials import Accounts, HandSequences, compiled_task, make_trials
-from coartic.robot import HANDS, LARGEST_ENTRY, Array, Configs, Hands
+from coartic.motion.trials import HandSequences, TrialRecords, compiled_task, make_trials
+from coartic.robot import HANDS, MAX_ENTRY, Array, Configs, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.optima import KnownOptimum, best_shipped
 from coartic.tasks.task import Task, letters_of
@@ -176,7 +176,7 @@ class Objective:
         check_limits("half_width", half_width, *WIDTHS)
         self._session, self._task, self._process = session, task, os.getpid()
         limits = [limit for limit in (trials, session.trials_left) if limit is not None]
-        self._end = session.trials_made + min(limits, default=MOST_COUNT)
+        self._end = session.trials_made + min(limits, default=MAX_COUNT)
         sequences = sequences_of(session) if hands is None else [hands]
         sequences = sequences[: self._trials_left(len(sequences))]
         shape = (len(sequences), session.goals_count, session.dof)
@@ -411,9 +411,9 @@ class Objective:
         if self._session.model.motor_noise > 0.0:
             return movements_of(chosen, targets[0])
         task = self.task
-        accounts = make_trials(compiled_task(task, self._session.model), codes, targets[:, :, None])
+        records = make_trials(compiled_task(task, self._session.model), codes, targets[:, :, None])
         has_target = ~np.isnan(targets[0]).all(axis=1, keepdims=True)
-        targets = self._targets_in(accounts, 0)
+        targets = self._targets_in(records, 0)
         is_missing = np.isnan(targets) & has_target  # at goals after the failure of the trial
         return movements_of(chosen, np.where(is_missing, task.q0, targets))
 
@@ -454,16 +454,16 @@ class Objective:
                 "many(x) takes points as rows"
             )
         # Points with NaN or large entries need a closer check.
-        if hands is not None or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
+        if hands is not None or not math.hypot(*point.tolist()) < MAX_ENTRY:
             return float(self.many(point[None], hands)[0])
         with self._session.lock:
             self._trials_left(1)
             self._targets.put(self._entries, point)
-            accounts = self._session._make_trials(self._codes, self._targets)
-            cost = float(min(-accounts.rewards.item(), FAILED))
+            records = self._session._make_trials(self._codes, self._targets)
+            cost = float(min(-records.rewards.item(), FAILED))
             self._evaluations += 1
             if cost < self._best_cost:
-                self._note_best(cost, self._evaluations, point, self._codes[0], accounts, 0)
+                self._note_best(cost, self._evaluations, point, self._codes[0], records, 0)
         return cost
 
     def many(
@@ -523,17 +523,17 @@ class Objective:
             for start in range(0, left, CHUNK):
                 part = slice(start, min(start + CHUNK, left))
                 part_costs, hand_codes, points = costs[part], codes[part], array[part]
-                accounts = self._session._make_trials(
+                records = self._session._make_trials(
                     hand_codes,
                     self._targets_of(points),
                     draws=None if chosen is None else chosen[part],
                 )
-                np.minimum(-accounts.rewards, FAILED, out=part_costs)
+                np.minimum(-records.rewards, FAILED, out=part_costs)
                 if part_costs.min() < self._best_cost:
                     best_costs = np.minimum.accumulate(np.append(self._best_cost, part_costs))[:-1]
                     for n in np.flatnonzero(part_costs < best_costs).tolist():
                         cost, evaluations = float(part_costs[n]), self._evaluations + n + 1
-                        self._note_best(cost, evaluations, points[n], hand_codes[n], accounts, n)
+                        self._note_best(cost, evaluations, points[n], hand_codes[n], records, n)
                 self._evaluations += len(points)
         if left < len(array):
             raise BudgetError("the budget has no trial left")
@@ -545,28 +545,28 @@ class Objective:
         evaluations: int,
         point: Array,
         codes: Hands,
-        accounts: Accounts,
+        records: TrialRecords,
         trial: int,
     ) -> None:
         """Note a point as the best so far.
 
         ``cost`` is in ticks, and ``codes``, shape ``(G,)``, are the hands of the point. The point
-        is evaluation number ``evaluations`` (from 1), and trial ``trial`` (from 0) of ``accounts``.
+        is evaluation number ``evaluations`` (from 1), and trial ``trial`` (from 0) of ``records``.
         """
         self._best_cost, self._best_x = cost, point.copy()
         if self._session.model.motor_noise > 0.0:  # a joint that keeps still has no noise
             self._best_targets = self._targets_of(point[None])[0]
         else:
-            self._best_targets = self._targets_in(accounts, trial)
+            self._best_targets = self._targets_in(records, trial)
         self._best_hands = letters_of([HANDS[code] for code in codes])
         self._improvements.append((evaluations, cost))
 
-    def _targets_in(self, accounts: Accounts, trial: int) -> Configs:
+    def _targets_in(self, records: TrialRecords, trial: int) -> Configs:
         """Return a copy of a trial's targets, shape ``(G, dof)``, in length units and rad.
 
-        ``trial`` is the index of the trial in ``accounts``.
+        ``trial`` is the index of the trial in ``records``.
         """
-        return accounts.goals["target"][trial, :, 0, : self._session.dof].copy()
+        return records.goals["target"][trial, :, 0, : self._session.dof].copy()
 
     def _targets_of(self, points: Array) -> Configs:
         """Return the targets of points ``(N, dim)``, shape ``(N, G, dof)``.
@@ -582,7 +582,7 @@ class Objective:
 
         Raises ValueError for an infinite entry, and for a goal with both NaN and other entries.
         """
-        if points.min(initial=0.0) >= -LARGEST_ENTRY and points.max(initial=0.0) <= LARGEST_ENTRY:
+        if points.min(initial=0.0) >= -MAX_ENTRY and points.max(initial=0.0) <= MAX_ENTRY:
             return
         missing = (np.isnan(self._targets_of(points)) & self.joints).sum(axis=2)
         in_part = (missing > 0) & (missing < self.joints.sum(axis=1))
@@ -667,17 +667,17 @@ def objective(
     """
     chosen = as_task(task)
     if budget is not None:
-        check_limits("budget", budget, 1, MOST_TRIALS)
+        check_limits("budget", budget, 1, MAX_TRIALS)
     goals = len(chosen.goals)
     reason = too_many_sequences(chosen.name, goals, len(chosen.hands))
     if hands is None and reason:
         raise MethodError("infeasible", f"{reason}; pass the hands to use")
     if hands is None and budget is not None and budget < (count := len(chosen.hands) ** goals):
         raise ValueError(
-            f"budget is {budget}; it takes {counted(count, 'trial')} to choose among the hand "
+            f"budget is {budget}; it takes {pluralize(count, 'trial')} to choose among the hand "
             f"sequences of task {chosen.name!r}: raise the budget, or pass the hands to use"
         )
-    check_limits("seed", seed, 0, MOST_RUN_SEED)
+    check_limits("seed", seed, 0, MAX_RUN_SEED)
     information = OPTIMISER_INFORMATION | {Information.NOISE_DRAWS}
     session = Session(chosen, int(seed), information, model=model)
     return Objective(session, hands, half_width=half_width, trials=budget, task=chosen)

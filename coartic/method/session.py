@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.errors import CoarticError, SolutionError
 from coartic.internal.limits import brief_value, check_limits, real_array
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.model import PAPER, MotionModel
 from coartic.motion.doors import Correction, correct
 from coartic.motion.execution import Execution, execute_many
@@ -27,17 +27,17 @@ from coartic.motion.solution import Movement, check_targets
 from coartic.motion.trials import (
     NO_NOISE,
     NO_REWARD,
-    Accounts,
     CompiledTask,
     HandSequences,
+    TrialRecords,
     Trials,
     compiled_task,
     count_trials,
     hand_codes,
     make_trials,
+    noise_draws,
+    noise_seed,
     trials_of,
-    world_seed,
-    worlds_of,
 )
 from coartic.robot import Array, Configs, Hand, Hands, Robot
 from coartic.tasks.task import Task
@@ -171,7 +171,7 @@ class Meter:
 
 
 Meter.COUNTS = tuple(name for name, value in vars(Meter()).items() if isinstance(value, int))
-MOST_COUNT = 2**63 - 1
+MAX_COUNT = 2**63 - 1
 """Largest count that can be stored."""
 
 
@@ -571,8 +571,8 @@ class Session:
         with self.lock:
             left = self._affordable(count)
             drawn = None if chosen is None else chosen[:left]
-            accounts = self._make_trials(codes[:left], configurations[:left], until, drawn)
-        trials = trials_of(accounts, self.dof)
+            records = self._make_trials(codes[:left], configurations[:left], until, drawn)
+        trials = trials_of(records, self.dof)
         if Information.CORRECTIVE_PROCESS in self._information:
             return trials
         return trials._replace(
@@ -591,7 +591,9 @@ class Session:
         if left is None:
             return count
         if left <= 0 < count:
-            raise BudgetError(f"the budget of {counted(self._trial_budget or 0, 'trial')} is spent")
+            raise BudgetError(
+                f"the budget of {pluralize(self._trial_budget or 0, 'trial')} is spent"
+            )
         return min(count, left)
 
     # The same calls for an objective, which checks points and budget itself.
@@ -609,11 +611,11 @@ class Session:
         return hand_codes(self._task, hands, count)
 
     def _worlds(self, count: int, draws: ArrayLike | None = None) -> NDArray[np.uint64]:
-        """Return the worlds of the next ``count`` trials (:func:`worlds_of`)."""
+        """Return the worlds of the next ``count`` trials (:func:`noise_draws`)."""
         if self.model.motor_noise == 0.0:
             return NO_NOISE
         numbers = self.trials_made + np.arange(count) if draws is None else draws
-        return worlds_of(world_seed(self.seed), numbers)
+        return noise_draws(noise_seed(self.seed), numbers)
 
     def chosen_draws(self, draws: Any, count: int) -> NDArray[np.int64] | None:
         """Return chosen draws as an array, shape ``(count,)``; return None if none are chosen.
@@ -640,7 +642,7 @@ class Session:
         targets: Configs,
         until: Array | None = None,
         draws: NDArray[np.int64] | None = None,
-    ) -> Accounts:
+    ) -> TrialRecords:
         """Make and count N trials, and return their per-goal records.
 
         With ``until`` fewer trials may be counted and returned (:meth:`trials`). ``codes`` are the
@@ -648,15 +650,15 @@ class Session:
         holds ``lock``.
         """
         worlds = self._worlds(len(targets), draws)
-        accounts = make_trials(self._compiled, codes, targets[:, :, None], worlds=worlds)
+        records = make_trials(self._compiled, codes, targets[:, :, None], worlds=worlds)
         count_trials(-len(targets) * self._of_run)
         if until is not None:
-            better = trials_of(accounts, self.dof).rewards > until[: len(targets)]
+            better = trials_of(records, self.dof).rewards > until[: len(targets)]
             if better.any():
                 count = int(better.argmax()) + 1
-                accounts = Accounts._make(array[:count] for array in accounts)
-        self._count(accounts.rewards, *np.add.reduce(accounts.counts).tolist())
-        return accounts
+                records = TrialRecords._make(array[:count] for array in records)
+        self._count(records.rewards, *np.add.reduce(records.counts).tolist())
+        return records
 
     def find_initial_hands(self, hands: tuple[Hand, ...] | None = None) -> str:
         """Find the hand sequence of the first trial, such as ``"RRRR"``.
@@ -754,7 +756,7 @@ class Session:
         for name, count in counts.items():
             if name not in allowed:
                 raise ValueError(f"a method cannot set counter {name!r}, only {', '.join(allowed)}")
-            left = MOST_COUNT - getattr(self._meter, name)
+            left = MAX_COUNT - getattr(self._meter, name)
             check_limits(f"counter {name!r}", count, 0, left)
         self._meter.add(**counts)
 

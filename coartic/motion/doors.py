@@ -18,7 +18,7 @@ from coartic.model import PAPER, MotionModel, check_exact
 from coartic.motion.kernels.correct import correct_kernel
 from coartic.motion.kernels.move import move_kernel, path_kernel
 from coartic.motion.kernels.slots import Batch, batch_for, robot_parameters
-from coartic.robot import BASE_DOF, HANDS, LARGEST_ENTRY, Array, Hand, Robot
+from coartic.robot import BASE_DOF, HANDS, MAX_ENTRY, Array, Hand, Robot
 
 
 class MoveResult(NamedTuple):
@@ -242,11 +242,9 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     array = np.array(real_array(name, value), order="C")
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}; it must be {shape}")
-    if not (np.abs(array) <= LARGEST_ENTRY).all():
+    if not (np.abs(array) <= MAX_ENTRY).all():
         problem = (
-            f"has a number beyond ±{LARGEST_ENTRY:g}"
-            if np.isfinite(array).all()
-            else "is not finite"
+            f"has a number beyond ±{MAX_ENTRY:g}" if np.isfinite(array).all() else "is not finite"
         )
         raise ValueError(f"{name} {brief_value(array.tolist())} {problem}")
     return array
@@ -275,7 +273,7 @@ def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
     not from 0 to 100,000 (in length units).
     """
     x, y = finite_array("goal", centre, (2,)).tolist()
-    check_limits("radius", radius, 0.0, LARGEST_ENTRY)
+    check_limits("radius", radius, 0.0, MAX_ENTRY)
     return x, y
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coartic.errors import NotApplicableError, SolutionError
-from coartic.internal.limits import MOST_RUN_SEED, MOST_RUNS, brief_value, check_limits
+from coartic.internal.limits import MAX_RUN_SEED, MAX_RUNS, brief_value, check_limits
 from coartic.internal.validation import equal_contents
 from coartic.model import PAPER, MotionModel, check_model, refuse_noise
 from coartic.motion.doors import line_points, path_points
@@ -40,20 +40,20 @@ from coartic.motion.trials import (
     JUDGE,
     NO_NOISE,
     NO_WAYPOINTS,
-    Accounts,
     CompiledTask,
+    TrialRecords,
     compiled_task,
     make_trials,
+    noise_draws,
+    noise_seed,
     reason_of_failure,
-    world_seed,
-    worlds_of,
 )
 from coartic.robot import HANDS, Array, Configs, Hand, Hands
 from coartic.tasks.catalogue import TaskLike, as_task
 from coartic.tasks.task import Task, check_hands
 
 _ACTIONS = {"learned": MOVE, "planned": MOVE, "corrective": REPEAT, "path": FOLLOW}
-_MOST_NOISE = 100.0  # standard deviation, in length units and rad
+_MAX_NOISE = 100.0  # standard deviation, in length units and rad
 _AT_ONCE = 4096  # noisy executions, which limits the memory
 
 
@@ -167,7 +167,7 @@ def execute_many(
 
     For a solution that cannot be executed, the entry is the error that :func:`execute` would raise;
     the error is not raised. If the model of ``compiled`` has motor noise, ``worlds`` has the seed
-    and the draw of the noise for each solution (:func:`.worlds_of`).
+    and the draw of the noise for each solution (:func:`.noise_draws`).
     """
     executions: list[Plan | Refused] = []
     for solution in solutions:
@@ -244,14 +244,14 @@ def _execute_plans(
         return []
     aims = [[_with_targets(movements) for movements in plan] for plan in plans]
     requested = _requested(compiled, aims, _hands_of(plans))
-    accounts = make_trials(compiled, *requested, worlds=worlds).goals
-    executed = movements_in(accounts, compiled.task.robot.dof, aims)
-    trials = zip(plans, executed, accounts[..., 0], strict=True)
+    records = make_trials(compiled, *requested, worlds=worlds).goals
+    executed = movements_in(records, compiled.task.robot.dof, aims)
+    trials = zip(plans, executed, records[..., 0], strict=True)
     return [_execution_of(compiled, *trial) for trial in trials]
 
 
 def movements_in(
-    accounts: NDArray[np.void], dof: int, requested: Iterable[Iterable[Sequence[Movement | None]]]
+    records: NDArray[np.void], dof: int, requested: Iterable[Iterable[Sequence[Movement | None]]]
 ) -> list[list[Movement]]:
     """Return the movements made in N trials, up to the first goal that was missed.
 
@@ -259,7 +259,7 @@ def movements_in(
 
     Parameters
     ----------
-    accounts : ndarray, shape (N, G, M)
+    records : ndarray, shape (N, G, M)
         Per-goal records of the trials.
             dof : int
         Length of a configuration.
@@ -273,9 +273,9 @@ def movements_in(
         A list for each trial.
     """
     names = ("hand", "hit", "ticks", "corrections")
-    goals = accounts[..., 0]
-    columns = [goals[name].tolist() for name in names] + [accounts["moved"].tolist()]
-    targets, trials = accounts["target"][..., :dof], []
+    goals = records[..., 0]
+    columns = [goals[name].tolist() for name in names] + [records["moved"].tolist()]
+    targets, trials = records["target"][..., :dof], []
     for n, of_trial in enumerate(requested):
         movements: list[Movement] = []
         of_goals = zip(of_trial, *[column[n] for column in columns], strict=True)
@@ -289,14 +289,12 @@ def movements_in(
                     movements.append(made)
             if corrections:
                 ticks = total - sum(moved)
-                corrected = accounts["corrected"][n, g, 0, :dof]
+                corrected = records["corrected"][n, g, 0, :dof]
                 movements.append(Movement(goal, hand, "corrective", corrected, ticks))
             if not hit:
                 break
             if len(movements) == start:  # hit without a movement: record the hand
-                movements.append(
-                    Movement(goal, hand, "corrective", accounts["q"][n, g, 0, :dof], 0)
-                )
+                movements.append(Movement(goal, hand, "corrective", records["q"][n, g, 0, :dof], 0))
         trials.append(movements)
     return trials
 
@@ -474,8 +472,8 @@ def execute_noisy(
     >>> execute_noisy("ascending", [solution], 0.01, 100, seed=0).shape
     (1, 100)
     """
-    check_limits("motor_noise", motor_noise, 0.0, _MOST_NOISE)
-    check_limits("repeats", repeats, 1, MOST_RUNS)
+    check_limits("motor_noise", motor_noise, 0.0, _MAX_NOISE)
+    check_limits("repeats", repeats, 1, MAX_RUNS)
     if not isinstance(signal_dependent, bool | np.bool_):
         raise TypeError(f"signal_dependent is {brief_value(signal_dependent)}; it must be a bool")
     if not isinstance(solutions, Iterable):
@@ -487,7 +485,7 @@ def execute_noisy(
             "motor_noise says how large the noise is"
         )
     plans = [_plan_of(chosen, k, solution) for k, solution in enumerate(solutions)]
-    seeds = np.array([world_seed(value, JUDGE) for value in _seeds(seed, len(plans))], np.uint64)
+    seeds = np.array([noise_seed(value, JUDGE) for value in _seeds(seed, len(plans))], np.uint64)
     if not plans:
         return np.empty((0, int(repeats)))
     aims, ticks = _execute_exactly(compiled_task(chosen, model), plans)
@@ -503,8 +501,8 @@ def execute_noisy(
         number, draws = np.divmod(np.arange(begin, min(begin + _AT_ONCE, count)), int(repeats))
         actions = movements[number] if len(movements) else movements
         of_part = hands[number], targets[number], actions, waypoints
-        accounts = make_trials(compiled, *of_part, worlds_of(seeds[number], draws))
-        parts.append(_ticks_of(accounts))
+        records = make_trials(compiled, *of_part, noise_draws(seeds[number], draws))
+        parts.append(_ticks_of(records))
     return np.concatenate(parts).reshape(len(plans), -1)
 
 
@@ -513,9 +511,9 @@ def _hands_of(plans: Sequence[Plan]) -> list[int]:
     return [HANDS.index(movements[0].hand) for plan in plans for movements in plan]
 
 
-def _ticks_of(accounts: Accounts) -> Array:
+def _ticks_of(records: TrialRecords) -> Array:
     """Return the ticks of trials, shape ``(N,)``; NaN for a trial that failed."""
-    return np.where(accounts.counts[:, FAILURES] > 0, np.nan, accounts.counts[:, TICKS])
+    return np.where(records.counts[:, FAILURES] > 0, np.nan, records.counts[:, TICKS])
 
 
 def _execute_exactly(
@@ -540,11 +538,11 @@ def _execute_exactly(
     ticks, due = np.empty(len(plans)), [*range(len(plans))]
     while due:
         aims_due, hands = [aims[k] for k in due], _hands_of([plans[k] for k in due])
-        accounts = make_trials(compiled, *_requested(compiled, aims_due, hands))
-        ticks[due] = _ticks_of(accounts)
+        records = make_trials(compiled, *_requested(compiled, aims_due, hands))
+        ticks[due] = _ticks_of(records)
         changed = []
         for n, k in enumerate(due):
-            for g, goal in enumerate(accounts.goals[n, :, 0]):
+            for g, goal in enumerate(records.goals[n, :, 0]):
                 after = [m for m in plans[k][g] if m.kind == "corrective"][kept[k][g] :]
                 target = after[0].target if after else None
                 if target is not None and not _is_found(goal, target):
@@ -609,7 +607,7 @@ def _seeds(seed: Any, count: int) -> list[int]:
             f"seed has {len(seeds)} entries; it must have one for each of the {count} solutions"
         )
     for value in seeds[:1] if not isinstance(seed, Iterable) else seeds:
-        check_limits("seed", value, 0, MOST_RUN_SEED)
+        check_limits("seed", value, 0, MAX_RUN_SEED)
     return [int(value) for value in seeds]
 
 

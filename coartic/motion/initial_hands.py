@@ -23,7 +23,7 @@ from coartic.motion.trials import (
 from coartic.robot import HANDS, Hand
 from coartic.tasks.task import WITHOUT_REACH, Task, letters_of
 
-MOST_SEQUENCES = 4096  # largest number of hand sequences that are all tried
+MAX_SEQUENCES = 4096  # largest number of hand sequences that are all tried
 
 
 def ranked_sequences(
@@ -54,11 +54,9 @@ def ranked_sequences(
     exact = model.without_noise()
     compiled, codes = compiled_task(task, exact), hand_codes(task, [*sequences], len(sequences))
     targets = np.full((*codes.shape, 1, task.robot.dof), np.nan)
-    accounts = make_trials(compiled, codes, targets)
+    records = make_trials(compiled, codes, targets)
     trials = []
-    for hands, goals, counts in zip(
-        sequences, accounts.goals[..., 0], accounts.counts, strict=True
-    ):
+    for hands, goals, counts in zip(sequences, records.goals[..., 0], records.counts, strict=True):
         spent = dict(zip(COUNTED, counts.tolist(), strict=True))
         # coartic.execute also evaluates the position of the hand at each goal that is tried.
         spent["forward_kinematics"] += int(goals["hit"].sum()) + spent["failed_trials"]
@@ -123,9 +121,9 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
     its hands.
     """
     count = hands**goals
-    if count <= MOST_SEQUENCES:
+    if count <= MAX_SEQUENCES:
         return None
-    return f"task {task!r} has {count} hand sequences; at most {MOST_SEQUENCES} are tried"
+    return f"task {task!r} has {count} hand sequences; at most {MAX_SEQUENCES} are tried"
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:

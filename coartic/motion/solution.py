@@ -17,7 +17,7 @@ from coartic.errors import SolutionError
 from coartic.internal.limits import brief_value, real_array
 from coartic.internal.validation import equal_contents
 from coartic.motion.doors import configuration
-from coartic.robot import LARGEST_ENTRY, Array, Configs, Hand
+from coartic.robot import MAX_ENTRY, Array, Configs, Hand
 from coartic.tasks.task import Task, hands_of, letters_of
 
 Kind = Literal["learned", "corrective", "planned", "path"]
@@ -184,7 +184,7 @@ def _check_point(task: Task, point: Any, kind: Kind = "path") -> Array:
     """
     usual = type(point) is np.ndarray and point.dtype == np.float64
     # The length is quick to compute; with a NaN entry it is not below any limit.
-    if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < LARGEST_ENTRY:
+    if not usual or point.shape != task.q0.shape or not math.hypot(*point.tolist()) < MAX_ENTRY:
         numbers = real_array("configuration", point)
         stays = np.isnan(numbers) if kind != "path" else np.zeros(numbers.shape, np.bool_)
         if stays.all() and numbers.size:

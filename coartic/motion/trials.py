@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coartic.internal.arguments import Numbers, checked_arguments
 from coartic.internal.limits import brief_value, check_limits
-from coartic.internal.text import counted
+from coartic.internal.text import pluralize
 from coartic.internal.threads import in_parts
 from coartic.model import PAPER, MotionModel, check_exact, check_model
 from coartic.motion.doors import check_goal, configuration, finite_array
@@ -30,20 +30,20 @@ from coartic.motion.kernels.trial import (
     ITERATIONS,
     TICKS,
     Requests,
-    account_type,
+    goal_record_type,
     reach_kernel,
 )
 from coartic.motion.kernels.trial import NO_REWARD as NO_REWARD
-from coartic.robot import HANDS, LARGEST_ENTRY, Array, Configs, Hands, Points, Robot
+from coartic.robot import HANDS, MAX_ENTRY, Array, Configs, Hands, Points, Robot
 from coartic.tasks.task import Task, check_hands, hands_of
 
 
-class Accounts(NamedTuple):
+class TrialRecords(NamedTuple):
     """Per-goal records, counts and rewards of N trials with G goals."""
 
     goals: NDArray[np.void]
-    """What happened at each goal, a structured array of shape ``(N, G, M)`` (:func:`account_type`).
-    M is the number of requested movements for each goal."""
+    """What happened at each goal, a structured array of shape ``(N, G, M)``
+    (:func:`goal_record_type`). M is the number of requested movements for each goal."""
     counts: NDArray[np.int64]
     """Counts of the trials, shape ``(N, 5)``, columns in the order of :data:`COUNTED`."""
     rewards: NDArray[np.int64]
@@ -56,14 +56,14 @@ _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
 """Dict that maps :attr:`Robot.max_links` to a list of batches that no thread uses."""
 
 
-def empty_accounts(robot: Robot, count: int, goals: int, moves: int = 1) -> Accounts:
+def empty_records(robot: Robot, count: int, goals: int, moves: int = 1) -> TrialRecords:
     """Allocate the records of ``count`` trials with ``goals`` goals.
 
     There are ``moves`` movements to targets for each goal. The counts of the trials are 0; the
     caller fills in everything else.
     """
-    return Accounts(
-        np.empty((count, goals, moves), account_type(width_of(robot))),
+    return TrialRecords(
+        np.empty((count, goals, moves), goal_record_type(width_of(robot))),
         np.zeros((count, len(COUNTED)), dtype=np.int64),
         np.empty(count, dtype=np.int64),
     )
@@ -80,7 +80,7 @@ PRACTICE, JUDGE = 0x70726163, 0x6A756467
 
 
 @lru_cache(maxsize=4096)
-def world_seed(seed: int, world: int = PRACTICE) -> int:
+def noise_seed(seed: int, world: int = PRACTICE) -> int:
     """Derive the seed of the motor noise from the seed of a run.
 
     The noise seed is from 0 to 2^64 - 1. It is a child of ``seed`` (``numpy.random.SeedSequence``),
@@ -90,33 +90,33 @@ def world_seed(seed: int, world: int = PRACTICE) -> int:
     return int(np.random.SeedSequence(seed, spawn_key=(world,)).generate_state(1, np.uint64)[0])
 
 
-def worlds_of(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
+def noise_draws(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
     """Return the noise seed and the noise draw of N trials, shape ``(N, 2)``.
 
-    The result is a value for :attr:`Requests.worlds`. ``seeds`` (from :func:`world_seed`) and
+    The result is a value for :attr:`Requests.worlds`. ``seeds`` (from :func:`noise_seed`) and
     ``draws`` are integers or have shape ``(N,)``.
     """
     pairs = np.broadcast_arrays(np.asarray(seeds, np.uint64), np.asarray(draws, np.uint64))
     return np.stack(np.atleast_1d(*pairs), axis=1)
 
 
-def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Accounts:
+def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> TrialRecords:
     """Let N arms reach for G goals in order, and return the records.
 
     An arm that misses a goal makes no movement for later goals. A trial with a target beyond
-    :data:`LARGEST_ENTRY` fails without a movement; nothing else is checked. ``parameters`` come
+    :data:`MAX_ENTRY` fails without a movement; nothing else is checked. ``parameters`` come
     from :func:`robot_parameters`. Many arms are divided among threads.
     """
     count, goals, moves, _ = arms.targets.shape
-    accounts, idle = empty_accounts(robot, count, goals, moves), _IDLE[robot.max_links]
+    records, idle = empty_records(robot, count, goals, moves), _IDLE[robot.max_links]
 
     def work(part: slice) -> None:
-        requests, results = arms, accounts
+        requests, results = arms, records
         if part.stop - part.start < count:
             rows = {name: array[part] for name, array in arms._asdict().items()
                     if name not in ("waypoints", "first") and len(array) == count}  # fmt: skip
             requests = arms._replace(**rows)
-            results = Accounts._make(array[part] for array in accounts)
+            results = TrialRecords._make(array[part] for array in records)
         try:
             batch = idle.pop()  # no other thread gets it
         except IndexError:
@@ -125,7 +125,7 @@ def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> Account
         idle.append(batch)
 
     in_parts(work, count, SHARE)
-    return accounts
+    return records
 
 
 class Reached(NamedTuple):
@@ -209,7 +209,7 @@ def reach_goals(
     codes = finite_array("hands", hands, (count,)).astype(np.int64)
     if not (np.isin(codes, range(len(HANDS))) & (codes == hands)).all():
         raise ValueError(f"hands is {brief_value(hands)}; each entry must be 0 (left) or 1 (right)")
-    check_limits("radius", radius, 1e-9, LARGEST_ENTRY)
+    check_limits("radius", radius, 1e-9, MAX_ENTRY)
     check_exact(model, radius=radius)
     arms = Requests(
         starts=starts,
@@ -318,7 +318,7 @@ def make_trials(
     movements: NDArray[np.int64] = ALL_MOVE,
     waypoints: Configs = NO_WAYPOINTS,
     worlds: NDArray[np.uint64] = NO_NOISE,
-) -> Accounts:
+) -> TrialRecords:
     """Make N trials of a task, count the trials, and return their records.
 
     The trials are counted by :func:`count_trials`. All arguments are as in :class:`Requests`.
@@ -338,7 +338,7 @@ def reach_next(
     targets: Configs,
     first: int,
     worlds: NDArray[np.uint64] = NO_NOISE,
-) -> Accounts:
+) -> TrialRecords:
     """Let a robot reach for goals ``first`` (from 0), ``first`` + 1, ... of a task.
 
     ``q``, shape ``(1, dof)``, is the robot's present configuration. The other arguments are as in
@@ -364,7 +364,7 @@ def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
         return f"goal {number + 1}: the {hand} hand misses it after {corrections} corrections"
     return (
         f"goal {number + 1}: the corrective process did not converge with the {hand} hand in "
-        f"{counted(int(goal['iterations']), 'iteration')}"
+        f"{pluralize(int(goal['iterations']), 'iteration')}"
     )
 
 
@@ -397,15 +397,15 @@ class Trials(NamedTuple):
         return np.where(self.completed, -self.ticks, -np.inf)
 
 
-def trials_of(accounts: Accounts, dof: int) -> Trials:
+def trials_of(records: TrialRecords, dof: int) -> Trials:
     """Return the results of trials from their records.
 
     ``dof`` is the number of entries of a configuration. The arrays of the result, except
-    ``completed``, are views of ``accounts``. This function changes ``accounts``: it sets
-    ``accounts.goals["q"]`` to NaN at goals that were not hit. If there are several movements for a
+    ``completed``, are views of ``records``. This function changes ``records``: it sets
+    ``records.goals["q"]`` to NaN at goals that were not hit. If there are several movements for a
     goal, only the first record of the goal is used.
     """
-    goals, counts = accounts.goals[..., 0], accounts.counts
+    goals, counts = records.goals[..., 0], records.counts
     reached = goals["q"][..., :dof]
     if counts[:, FAILURES].any():
         reached[~goals["hit"]] = np.nan
@@ -439,8 +439,8 @@ def hand_codes(task: Task, hands: HandSequences, count: int) -> Hands:
             codes[sequence] = [HANDS.index(hand) for hand in chosen]
     if is_list and len(sequences) != count:
         raise ValueError(
-            f"hands has {counted(len(sequences), 'hand sequence')} for {counted(count, 'trial')}; "
-            "it must have one for each"
+            f"hands has {pluralize(len(sequences), 'hand sequence')} for "
+            f"{pluralize(count, 'trial')}; it must have one for each"
         )
     rows = np.empty((count, len(task.goals)), dtype=np.int64)
     rows[:] = np.reshape([codes[sequence] for sequence in sequences], (-1, len(task.goals)))

@@ -20,8 +20,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from coartic.errors import CoarticError
-from coartic.internal.files import check_ending, check_output, errors_in_words, write_output
-from coartic.internal.text import counted
+from coartic.internal.files import check_ending, check_output, describe_os_errors, write_output
+from coartic.internal.text import pluralize
 from coartic.pictures.drawing import box, circle_goals, draw_robot, fill_goals, number_goals
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 RATE = 12.5
 """Frames per second. GIF needs an integer number of hundredths of a second for a frame."""
-LONGEST = 125
+MAX_FRAMES = 125
 """Largest number of frames of a film, without pauses. In longer movements each frame stands for
 several ticks."""
 PAUSE, HOLD = 6, 30
@@ -78,7 +78,7 @@ def write_film(
     lengths = [len(movement.configurations) for _, movement in movements]
     if 0 in lengths:
         raise CoarticError("there is no movement to draw: all goals are hit before the first tick")
-    stride, end = math.ceil(max(lengths) / LONGEST), max(lengths) - 1
+    stride, end = math.ceil(max(lengths) / MAX_FRAMES), max(lengths) - 1
     hits = {int(hit) for _, movement in movements for hit in movement.hits}
     rows = sorted({*range(0, end, stride), *hits, end})
     shown = [row for row in rows
@@ -87,7 +87,7 @@ def write_film(
     rate: Any = RATE
     writer = FFMpegWriter(rate, codec="h264") if is_mp4 else PillowWriter(rate)
     try:
-        with errors_in_words(path), tempfile.TemporaryDirectory() as folder:
+        with describe_os_errors(path), tempfile.TemporaryDirectory() as folder:
             film = Path(folder) / f"film{path.suffix.lower()}"
             FuncAnimation(figure, show, shown, lambda: (), cache_frame_data=False).save(
                 film, writer
@@ -154,6 +154,6 @@ def _scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], Non
         for hand, trace in traces.items():
             trace.set_data(*paths[hand][: row + 1].T)
         fill_goals(goals, movement.hits <= row)
-        counter.set_text(counted(row + 1, "tick"))
+        counter.set_text(pluralize(row + 1, "tick"))
 
     return show

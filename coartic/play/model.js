@@ -9,8 +9,8 @@
 const HANDS = ["left", "right"];
 const [LEFT, RIGHT, NO_HAND] = [0, 1, 2];
 const BASE_DOF = 2;
-const MOST_LINKS = 100;
-const MOST_SEQUENCES = 4096; // largest number of hand sequences that are all tried
+const MAX_LINKS = 100;
+const MAX_SEQUENCES = 4096; // largest number of hand sequences that are all tried
 
 /* coartic/motion/kernels/slots.py; `task` is a task of the package as plain data. The model is the default of coartic/model.py. */
 function problem_of(task) {
@@ -41,7 +41,7 @@ function movable({ start, free, arms }, hands) {
 /* ---- Kinematics ---- */
 
 /* coartic/motion/kernels/trigonometry.py */
-const LARGEST = 1e5;
+const MAX_ANGLE = 1e5;
 const [HIGH, MIDDLE, LOW] = [1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21];
 const PER_QUARTER = 2 / Math.PI;
 const factorial = (n) => (n < 2 ? 1 : n * factorial(n - 1));
@@ -61,7 +61,7 @@ function chain(q, arm, xs, ys) {
     angle += q[first + k];
     let cosine;
     let sine;
-    if (Math.abs(angle) < LARGEST) {
+    if (Math.abs(angle) < MAX_ANGLE) {
       const quarters = (angle * PER_QUARTER + TO_WHOLE) - TO_WHOLE;
       const r = ((angle - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW;
       const z = r * r;
@@ -89,8 +89,8 @@ function chain(q, arm, xs, ys) {
   }
 }
 
-const xs = new Float64Array(MOST_LINKS + 1);
-const ys = new Float64Array(MOST_LINKS + 1);
+const xs = new Float64Array(MAX_LINKS + 1);
+const ys = new Float64Array(MAX_LINKS + 1);
 
 /* coartic/robot.py: positions of shoulder, joints and hand. */
 function joint_positions(problem, q, hand) {
@@ -364,7 +364,7 @@ function initial_hands(problem, named = problem.task.initial_hands) {
 
 /* The hands with which the corrective process alone is fastest, or the initial hands if there are too many to try. */
 function best_hands(problem) {
-  return initial_hands(problem, problem.hands.length ** problem.goals.length > MOST_SEQUENCES ? undefined : "best-of-all");
+  return initial_hands(problem, problem.hands.length ** problem.goals.length > MAX_SEQUENCES ? undefined : "best-of-all");
 }
 
 /* ---- Random numbers of numpy.random.default_rng(seed), so that a seed gives the same run ----

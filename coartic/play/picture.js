@@ -73,7 +73,7 @@ class Picture {
     context.strokeStyle = ink;
     const [from, to] = [12, 12 + unit * scale].map((x) => this.toWorld([x, size[1] - 12]));
     this.line([from, to], 1.5);
-    this.text(counted(unit, "length unit"), [18 + unit * scale, size[1] - 12], ink, "left", 12);
+    this.text(pluralize(unit, "length unit"), [18 + unit * scale, size[1] - 12], ink, "left", 12);
   }
 
   /* The rail on which the base slides, below or next to it. */

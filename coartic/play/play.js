@@ -9,7 +9,7 @@ const PRACTICE = 1.05; // factor by which the number of trials shown grows from 
 const FIRST_SEEN = 0.05; // where that number begins: the first trial is shown for a second, until it reaches 2
 const HOLD_S = 0.9; // pause at a hit
 const DRIFTS = [0, 0.03, 0.1, 0.3, 1]; // κ, how far exploration leans towards the next goal
-const MOST_GOALS = 6;
+const MAX_GOALS = 6;
 const FAR = 12; // largest coordinate of a goal or angle of a joint, length units or rad
 const STRIDE = 2; // distance to a new goal, for arms of length 4
 const ROLES = ["first", "second"];
@@ -19,7 +19,7 @@ const NAMES = {
 const PLANNER = "planner, all goals ahead"; // with which others are compared
 const short = (value) => Number(value.toFixed(2)).toString();
 const grouped = (count) => `${count}`.replace(/\B(?=(\d{3})+$)/g, "\u202f");
-const counted = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
+const pluralize = (count, what) => `${grouped(count)} ${what}${count === 1 ? "" : "s"}`;
 const capital = (words) => words[0].toUpperCase() + words.slice(1);
 const bounded = (values) => values.map((value) => Math.max(-FAR, Math.min(FAR, value)));
 const ticks_by_goal = ({ hands, movements }) => hands.map((_, at) => movements.reduce((sum, { goal, ticks }) => sum + (goal === at ? ticks : 0), 0));
@@ -200,9 +200,9 @@ class Play {
         order(`${k} run ${seed}`, announced ? announced.task : task, job);
       }
       if (who === "plan") order(`${k} plan`, task, { horizon: this.state.ahead, turn: 0 });
-      else order(`${k} far`, task, { horizon: MOST_GOALS });
+      else order(`${k} far`, task, { horizon: MAX_GOALS });
     });
-    if (announced) order("0 before", announced.task, { horizon: MOST_GOALS });
+    if (announced) order("0 before", announced.task, { horizon: MAX_GOALS });
     this.asked = new Map(jobs.map((job) => [job.key, JSON.stringify(job)]));
     // Do not compute results again that exist already.
     this.fresh = new Set([...this.asked.keys()].filter((key) => {
@@ -583,7 +583,7 @@ class Play {
   /* The number of goals ahead that a planner sees, in words. */
   horizon(ahead) {
     if (!ahead) return "no goal ahead";
-    return `${ahead < this.state.goals.length - 1 ? counted(ahead, "goal") : "all goals"} ahead`;
+    return `${ahead < this.state.goals.length - 1 ? pluralize(ahead, "goal") : "all goals"} ahead`;
   }
 
   /* The result, and what its words mean. */
@@ -601,12 +601,12 @@ class Play {
     if (state.who === "you" || (main.length < 2 && state.who !== "alone")) {
       const saved = main[0].trial.reward - this.alone[0].reward;
       const [{ hands, goals }] = this.problems;
-      const tried = hands.length ** goals.length <= MOST_SEQUENCES ? "best hands" : "hands";
+      const tried = hands.length ** goals.length <= MAX_SEQUENCES ? "best hands" : "hands";
       const used = hands.length > 1 ? ` (${tried} ${letters_of(this.alone[0].hands)})` : "";
       const runs = this.practised(0).length;
       if (state.who === "learner" && this.shown === 1) return ["In the first trial only the corrective process acts. Practice follows."];
       return [
-        `${saved ? `${counted(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} the corrective process alone${used}.`,
+        `${saved ? `${pluralize(Math.abs(saved), "tick")} ${saved < 0 ? "more than" : "fewer than"}` : "As many ticks as"} the corrective process alone${used}.`,
         runs > 1 && state.who === "learner" ? `Shown is the median of the learner's ${runs} runs.` : "",
       ];
     }
@@ -619,10 +619,10 @@ class Play {
     const by_chance = this.stored(state.who) && this.preset.by_chance;
     const random = Number.isFinite(by_chance) ? ` (random search: ${short(by_chance)})` : "";
     const saved = this.first_trials.map(({ reward }, k) => main[k].trial.reward - reward);
-    const pays = saved.length && Math.min(...saved) > 0 ? `Practice saves blue ${counted(saved[0], "tick")} and orange ${saved[1]}. ` : "";
+    const pays = saved.length && Math.min(...saved) > 0 ? `Practice saves blue ${pluralize(saved[0], "tick")} and orange ${saved[1]}. ` : "";
     return [
       `${pays}At goal 1 the posture difference is ${short(distance)}${random}.`,
-      `It is the distance between the mean postures (thick; ${counted(runs, "run")} each, thin), in length units and rad.${random && " Random search takes the best of as many random trials."}`,
+      `It is the distance between the mean postures (thick; ${pluralize(runs, "run")} each, thin), in length units and rad.${random && " Random search takes the best of as many random trials."}`,
     ];
   }
 
@@ -657,7 +657,7 @@ class Play {
       const line = document.createElement("span");
       const figure = document.createElement("strong");
       line.className = role;
-      figure.textContent = Number.isFinite(reward) ? counted(-reward, "tick") : "–";
+      figure.textContent = Number.isFinite(reward) ? pluralize(-reward, "tick") : "–";
       line.append(`${name} `, figure);
       return line;
     });
@@ -667,8 +667,8 @@ class Play {
     this.find("first-score").replaceChildren(...lines(first));
     const drift = state.drift ? `, drift ${state.drift}` : "";
     this.set("textContent", {
-      lead: this.lead, finding, meaning, progress: learns ? counted(at, "trial") + drift : "", now: `After ${counted(at, "trial")}`, play: this.playing ? "Pause" : "Show movement",
-      count: this.main.map((mover, k, all) => `${all.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${k < all.length - 1 ? mover.last + 1 : counted(mover.last + 1, "tick")}`).join(", "),
+      lead: this.lead, finding, meaning, progress: learns ? pluralize(at, "trial") + drift : "", now: `After ${pluralize(at, "trial")}`, play: this.playing ? "Pause" : "Show movement",
+      count: this.main.map((mover, k, all) => `${all.length > 1 ? ["blue ", "orange "][k] : ""}${this.row(mover) + 1} of ${k < all.length - 1 ? mover.last + 1 : pluralize(mover.last + 1, "tick")}`).join(", "),
     });
     const stored = this.stored(state.who);
     this.find("film").hidden = !stored;
@@ -677,7 +677,7 @@ class Play {
     this.find("practice").hidden = !learns;
     const trials = this.find("trials");
     trials.value = at ? (1000 * Math.log(at)) / Math.log(TRIALS) : 0;
-    trials.setAttribute("aria-valuetext", counted(at, "trial"));
+    trials.setAttribute("aria-valuetext", pluralize(at, "trial"));
     const tick = this.find("tick");
     tick.max = this.last;
     tick.value = this.tick;
@@ -948,7 +948,7 @@ class Play {
     const { state } = this;
     if (!this.data.presets[state.preset]) state.preset = this.first.preset;
     const { task, others = null } = this.preset;
-    const limit = Math.max(MOST_GOALS, task.goals.length);
+    const limit = Math.max(MAX_GOALS, task.goals.length);
     const places = (name) => state[name] && state[name].filter((row) => row.length === 2).slice(0, limit).map((place) => this.within(place));
     const [goals, second, announced] = ["goals", "others", "announced"].map(places);
     state.goals = goals && goals.length ? goals : task.goals;
@@ -985,7 +985,7 @@ class Play {
     const hasOneHand = preset.task.hands.length < 2;
     const changed = !same([goals, others], [preset.task.goals, preset.others || null]);
     fill("preset", this.data.presets.map(({ label }, k) => [k, `${label}${changed && k === state.preset ? " (changed)" : ""}`]));
-    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => counted(ticks, "tick")).join(" and ")}`])]);
+    fill("stored", [["", "–"], ...runs.map(({ id, name, films }) => [id, `${name}: ${films.map(({ ticks }) => pluralize(ticks, "tick")).join(" and ")}`])]);
     fill("ahead", goals.map((_, k) => [k, this.horizon(k)]));
     fill("edited", goals.map((_, k) => [k + 1, `goal ${k + 1}`]));
     this.set("value", { preset: state.preset, stored: this.stored(who) ? who : "", ahead, edited, explores, drift: DRIFTS.indexOf(drift) });
@@ -994,10 +994,10 @@ class Play {
     ["who", "reward"].forEach((name) => this.find(name).querySelectorAll("input").forEach((input) => { input.checked = input.value === state[name]; }));
     this.find("two").checked = Boolean(others);
     this.find("announced").textContent = `Move goal ${this.moved + 1} now`;
-    const [few, full] = [goals.length < 2, goals.length >= MOST_GOALS];
+    const [few, full] = [goals.length < 2, goals.length >= MAX_GOALS];
     this.set("disabled", { reset: !changed && !state.own && !trials && drift === this.first.drift, two: few, fewer: few, announced: few, add: full });
     this.find("goad").textContent = this.optimum ? "Can you reach the proven optimum?" : `Can you beat the ${PLANNER}?`;
-    this.find("why").textContent = (few && "The only goal cannot be removed, and has no next goal.") || (full && `A task can have at most ${MOST_GOALS} goals here.`) || "";
+    this.find("why").textContent = (few && "The only goal cannot be removed, and has no next goal.") || (full && `A task can have at most ${MAX_GOALS} goals here.`) || "";
     const other = who !== "learner";
     this.set("hidden", {
       runs: !runs.length, "for-learner": other, "for-drift": other, "for-two": other || hasOneHand,

@@ -105,13 +105,15 @@ class MethodInfo:
         """
         return dict(self._ask("complete", parameters))
 
-    def why_not(self, task: Task, parameters: Mapping[str, Any] | None = None) -> str | None:
+    def inapplicable_reason(
+        self, task: Task, parameters: Mapping[str, Any] | None = None
+    ) -> str | None:
         """Return why the method, with given parameters, does not apply to a task; else None.
 
         Parameters that are not passed have their defaults. Raises CoarticError for a wrong
         parameter, or if the method cannot say whether it applies.
         """
-        reason = self._ask("why_not", parameters or {}, *outline_of(task))
+        reason = self._ask("inapplicable_reason", parameters or {}, *outline_of(task))
         return None if reason is None else plain(str(reason))
 
     def refuses(self, model: MotionModel) -> str | None:
@@ -151,7 +153,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
     ----------
     method : type
         Class of the method.
-    question : {"complete", "why_not", "refuses", "rules"}
+    question : {"complete", "inapplicable_reason", "refuses", "rules"}
         Name of the function of :class:`MethodInfo` whose result is returned.
     *arguments
         Arguments of the question:
@@ -159,7 +161,8 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         - ``"rules"``: none;
         - ``"refuses"``: the constants of a motion model;
         - ``"complete"``: the parameters of the method;
-        - ``"why_not"``: the parameters of the method, then the entries of an :class:`Outline`.
+        - ``"inapplicable_reason"``: the parameters of the method, then the entries of an
+          :class:`Outline`.
 
     Raises
     ------
@@ -192,7 +195,7 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
         }
     task = Outline(*outline)._replace(hands=tuple(outline[3]))
     try:
-        return method(typed).why_not(task)
+        return method(typed).inapplicable_reason(task)
     except Exception as error:
         raise CoarticError(
             f"method {method.name!r} cannot say whether it applies to task {task.name!r}: "

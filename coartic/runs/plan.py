@@ -40,13 +40,13 @@ class Cell:
     @cached_property
     def world(self) -> str:
         """Constants that differ from the paper's model, such as ``motor_noise=0.01``, or ``""``."""
-        return in_words(differences(self.model))
+        return describe_parameters(differences(self.model))
 
     @property
     def setting(self) -> str:
         """Parameters that differ from the defaults, such as ``noise_sd=0.1``; empty for none."""
         defaults = self.method.defaults
-        return in_words(
+        return describe_parameters(
             {
                 name: value
                 for name, value in self.parameters.items()
@@ -229,7 +229,7 @@ def hash_of(content: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def in_words(parameters: Mapping[str, Any]) -> str:
+def describe_parameters(parameters: Mapping[str, Any]) -> str:
     """Return parameters as a string, such as ``noise_sd=0.1, trials=100``; empty for none."""
     return ", ".join(f"{name}={value}" for name, value in parameters.items())
 

@@ -17,7 +17,7 @@ from pydantic import Field, InstanceOf
 
 from coartic.errors import SolutionError
 from coartic.internal.limits import real_array
-from coartic.method import CORRECTIONS_BY_TENTH, MOST_COUNT, Meter
+from coartic.method import CORRECTIONS_BY_TENTH, MAX_COUNT, Meter
 from coartic.model import PAPER, MotionModel
 from coartic.motion.doors import segment_lengths
 from coartic.motion.execution import Execution, execute_many, execute_noisy, other_arm_travel
@@ -48,11 +48,11 @@ OF_NOISE = ("noisy_ticks", "mean_ticks", "failed_executions")
 UNREPEATED = "made_again"
 """Key in the details of a run. Its value is the difference that was found when the run was made
 again."""
-_MOST_MOVEMENTS = 10_000
+_MAX_MOVEMENTS = 10_000
 """Largest number of movements of a solution."""
-_MOST_NUMBERS = 400_000
+_MAX_NUMBERS = 400_000
 """Largest number of entries in the start, the targets and the waypoints of a solution."""
-MOST_STEPS = 1_000_000
+MAX_STEPS = 1_000_000
 """Largest number of steps of the movements of a solution. The steps are counted on the straight
 path from the start through all targets and waypoints."""
 
@@ -69,7 +69,7 @@ class Times:
     """True if the process had run the method before; None if unknown."""
     together: int = 1
     """Number of runs of the job, which were made together."""
-    process_peak_mb: float | None = None
+    peak_rss_mib: float | None = None
     """Largest memory of the worker so far, including earlier runs (in MiB); None if unknown."""
 
 
@@ -222,7 +222,7 @@ def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
     counts = details.get(CORRECTIONS_BY_TENTH)
     if not isinstance(counts, list) or len(counts) != 11:
         return None
-    are_counts = all(type(count) is int and 0 <= count <= MOST_COUNT for count in counts)
+    are_counts = all(type(count) is int and 0 <= count <= MAX_COUNT for count in counts)
     return counts if are_counts else None
 
 
@@ -319,7 +319,7 @@ COLUMNS = (
      "whether the process had run the method before"),
     ("together", "INTEGER", "outcome.times.together",
      "runs that one process made side by side; they share their time evenly"),
-    ("process_peak_mb", "REAL", "outcome.times.process_peak_mb",
+    ("process_peak_mb", "REAL", "outcome.times.peak_rss_mib",
      "most memory of the process so far, MiB"),
     ("time_limit_s", "REAL", "job.time_limit_s", "limit of CPU time, seconds"),
     ("date", "TEXT NOT NULL", "date", "date and time at the end, UTC"),
@@ -468,17 +468,17 @@ def too_long(
     - more than 400,000 numbers in the start, the targets and the waypoints;
     - more than 1,000,000 steps on the straight path through them.
     """
-    if len(solution) > _MOST_MOVEMENTS:
+    if len(solution) > _MAX_MOVEMENTS:
         return SolutionError(
-            f"the solution has {len(solution)} movements; at most {_MOST_MOVEMENTS} are allowed"
+            f"the solution has {len(solution)} movements; at most {_MAX_MOVEMENTS} are allowed"
         )
     corners = [task.q0]
     for movement in solution:
         corners += [] if movement.waypoints is None else list(movement.waypoints)
         corners += [] if movement.target is None else [movement.target]
-    if (count := sum(map(np.size, corners))) > _MOST_NUMBERS:
+    if (count := sum(map(np.size, corners))) > _MAX_NUMBERS:
         return SolutionError(
-            f"the solution has {count} numbers in its paths; at most {_MOST_NUMBERS} are allowed"
+            f"the solution has {count} numbers in its paths; at most {_MAX_NUMBERS} are allowed"
         )
     shapes = {np.shape(corner) for corner in corners}
     if len(shapes) == 1:  # a solution with other shapes breaks the rules of the task
@@ -488,8 +488,8 @@ def too_long(
             for k in range(1, len(points)):
                 points[k] = np.where(stays[k], points[k - 1], points[k])
             steps = segment_lengths(points, model).sum() / model.step
-        if steps > MOST_STEPS:
+        if steps > MAX_STEPS:
             return SolutionError(
-                f"the path of the solution has {steps:.0f} steps; at most {MOST_STEPS} are allowed"
+                f"the path of the solution has {steps:.0f} steps; at most {MAX_STEPS} are allowed"
             )
     return None

@@ -213,7 +213,7 @@ class Store:
         """
         return self._rows("SELECT position, run, status, time_limit_s FROM asked")
 
-    def stale(self) -> Counter[tuple[str, str, str]]:
+    def count_outdated_runs(self) -> Counter[tuple[str, str, str]]:
         """Count the planned runs that an older or other version of the method made.
 
         The keys are triples: id of the method, version (or code) that made the runs, and version in
@@ -288,7 +288,7 @@ class Store:
     def others(self) -> int:
         """Return the number of runs in the folder that do not belong to the plan.
 
-        Runs of other versions of a method (:meth:`stale`) are included.
+        Runs of other versions of a method (:meth:`count_outdated_runs`) are included.
         """
         query = "SELECT (SELECT count(*) FROM results) - (SELECT count(*) FROM asked)"
         return int(self._rows(query)[0][0])
@@ -623,7 +623,7 @@ def open_content(content: bytes, name: str) -> Iterator[Store]:
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[Store]:
+def open_store_for_writing(folder: Path) -> Iterator[Store]:
     """Lock a results folder, and open it for writing in a ``with`` block.
 
     A missing folder is made. Raises CoarticError if the folder contains something else, if it

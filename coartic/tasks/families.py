@@ -35,17 +35,17 @@ from pydantic_core import PydanticCustomError
 
 from coartic.errors import NotApplicableError, TaskError
 from coartic.internal.arguments import checked_arguments
-from coartic.internal.limits import MOST_CELLS, check_limits
-from coartic.internal.text import BACKWARDS, Line, counted, plain, unknown
+from coartic.internal.limits import MAX_CELLS, check_limits
+from coartic.internal.text import BACKWARDS, Line, plain, pluralize, unknown
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.internal.validation import FileData, described_error, explain
 from coartic.motion.doors import move
 from coartic.motion.initial_hands import ranked_sequences, search_initial_hands
 from coartic.robot import HANDS, Hand, Robot
 from coartic.tasks.philox import Draws, hash_key
 from coartic.tasks.task import (
     INITIAL_POLICIES,
-    MOST_GOALS,
+    MAX_GOALS,
     SPLITS,
     Address,
     InitialPolicy,
@@ -58,7 +58,7 @@ from coartic.tasks.task import (
 FAMILY_FOLDER = Path(__file__).parent / "families"
 COUNTS: dict[Split, int] = {"development": 1000, "test": 10, "fresh": 10}
 """Default number of instances of each split, counted from instance 0."""
-MOST_ATTEMPTS = 10_000
+MAX_ATTEMPTS = 10_000
 """Largest number of drafts of one instance; a family that needs more cannot be used."""
 Base = Literal["free", "rail", "locked"]
 LOCKED: dict[Base, tuple[Literal["x", "y"], ...]] = {
@@ -81,7 +81,7 @@ def _in_thousandths(value: float) -> int:
     if not is_number or not abs(value * _PARTS) <= sys.float_info.max:
         raise PydanticCustomError("finite", "should be a finite number")
     if round(value * _PARTS) / _PARTS != value:
-        raise sentence_error(f"{value} should have at most three decimals")
+        raise described_error(f"{value} should have at most three decimals")
     return round(value * _PARTS)
 
 
@@ -106,7 +106,7 @@ def _as_share(limits: tuple[int, int]) -> tuple[int, int]:
 _ordered = AfterValidator(_in_order)
 Range = Annotated[tuple[Thousandths, Thousandths], _ordered]
 """Lowest and highest value; every thousandth between them is equally likely."""
-_GoalsCount = Annotated[int, Field(strict=True, ge=2, le=MOST_GOALS)]
+_GoalsCount = Annotated[int, Field(strict=True, ge=2, le=MAX_GOALS)]
 _PerArm = Annotated[int, Field(strict=True, ge=3, le=8)]
 _Bases = tuple[Base, ...]
 
@@ -348,7 +348,7 @@ def instance_of(family: Family, address: Address) -> Task:
     Raises TaskError if each of the first 10,000 drafts breaks a rule of the family.
     """
     broken = Counter[str]()
-    for attempt in range(MOST_ATTEMPTS):
+    for attempt in range(MAX_ATTEMPTS):
         task = draft(family, address, attempt)
         if (rule := broken_rule(family, task)) is None:
             break
@@ -356,7 +356,7 @@ def instance_of(family: Family, address: Address) -> Task:
     else:
         rule, times = broken.most_common(1)[0]
         raise TaskError(
-            f"{address}: {MOST_ATTEMPTS:,} draws of family {family.name!r} broke a rule, {times:,} "
+            f"{address}: {MAX_ATTEMPTS:,} draws of family {family.name!r} broke a rule, {times:,} "
             f"of them {rule!r}"
         )
     name = str(address)
@@ -369,7 +369,7 @@ def instance_of(family: Family, address: Address) -> Task:
     links = len(task.robot.left_links)
     content = task.model_dump() | {
         "title": f"{family.title} {short}",
-        "description": f"{counted(len(task.goals), 'goal')}, {links} links an arm, {base}: drawn "
+        "description": f"{pluralize(len(task.goals), 'goal')}, {links} links an arm, {base}: drawn "
         f"from family {family.name}.",
         "initial_hands": search_initial_hands(task)[0],
         "provenance": {key: {"status": "chosen", "source": source} for key in chosen},
@@ -425,8 +425,8 @@ def named_by(text: str) -> list[str]:
         )
     if high.number < low.number:
         raise TaskError(BACKWARDS.format(text))
-    if high.number - low.number >= MOST_CELLS:
-        raise TaskError(f"{text!r} names more than {MOST_CELLS:,} instances")
+    if high.number - low.number >= MAX_CELLS:
+        raise TaskError(f"{text!r} names more than {MAX_CELLS:,} instances")
     numbers = range(low.number, high.number + 1)
     return [str(low._replace(family=start[:-1], number=number)) for number in numbers]
 
@@ -530,6 +530,6 @@ def instance_names(
     if year is not None:
         check_limits("year", year, 1000, 9999)
     count = COUNTS[split] if count is None else count
-    check_limits("count", count, 1, MOST_CELLS)
+    check_limits("count", count, 1, MAX_CELLS)
     streams = {name: stream for stream, name in SPLITS.items()} | {"fresh": f"{year}-"}
     return [str(Address(family, streams[split], number)) for number in range(count)]

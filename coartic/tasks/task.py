@@ -23,19 +23,19 @@ from coartic.errors import CoarticError, TaskError
 from coartic.internal.arguments import checked_arguments
 from coartic.internal.files import folder_named, write_output
 from coartic.internal.limits import brief_value, real_array
-from coartic.internal.text import Line, counted, did_you_mean, plain
+from coartic.internal.text import Line, did_you_mean, plain, pluralize
 from coartic.internal.toml_files import read_toml
-from coartic.internal.validation import FileData, explain, sentence_error
+from coartic.internal.validation import FileData, described_error, explain
 from coartic.model import PAPER, PAPER_RADIUS
-from coartic.robot import HANDS, MOST_LINKS, Array, Finite, Hand, Length, Robot
+from coartic.robot import HANDS, MAX_LINKS, Array, Finite, Hand, Length, Robot
 
 InitialPolicy = Literal["best-single-hand", "best-of-all"]
 INITIAL_POLICIES: tuple[InitialPolicy, ...] = ("best-single-hand", "best-of-all")
 LETTERS: dict[str, Hand] = {"L": "left", "R": "right"}
 TASK_FOLDER = Path(__file__).parent / "paper"
 
-MOST_GOALS = 256
-LONGEST_NAME = 64
+MAX_GOALS = 256
+MAX_NAME_LENGTH = 64
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 """Form of the names of tasks and suites, which become file names and parts of commands."""
 _IN_FAMILY = r"^([a-z][a-z0-9-]*/v[1-9][0-9]?/)?"
@@ -126,10 +126,10 @@ class Start(FileData):
 
     base: Point = (0.0, 0.0)
     """Centre of the base (in length units)."""
-    left: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
+    left: Annotated[tuple[Finite, ...], Field(max_length=MAX_LINKS)]
     """Angles of the joints of the left arm (in rad), one for each link. The first is measured from
     +x, each other from the link before."""
-    right: Annotated[tuple[Finite, ...], Field(max_length=MOST_LINKS)]
+    right: Annotated[tuple[Finite, ...], Field(max_length=MAX_LINKS)]
     """Angles of the joints of the right arm, as for the left arm."""
 
 
@@ -144,7 +144,7 @@ class Task(FileData):
     number.
     """
 
-    name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=LONGEST_NAME)] = "unnamed"
+    name: Annotated[str, Field(pattern=TASK_PATTERN, max_length=MAX_NAME_LENGTH)] = "unnamed"
     """Name in commands, suites and tables, such as ``ascending`` or ``two-armed/v1/i017``."""
     title: Line = ""
     """Name in figures and tables; ``name`` if it is empty."""
@@ -152,7 +152,7 @@ class Task(FileData):
     """One sentence that describes the task in lists."""
     hands: Annotated[tuple[Hand, ...], Field(min_length=1, max_length=len(HANDS))] = HANDS
     """Hands that may hit goals. The robot has both arms in any case."""
-    goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MOST_GOALS)]
+    goals: Annotated[tuple[Point, ...], Field(min_length=1, max_length=MAX_GOALS)]
     """Goal centres x_g in the order in which they are to be hit (in length units)."""
     radius: Length = PAPER_RADIUS
     """θ^g: radius of every goal (in length units)."""
@@ -240,7 +240,7 @@ class Task(FileData):
         if not isinstance(content, dict):
             return content
         if {"start", "q0"} <= content.keys():
-            raise sentence_error("q0 and start both say where a trial begins: pass only one")
+            raise described_error("q0 and start both say where a trial begins: pass only one")
         if "start" in content:
             return content
         robot = content.get("robot", Robot())
@@ -252,11 +252,11 @@ class Task(FileData):
         try:
             q = real_array("q0", content.pop("q0", np.zeros(robot.dof)))
         except ValueError as error:
-            raise sentence_error(str(error)) from None
+            raise described_error(str(error)) from None
         if q.shape != (robot.dof,):
-            raise sentence_error(f"q0 has shape {q.shape}; it must be ({robot.dof},)")
+            raise described_error(f"q0 has shape {q.shape}; it must be ({robot.dof},)")
         if not np.isfinite(q).all():
-            raise sentence_error(f"q0 is {brief_value(q.tolist())}; all entries must be finite")
+            raise described_error(f"q0 is {brief_value(q.tolist())}; all entries must be finite")
         left, right = (tuple(q[robot.joints(hand)].tolist()) for hand in HANDS)
         content["start"] = Start(base=tuple(q[:2].tolist()), left=left, right=right)
         return content
@@ -265,37 +265,37 @@ class Task(FileData):
     def _is_consistent(self, info: ValidationInfo) -> Task:
         for key, values in (("hands", self.hands), ("locked_base", self.locked_base)):
             if len(set(values)) < len(values):
-                raise sentence_error(f"{key} has a duplicate entry: {', '.join(values)}")
+                raise described_error(f"{key} has a duplicate entry: {', '.join(values)}")
         for hand in HANDS:
             angles, joints = getattr(self.start, hand), len(self.robot.arm(hand).links)
             if len(angles) != joints:
-                raise sentence_error(
+                raise described_error(
                     f"start.{hand} has {len(angles)} joint angles, but the {hand} arm has {joints} "
                     "joints"
                 )
             largest = max(angles, key=abs)
             if abs(largest) > 2 * math.pi:
-                raise sentence_error(
+                raise described_error(
                     f"start.{hand} has the angle {largest:g}; angles must be in rad, from -2π to "
                     f"2π. Did you mean {largest:g}° = {math.radians(largest):.3f}?"
                 )
         for key in self.provenance:
             if key not in Task.model_fields:
                 meant = did_you_mean(key, _all_keys())
-                raise sentence_error(f"provenance.{key} is not a key of a task{meant}")
+                raise described_error(f"provenance.{key} is not a key of a task{meant}")
         if not self.initial_is_policy:
             try:
                 check_hands(self, self.initial_hands)
             except ValueError:
                 letters, count = letters_of(sorted(self.hands)), len(self.goals)
-                raise sentence_error(
+                raise described_error(
                     f"initial_hands is {brief_value(self.initial_hands)}; it must have "
-                    f"{counted(count, 'letter')} {' or '.join(letters)}, such as "
+                    f"{pluralize(count, 'letter')} {' or '.join(letters)}, such as "
                     f"{(letters * count)[:count]!r}, or be {' or '.join(INITIAL_POLICIES)}"
                 ) from None
         # With any model the corrective process ends within the radius; check_task is stricter.
         if info.context != WITHOUT_REACH and (far := _out_of_reach(self, self.radius)) is not None:
-            raise sentence_error(far)
+            raise described_error(far)
         return self
 
     @checked_arguments
@@ -356,7 +356,7 @@ def check_hands(task: Task, hands: str) -> str:
     if not fits or not set(hands) <= set(allowed):
         raise ValueError(
             f"hands {brief_value(hands)} do not fit task {task.name!r}: they must be a string with "
-            f"{' or '.join(allowed)} for each of {counted(len(task.goals), 'goal')}"
+            f"{' or '.join(allowed)} for each of {pluralize(len(task.goals), 'goal')}"
         )
     return hands
 

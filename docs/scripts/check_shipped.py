@@ -136,7 +136,7 @@ def missing_entries(runs: pd.DataFrame) -> Iterator[str]:
     for name, info in built_in().items():
         if name not in {*runs.method, *SHORT_RUNS}:
             tasks = ("two-armed-2", "ascending")
-            task = next(task for task in tasks if info.why_not(load_task(task)) is None)
+            task = next(task for task in tasks if info.inapplicable_reason(load_task(task)) is None)
             yield f'{name} has no shipped run: add "{name}": {short_run(name, task)} to SHORT_RUNS'
     for name in shipped_families():
         if name not in FAMILIES:

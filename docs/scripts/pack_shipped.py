@@ -28,7 +28,7 @@ from coartic.errors import CoarticError
 from coartic.internal.files import folder_named
 from coartic.runs import shipped
 from coartic.runs.record import Row
-from coartic.runs.store import RUNS_FILE, Store, open_store, writing
+from coartic.runs.store import RUNS_FILE, Store, open_store, open_store_for_writing
 
 
 def changed_runs(folder: Path) -> Iterator[str]:
@@ -71,7 +71,7 @@ def pack(source: Store, runs: Iterable[Row], out: Path) -> None:
     """
     with tempfile.TemporaryDirectory() as made:
         plan = source.plan()
-        with writing(Path(made)) as target:
+        with open_store_for_writing(Path(made)) as target:
             target.replace_plan(plan, source.made_with())
             target.write(run.downsample() for run in runs)
         content = lzma.compress((Path(made) / RUNS_FILE).read_bytes(), preset=9)

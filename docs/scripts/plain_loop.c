@@ -6,11 +6,11 @@
 #include <math.h>
 #include <string.h>
 
-enum { MOST = 64 };
+enum { MAX_ENTRIES = 64 };
 
 typedef struct {
     long first, links;
-    double lengths[MOST], shoulder_x, shoulder_y;
+    double lengths[MAX_ENTRIES], shoulder_x, shoulder_y;
 } Arm;
 
 typedef struct {
@@ -44,7 +44,8 @@ static double clear(double dx, double dy, double rim, const double *velocity, do
 /* Moves q to a target; returns the ticks, and whether the goal is hit. */
 static long move(double *q, const double *target, long dof, const Arm *arm, const double *goal,
                  int stops, const Rules *rules, int bounds, int *hit) {
-    double start[MOST], x[MOST], y[MOST], rate[MOST], square = 0.0, bend = 0.0, angle_rate = 0.0;
+    double start[MAX_ENTRIES], x[MAX_ENTRIES], y[MAX_ENTRIES], rate[MAX_ENTRIES];
+    double square = 0.0, bend = 0.0, angle_rate = 0.0;
     long tip = arm->links;
     memcpy(start, q, dof * sizeof *q);
     for (long j = 0; j < dof; j++) square += (target[j] - start[j]) * (target[j] - start[j]);
@@ -83,7 +84,7 @@ static long move(double *q, const double *target, long dof, const Arm *arm, cons
 
 /* Descends on the distance to the goal; returns whether q hits. */
 static int correct(double *q, const Arm *arm, const double *goal, const Rules *rules) {
-    double x[MOST], y[MOST];
+    double x[MAX_ENTRIES], y[MAX_ENTRIES];
     long tip = arm->links;
     for (long n = 0; n < rules->iterations; n++) {
         place(q, arm, x, y);
@@ -100,7 +101,7 @@ static int correct(double *q, const Arm *arm, const double *goal, const Rules *r
 /* Makes trials one after the other: their ticks, -1 where a trial fails. */
 void trials(long count, long goals, long dof, const double *q0, const double *targets, const long *hands,
             const double *centres, const Arm *arms, const Rules *rules, int bounds, long *ticks) {
-    double q[MOST], corrected[MOST];
+    double q[MAX_ENTRIES], corrected[MAX_ENTRIES];
     for (long n = 0; n < count; n++) {
         memcpy(q, q0, dof * sizeof *q);
         ticks[n] = 0;

@@ -25,7 +25,7 @@ from coartic import CoarticError
 from coartic.analysis import interval, mean
 from coartic.analysis.statistics import bootstrap_test, holm
 from coartic.analysis.words import p_value
-from coartic.estimates import FEWEST, FEWEST_TASKS, LEVEL, Estimate
+from coartic.estimates import LEVEL, MIN_TASKS, MIN_VALUES, Estimate
 
 RESAMPLES_OF_CLAIMS = 99_999
 """Resamples of a test over tasks, whose p-value is corrected over many claims."""
@@ -100,14 +100,15 @@ class Finding:
         - *undecided*: any other claim. A claim that holds is also undecided if one of its tests has
           fewer than five values and no p.
         """
-        untested = any(math.isnan(test.p) and min(test.n) < FEWEST for test in self.tests)
+        untested = any(math.isnan(test.p) and min(test.n) < MIN_VALUES for test in self.tests)
         if self.holds is None or (self.holds and untested):
             return "undecided"
         if self.holds:
             # NaN: counted exactly, or no spread in any sample.
             return "undecided" if p >= self.level else "supported"
         certain = not self.tests or any(
-            test.value <= 0 and math.isnan(test.p) and min(test.n) >= FEWEST for test in self.tests
+            test.value <= 0 and math.isnan(test.p) and min(test.n) >= MIN_VALUES
+            for test in self.tests
         )
         return "not supported" if certain or opposite_p < self.level else "undecided"
 
@@ -179,8 +180,8 @@ def mean_beyond(
     if found.ndim != 1:
         raise CoarticError(f"values have shape {found.shape}; they need one value for each task")
     found = found[~np.isnan(found)]
-    if len(found) < FEWEST_TASKS:
-        return Finding(None, f"fewer than {FEWEST_TASKS} random tasks can be judged")
+    if len(found) < MIN_TASKS:
+        return Finding(None, f"fewer than {MIN_TASKS} random tasks can be judged")
     sign = SIGNS[side]
     test, without = _tests_over_tasks(sign * found, sign * bound)
     opposite = max(_tests_over_tasks(-sign * found, -sign * bound), key=lambda test: test.p)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from coartic import CoarticError
 from coartic.analysis import SIGNATURES, Study, interval, number
-from coartic.analysis.control import LEAST_SHARE, control_of, explores_idle_arm, selects
+from coartic.analysis.control import MIN_SHARE, control_of, explores_idle_arm, selects
 from coartic.analysis.figures import picture, style
 from coartic.analysis.study import solved
 from coartic.analysis.words import listed, p_value
@@ -199,7 +199,7 @@ def control_suite(study: Study, *, runs: int = 20) -> str:
         trials = int(of_method.trials.fillna(0).max())
         explored = explores_idle_arm(study, task, label)
         for hands, share in solved(of_method).hands.value_counts(normalize=True).items():
-            if share >= LEAST_SHARE and not control_of(study, task, label, str(hands), alike=True):
+            if share >= MIN_SHARE and not control_of(study, task, label, str(hands), alike=True):
                 blocks[task, str(hands), trials, explored] = None
     lines = [
         'title = "Random search with the hands of learners"',

@@ -15,7 +15,7 @@ from coartic import Task, corrective_trial
 
 STATIONS = 100
 """Number of points at equal distances along a hand's path."""
-NEAR_TIE, FEWEST_TIES = 0.05, 30
+NEAR_TIE, MIN_TIES = 0.05, 30
 """Largest difference between the ticks of both hands in a near tie, as a share of the fewer ticks,
 and the smallest number of near ties for which repeats are measured."""
 LONG, ENOUGH_TICKS = 6, 1.01
@@ -248,10 +248,10 @@ def excess_of_first(runs, model):
 def near_tie_repeats(runs, model):
     """Return by task, for each near tie, 1 if the hand stays the same, and otherwise 0.
 
-    All values are NaN if all tasks together have fewer than :data:`FEWEST_TIES` near ties.
+    All values are NaN if all tasks together have fewer than :data:`MIN_TIES` near ties.
     """
     repeats = unmoved(runs, model, arms=2).map(repeats_of_path).explode().dropna().astype(float)
-    return repeats if len(repeats) >= FEWEST_TIES else repeats * np.nan
+    return repeats if len(repeats) >= MIN_TIES else repeats * np.nan
 
 
 def repeats_of_path(path):

@@ -38,7 +38,7 @@ OF_TWO_ARMS = {"first movement against isolated reach", "near-tie repeats"}
 LEVEL, RESAMPLES = 0.05, 9_999
 VALUE_KEYS = ["measure", "model", "sample", "task"]
 NOT_BEYOND = "it is not shown to exceed random search"
-FEWEST_TASKS = 10
+MIN_TASKS = 10
 POWER = 0.9
 EFFECTS_WITH_POWER = {
     "two-ahead learner slope norm at distance 2": "value",
@@ -212,7 +212,7 @@ def decide(test, seen, over, tasks, silent):
     agrees, disagrees = near > side * test[word], far < side * test.get("disagree", test[word])
     if not tasks:
         return "silent" if silent else "no cases", silent
-    if tasks < FEWEST_TASKS or agrees == disagrees:
+    if tasks < MIN_TASKS or agrees == disagrees:
         return "undecided", silent
     if agrees and min(side * over.low, side * over.high) <= 0:
         return "undecided", NOT_BEYOND

@@ -28,7 +28,7 @@ CONTEXTS = ("ascending", "descending")
 POSTURE = ["at_x", "at_y", *(f"at_{joint}" for joint in range(1, 5))]
 """Columns of the posture at goal 1: base (in length units) and joints of the right arm (in rad)."""
 TRIALS = 10_000
-LEAST_SHARE = 0.1
+MIN_SHARE = 0.1
 
 
 def measure_runs(study):
@@ -54,7 +54,7 @@ def measure_cells(runs):
     for (group, task), of_task in runs.groupby(["group", "task"], sort=False):
         learner = of_task[(of_task.name == "learner") & (of_task.trials == TRIALS)]
         shares = learner.hands.value_counts(normalize=True)
-        shares = shares[shares >= LEAST_SHARE]
+        shares = shares[shares >= MIN_SHARE]
         key = {"group": group, "task": task}
         compared = learner[learner.hands.isin(shares.index)][measures].mean()
         rows.append(key | {"name": "compared", "trials": TRIALS} | compared.to_dict())

@@ -12,7 +12,7 @@ not made again. All takes about ten CPU hours.
 import sys
 from pathlib import Path
 
-from cells import LEAST_SHARE
+from cells import MIN_SHARE
 
 from coartic.analysis import load
 from coartic.benchmarks.runner import run_suite
@@ -32,7 +32,7 @@ def scales(runs):
     ]
     for task, of_task in learner.groupby("task", sort=False):
         shares = of_task.hands.value_counts(normalize=True)
-        hands = f"hands = {sorted(shares.index[shares >= LEAST_SHARE])}"
+        hands = f"hands = {sorted(shares.index[shares >= MIN_SHARE])}"
         more = 'stages = [2, 4, 10, 30, 100, 1_000], keep = ["postures", "targets"]'
         for grid in (hands, f"{hands}, {more}"):
             text += f'\n[[blocks]]\ntasks = ["{task}"]\nmethods = ["random-search"]\n'

@@ -13,7 +13,7 @@ BOUNDS = {"gain": 5.0, "first": 2.0, "arm": 2.0, "other arm": 0.1}
 """Differences below which means count as equal. They were set on development instances, before any
 test instance was run."""
 STAGES = [1, 2, 4, 10, 30, 100, 1_000]
-MOST = STAGES[-1]
+MAX_STAGES = STAGES[-1]
 RESAMPLES = 9_999
 
 
@@ -177,17 +177,20 @@ def tabulate_scales(scales):
     for (measure, group, keep), scale in scales.items():
         row = {"group": group, "keep": keep, "measure": measure, "tasks": len(scale.table)}
         for name, value in {
-            "rise": scale.difference(MOST, 1),
+            "rise": scale.difference(MAX_STAGES, 1),
             "place": scale.place(),
             "beyond_one": scale.difference("learner", 1),
-            "beyond_level": scale.difference("learner", MOST),
+            "beyond_level": scale.difference("learner", MAX_STAGES),
         }.items():
             row |= value.columns(name)
-        for name, (first, second) in {"hundred": (100, MOST), "beyond": ("learner", MOST)}.items():
+        for name, (first, second) in {
+            "hundred": (100, MAX_STAGES),
+            "beyond": ("learner", MAX_STAGES),
+        }.items():
             row |= scale.difference(first, second, 0.9).columns(f"{name}_90")
-        row["rise_median"] = scale.median(MOST, 1)
+        row["rise_median"] = scale.median(MAX_STAGES, 1)
         row["beyond_one_median"] = scale.median("learner", 1)
-        row["beyond_level_median"] = scale.median("learner", MOST)
+        row["beyond_level_median"] = scale.median("learner", MAX_STAGES)
         row |= {"level": scale.level(BOUNDS[measure]), "where": where(scale, BOUNDS[measure])}
         rows[f"{group} {keep} {measure}"] = row
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("row")
@@ -218,7 +221,7 @@ def tabulate_keeping(cells):
     rows = {}
     for measure in MEASURES:
         for group, families in groups_of(cells, measure).items():
-            of = cells[cells.group.isin(families) & (cells.stages == MOST)]
+            of = cells[cells.group.isin(families) & (cells.stages == MAX_STAGES)]
             table = of.pivot_table(measure, ["group", "task"], "name").dropna()
             more = (table.targets - table.postures).sort_index()
             of_task = more.index.get_level_values(0).to_series(index=more.index)

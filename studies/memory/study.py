@@ -31,7 +31,7 @@ from cells import (
     tabulate_contexts,
 )
 from equal_gain import tabulate_equal
-from scales import MOST, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
+from scales import MAX_STAGES, Scale, every_scale, tabulate, tabulate_keeping, tabulate_scales
 
 from coartic.analysis import figures, load
 from common.judging import judge_means
@@ -53,14 +53,14 @@ def judge_claims(cells, scales):
     families = [name for name in groups_of(cells, "gain")["all"] if name != "long"]
     but_long = Scale(cells, "gain", "postures", families)
     both = {measure: targets[measure].by_task(
-        (targets[measure].table[MOST] - postures[measure].table[MOST]).dropna()
+        (targets[measure].table[MAX_STAGES] - postures[measure].table[MAX_STAGES]).dropna()
     ) for measure in MEASURES}  # fmt: skip
     values = {
         "rises-with-postures": rises(postures),
         "rises-with-targets": rises(targets),
-        "level-from-a-hundred": [scale.more(100, MOST) for scale in postures.values()],
-        "learner-at-the-level": [postures[name].more("learner", MOST) for name in signatures],
-        "learner-gains-the-level": [but_long.more("learner", MOST)],
+        "level-from-a-hundred": [scale.more(100, MAX_STAGES) for scale in postures.values()],
+        "learner-at-the-level": [postures[name].more("learner", MAX_STAGES) for name in signatures],
+        "learner-gains-the-level": [but_long.more("learner", MAX_STAGES)],
         "targets-gain-more": [both["gain"]],
         "targets-slow-more": [both["first"]],
         "targets-pass-the-learner": [targets["gain"].more(30, "learner")],

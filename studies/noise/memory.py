@@ -6,7 +6,7 @@ from rules import RESAMPLES, judge_levels
 
 from coartic.analysis.statistics import other_tasks
 
-MOST = 1_000
+MAX_STAGES = 1_000
 
 
 def read_memory(rows, hands):
@@ -55,6 +55,6 @@ def tabulate_memory(values, resamples=RESAMPLES):
         }
         row = {"group": "random tasks", "stages": stages, "motor_noise": level}
         rows.append(row | other_tasks(families).columns("difference"))
-    random = difference[(difference.group == "families") & (difference.stages == MOST)]
+    random = difference[(difference.group == "families") & (difference.stages == MAX_STAGES)]
     by_level = {level: of.ticks.to_numpy() for level, of in random.groupby("motor_noise")}
     return pd.DataFrame(rows), judge_levels(by_level, resamples).rename_axis("motor_noise")

@@ -7,7 +7,7 @@ import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
-LARGEST = 1e4
+MAX_MULTIPLIER = 1e4
 """Largest multiplier that is used. Rounding is then far below the tolerance of a bound."""
 _PLANTED = 1e6  # larger than any number of the programme
 # Any multipliers give a bound, so those of the solver need not be exact.
@@ -64,7 +64,7 @@ class Programme:
         solution = self._solver.solve()
         x, z = finite(solution.x), finite(solution.z)
         if solution.status == clarabel.SolverStatus.PrimalInfeasible:
-            z *= LARGEST / max(1.0, np.abs(z).max())
+            z *= MAX_MULTIPLIER / max(1.0, np.abs(z).max())
         variables = [
             x[first : first + math.prod(shape)].reshape(shape, order="F")
             for first, shape in self._variables

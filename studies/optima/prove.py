@@ -97,7 +97,7 @@ def polished(task, chains, still):
         return None
 
 
-def in_words(row):
+def describe_row(row):
     """Return a sentence about a row of the log."""
     is_proven, more = row["bound"] == row["reward"], ", a better solution" * ("solution" in row)
     proof = "proven optimal" if is_proven else f"no solution exceeds {row['bound']}"
@@ -125,7 +125,7 @@ def prove_all(names, seconds, folder, processes):
         for task in as_completed(tasks):
             file.write(f"\n{json.dumps(task.result())}\n")  # a line may have been cut off
             file.flush()
-            print(in_words(task.result()), flush=True)
+            print(describe_row(task.result()), flush=True)
 
 
 def main():

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import cvxpy as cp
 import numpy as np
 from lagrangian import Lagrangian, least
-from programme import LARGEST, Programme, finite
+from programme import MAX_MULTIPLIER, Programme, finite
 from speed import spans_of
 
 from coartic.baselines.trajectory_problem import held_joints
@@ -134,7 +134,9 @@ class Relaxation:
     def lagrangian(self, multipliers, longest):
         """Return the Lagrangian of any multipliers, for paths no longer than ``longest``."""
         pulls, forces, speeds = map(finite, multipliers)
-        size = min(1.0, LARGEST / max(np.abs(m).max(initial=1.0) for m in (pulls, forces, speeds)))
+        size = min(
+            1.0, MAX_MULTIPLIER / max(np.abs(m).max(initial=1.0) for m in (pulls, forces, speeds))
+        )
         pulls, forces, speeds = size * pulls, size * forces, size * np.maximum(speeds, 0.0)
         speeds = speeds / max(1.0, (speeds @ self._spans).max(initial=0.0))
         # Multipliers of joints that may move are within the ball that the spans leave. Those of

@@ -18,7 +18,7 @@ from coartic.analysis.optima import restrictions
 from coartic.tasks.families import shipped_families
 from coartic.tasks.optima import task_hash
 
-MOST = 40
+MAX_INSTANCES = 40
 """Number of instances of each family."""
 MADE_BY = "coartic", "commit", "model_code", "python", "date"
 """Facts about a results folder that entries have."""
@@ -28,7 +28,7 @@ def ships(task, restriction):
     """Return True if rewards of a task under a restriction (base, other arm) are shipped."""
     if task.family not in shipped_families():
         return task.name in builtin_tasks()
-    is_early = task.split == "test" and int(task.name.rpartition("/i")[2]) < MOST
+    is_early = task.split == "test" and int(task.name.rpartition("/i")[2]) < MAX_INSTANCES
     return is_early and restriction == shipped.FREE
 
 

@@ -22,12 +22,12 @@ from coartic import PAPER
 from coartic.analysis.optima import CANDIDATES, FRESH_EXECUTIONS
 from coartic.model import differences
 from coartic.motion.execution import execute_noisy
-from coartic.runs.plan import in_words, reference_seed
+from coartic.runs.plan import describe_parameters, reference_seed
 from coartic.runs.shipped import open_results
 from coartic.tasks.optima import best_shipped, task_hash
 
 MODEL = PAPER._replace(motor_noise=0.01)
-WORLD = in_words(differences(MODEL))
+WORLD = describe_parameters(differences(MODEL))
 
 
 def candidates_of(runs):

@@ -104,11 +104,11 @@ def all_positive(pairs, parts):
     tests = tuple(difference_test(*pair, "greater") for pair in pairs)
     less = (difference_test(*pair, "less") for pair in pairs)
     against = tuple(replace(test, value=-test.value) for test in less)
-    evidence = in_words(parts)
+    evidence = describe_parts(parts)
     return Finding(all(test.value > 0 for test in tests), evidence, tests, against)
 
 
-def in_words(parts):
+def describe_parts(parts):
     """Join parts of the evidence (pairs of a measured quantity and words), grouped by quantity."""
     seen = pd.DataFrame(parts, columns=["quantity", "words"]).groupby("quantity", sort=False)
     return ". ".join(

@@ -5,12 +5,12 @@ from dataclasses import replace
 from itertools import product
 from statistics import median
 
-from comparisons import Higher, in_words, written
+from comparisons import Higher, describe_parts, written
 from performance import no_trial_fails
 from reader import CONDITIONS, EC1, EC2, EC3, EC4, LEARNER, MARGINS, MissingError
 
 from coartic.analysis import mean, number
-from coartic.estimates import FEWEST_TASKS
+from coartic.estimates import MIN_TASKS
 from common.judging import Finding, all_of, mean_beyond
 
 OF_ONE_ARM = ("one-armed/v1",)
@@ -38,7 +38,7 @@ def in_families(families, *comparisons):
                     other = 0.0 if second is None else second.numbers.mean()
                     unit = 1.0 if first.quantity else 100 / abs(best.reward)
                     values.append(unit * float(first.numbers.mean() - other))
-            if len(values) < FEWEST_TASKS:
+            if len(values) < MIN_TASKS:
                 few.append(f"{family}{name}")
                 continue
             findings.append(mean_beyond("{}", values, margin))
@@ -48,13 +48,11 @@ def in_families(families, *comparisons):
             many = f"{number(median(values), digits)}{unit_of} on the median one"
             parts.append((quantity, f"{family}{name}: {seen} on {len(values)} instances, {many}"))
         if not findings:
-            raise MissingError(
-                f"fewer than {FEWEST_TASKS} instances of {listed(few)} can be judged"
-            )
+            raise MissingError(f"fewer than {MIN_TASKS} instances of {listed(few)} can be judged")
         finding = all_of(*findings)
-        evidence = in_words(parts)
+        evidence = describe_parts(parts)
         if few:
-            seen = f"fewer than {FEWEST_TASKS} instances can be judged of {listed(few)}. {evidence}"
+            seen = f"fewer than {MIN_TASKS} instances can be judged of {listed(few)}. {evidence}"
             return Finding(None, seen)
         return replace(finding, evidence=evidence)
 

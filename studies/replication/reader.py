@@ -13,14 +13,14 @@ from published import TRIALS, published_alone, published_cell
 
 from coartic import NotApplicableError, corrective_trial, initial_hands
 from coartic.analysis import SIGNATURES, Study, mean_excess, with_control
-from coartic.estimates import FEWEST
+from coartic.estimates import MIN_VALUES
 
 LEARNER = "dual-process/"
 EC1, EC2, EC3, EC4 = CONDITIONS = tuple(f"{LEARNER}EC{n}" for n in (1, 2, 3, 4))
 EC1_BY_SUBTASK, EC4_BY_SUBTASK = f"{EC1}-subtask", f"{EC4}-subtask"
 """Ids of the learner that learns from the reward of each subtask."""
 RANDOM_SEARCH = "random-search"
-FEWEST_ON_INSTANCE = 3
+MIN_VALUES_ON_INSTANCE = 3
 """Smallest number of runs whose mean is the value of a random task."""
 ONE_ARMED = "ascending", "descending"
 TWO_ARMED = TASK_1, TASK_2 = "two-armed-1", "two-armed-2"
@@ -74,7 +74,7 @@ class Reader:
         It is lower on an instance of a family, where the mean over runs is one value of a test over
         instances.
         """
-        return FEWEST_ON_INSTANCE if self.task(name).family else FEWEST
+        return MIN_VALUES_ON_INSTANCE if self.task(name).family else MIN_VALUES
 
     def runs(self, task, label):
         """Return the runs of a method on a task.

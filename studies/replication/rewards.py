@@ -9,7 +9,7 @@ from reader import LEARNER
 from scipy.special import stdtrit
 
 from coartic.analysis import figures
-from coartic.estimates import FEWEST, RESAMPLES, SEED, TAILS, Estimate, standard_deviation
+from coartic.estimates import MIN_VALUES, RESAMPLES, SEED, TAILS, Estimate, standard_deviation
 
 MARGIN = 0.01
 """Differences up to this share of the published reward count as equivalent."""
@@ -91,7 +91,7 @@ def difference_to_published(ours, published, sd, runs):
     (None), it is Student's. There is no interval for fewer than five runs of ours.
     """
     n, value = len(ours), float(np.mean(ours)) - published
-    if n < FEWEST:
+    if n < MIN_VALUES:
         return Estimate(value, n=(n,))
     parts = [(standard_deviation(ours) ** 2 / n, n - 1)]
     if sd is not None and runs > 1:

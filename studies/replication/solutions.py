@@ -6,7 +6,7 @@ from reader import LEARNER, Reader
 
 from coartic import load_task
 from coartic.analysis import figures
-from coartic.analysis.study import MOST_EXECUTED, solved, typical_run
+from coartic.analysis.study import MAX_EXECUTED, solved, typical_run
 from coartic.pictures.drawing import box, circle_goals, draw_robot, number_goals
 
 
@@ -24,7 +24,7 @@ def measure_solutions(study):
             condition, every = label.removeprefix(LEARNER), solved(study.cells[on, label])
             if on == name and len(every) and published_cell(name, condition):
                 executed = study.executed(name, label)
-                typical = typical_run(every[:MOST_EXECUTED])
+                typical = typical_run(every[:MAX_EXECUTED])
                 runs[condition] = executed.runs[executed.run_ids.index(typical)]
         if runs:
             runs = {"initial": Reader(study).initial_execution(name)} | runs

@@ -157,7 +157,7 @@ def _without_process(task, solution, model):
 
 def path_of(q, way, target, model):
     """Points of a movement along a way, or straight to a target."""
-    return verify.path(q, way, model) if len(way) else verify.line(q, target, model)
+    return verify.path(q, way, model) if len(way) else verify.straight_path_points(q, target, model)
 
 
 def correct_until_hit(task, q, hand, goal, model, world, **how):
@@ -177,7 +177,7 @@ def correct_until_hit(task, q, hand, goal, model, world, **how):
         if not found.converged:
             break
         end = world.end_of_correction(result.q, found.q, free)
-        points = verify.line(result.q, end, model)
+        points = verify.straight_path_points(result.q, end, model)
         result.q, ticks, result.hit, _ = move(
             task.robot, result.q, end, hand, goal, task.radius, stop_on_arrival=False, model=model
         )

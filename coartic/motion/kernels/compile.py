@@ -36,7 +36,7 @@ from coartic.robot import chain, lever
 
 PACKAGE = Path(__file__).parents[2]
 _KEPT_S = 30 * 24 * 3600.0  # time for which unused machine code of other sources is stored
-_LONGEST_COMPILATION_S, _RETRY_S = 120.0, 0.05
+_MAX_COMPILATION_S, _RETRY_S = 120.0, 0.05
 _TOLD_S = 60.0  # time after which a message names the process that is waited for
 _IMPORTING = Lock()  # an option of LLVM can be set only once
 F = TypeVar("F", bound=Callable[..., Any])
@@ -421,7 +421,7 @@ class _MachineCode:
         """
         with contextlib.suppress(OSError):
             file = open(f"{self.cache_path}/{self.name}.lock", "a+b", buffering=0)  # noqa: SIM115
-            for tries in range(round(_LONGEST_COMPILATION_S / _RETRY_S)):
+            for tries in range(round(_MAX_COMPILATION_S / _RETRY_S)):
                 with contextlib.suppress(BlockingIOError):
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                     self.lock = file

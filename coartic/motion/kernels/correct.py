@@ -61,28 +61,28 @@ def _find_statuses(slots: SlotArrays, count: int, square: float) -> None:
 
 @inlined
 def descend(
-    slots: SlotArrays, count: int, robot: RobotRecord, runs: Any, pull: Any
+    slots: SlotArrays, count: int, robot: RobotRecord, runs: Any, find_changes: Any
 ) -> tuple[int, bool]:
     """Make an iteration of the corrective process in the first ``count`` slots, in place.
 
     Slots that do not go on stay as they are; the status of a slot that goes on and does not change
-    becomes stuck. ``pull`` is as in :func:`descend_to_goals`. Return how many slots have ended, and
-    whether all link angles are certainly below 1e5 rad in size afterwards.
+    becomes stuck. ``find_changes`` is as in :func:`descend_to_goals`. Return how many slots have
+    ended, and whether all link angles are certainly below 1e5 rad in size afterwards.
     """
     ended = 0
     large = 0
     tip = len(slots.length)
     gain, free_x, free_y = robot.model.gain, robot.free_x, robot.free_y
-    if pull is not None:
-        pull(slots, count, robot, runs)
+    if find_changes is not None:
+        find_changes(slots, count, robot, runs)
     for i in range(padded_count(count)):
         error_x = slots.goal[0, i] - slots.x[tip, i]
         error_y = slots.goal[1, i] - slots.y[tip, i]
         going = slots.status[i] == GOING
         x = slots.q[0, i] + gain * error_x if free_x else slots.q[0, i]
         y = slots.q[1, i] + gain * error_y if free_y else slots.q[1, i]
-        if pull is not None:
-            x, y = x + slots.pull[0, i], y + slots.pull[1, i]
+        if find_changes is not None:
+            x, y = x + slots.nullspace_change[0, i], y + slots.nullspace_change[1, i]
         moved = (x != slots.q[0, i]) | (y != slots.q[1, i])
         slots.q[0, i] = x if going else slots.q[0, i]
         slots.q[1, i] = y if going else slots.q[1, i]
@@ -90,20 +90,20 @@ def descend(
             dx, dy = joint_lever(slots.x[:, i], slots.y[:, i], k, tip)
             angle = slots.q[BASE_DOF + k, i]
             turned = angle + gain * (dx * error_x + dy * error_y)
-            if pull is not None:
-                turned += slots.pull[BASE_DOF + k, i]
+            if find_changes is not None:
+                turned += slots.nullspace_change[BASE_DOF + k, i]
             moved |= turned != angle
             slots.q[BASE_DOF + k, i] = turned if going else angle
         # A stationary point outside the goal, which the process will not leave.
         stuck = going & (not moved)
         slots.status[i] = _STUCK if stuck else slots.status[i]
         ended += 0 if (going & moved) | (i >= count) else 1
-        large += 0 if winding(slots.q, i) < trigonometry.LARGEST else 1
+        large += 0 if winding(slots.q, i) < trigonometry.MAX_ANGLE else 1
     return ended, large == 0
 
 
 @inlined
-def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) -> None:
+def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, find_changes: Any) -> None:
     """Iterate the corrective process in the first ``count`` slots until each has ended.
 
     A correction ends when it has converged or failed. It fails if its configuration is not finite
@@ -114,9 +114,9 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
     - ``target`` gets base and arm of the last iterate; the entries of the other arm stay;
     - ``evaluations`` grows by these iterations + 1.
 
-    ``pull`` is None or a kernel ``pull(slots, count, robot, runs)``. The kernel sets ``slots.pull``
-    to what the next iteration adds to ``slots.q`` in addition to α Jᵀ e, 0 for locked coordinates
-    of the base.
+    ``find_changes`` is None or a kernel ``find_changes(slots, count, robot, runs)``. The kernel
+    sets ``slots.nullspace_change`` to what the next iteration adds to ``slots.q`` in addition to
+    α Jᵀ e, 0 for locked coordinates of the base.
     """
     slots, iteration = batch.slots[0], 0
     square = largest_square(robot.model.correction_tolerance)
@@ -126,7 +126,7 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, pull: Any) ->
         _find_statuses(slots, count, square)
         ended = count
         if iteration < robot.model.max_iterations:
-            ended, small_angles = descend(slots, count, robot, batch.runs, pull)
+            ended, small_angles = descend(slots, count, robot, batch.runs, find_changes)
         if ended > 0:
             for slot in range(count - 1, -1, -1):
                 if slots.status[slot] == GOING and iteration < robot.model.max_iterations:
@@ -174,18 +174,18 @@ def project(v: Any, x: Any, y: Any) -> None:
 
 
 @inner
-def _pull_to_preferred(slots: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
-    """Set ``slots.pull`` of the first ``count`` slots to a pull to each run's preferred posture.
+def _find_nullspace_changes(slots: SlotArrays, count: int, robot: RobotRecord, runs: Any) -> None:
+    """Set ``slots.nullspace_change`` of the first ``count`` slots: steps to preferred postures.
 
-    The pull is β N(q) (p − q), and 0 for locked base coordinates:
+    The step is β N(q) (p − q), and 0 for locked base coordinates:
 
-    - β is the ``pull`` of the run in the slot, and p its preferred posture;
+    - β is the ``nullspace_correction_gain`` of the run in the slot, and p its preferred posture;
     - q is the slot's configuration, whose positions ``x`` and ``y`` are filled already;
     - N projects onto the null space of the hand's Jacobian.
     """
     tip = len(slots.length)
     for i in range(count):
-        run, v = runs[slots.run[i]], slots.pull[:, i]
+        run, v = runs[slots.run[i]], slots.nullspace_change[:, i]
         x, y = slots.jacobian[0, :, i], slots.jacobian[1, :, i]
         for j in range(BASE_DOF + tip):
             v[j], x[j], y[j] = 0.0, 0.0, 0.0
@@ -199,17 +199,17 @@ def _pull_to_preferred(slots: SlotArrays, count: int, robot: RobotRecord, runs: 
             x[j], y[j] = joint_lever(slots.x[:, i], slots.y[:, i], k, tip)
         project(v, x, y)
         for j in range(BASE_DOF + tip):
-            v[j] *= run.pull
+            v[j] *= run.nullspace_correction_gain
 
 
 @shared
-def pull_slots(batch: Batch, count: int, robot: RobotRecord) -> None:
-    """Run the corrective process with a pull to each run's preferred posture.
+def correct_slots_informed(batch: Batch, count: int, robot: RobotRecord) -> None:
+    """Run the corrective process with null-space steps to each run's preferred posture.
 
     The process runs in the first ``count`` slots. Its results are set in the runs' records
     (:func:`descend_to_goals`).
     """
-    descend_to_goals(batch, count, robot, _pull_to_preferred)
+    descend_to_goals(batch, count, robot, _find_nullspace_changes)
 
 
 @shared
@@ -284,9 +284,9 @@ def correct_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
 
 
 @shared
-def pull_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
+def correct_runs_informed(count: int, robot: RobotRecord, batch: Batch) -> None:
     """Correct runs as :func:`correct_runs` does, with **A** pulled to preferred postures."""
-    _correct_by(count, robot, batch, pull_slots)
+    _correct_by(count, robot, batch, correct_slots_informed)
 
 
 @entry

@@ -156,7 +156,7 @@ def divide_steps(slots: SlotArrays, count: int, model: Any) -> bool:
         slots.step[i], slots.last[i] = 0.0, last if last < math.inf else 0.0
         # A joint turns at most as far as at the farther end, plus a step if it overshoots.
         angle = winding(slots.start, i) + winding(slots.target, i) + step * len(slots.length)
-        large += 0 if angle < trigonometry.LARGEST else 1
+        large += 0 if angle < trigonometry.MAX_ANGLE else 1
         size = reach * (1.0 + angle) + base_step
         for j in range(BASE_DOF):
             size += abs(slots.start[j, i]) + abs(slots.target[j, i]) + abs(slots.shoulder[j, i])

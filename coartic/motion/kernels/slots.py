@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from coartic.model import PAPER, PAPER_RADIUS, MotionModel, Norm
 from coartic.motion.kernels.compile import chain_by, inlined, inner, record_type
-from coartic.motion.kernels.trigonometry import LARGEST, cosine, near_cosine, near_sine, sine
+from coartic.motion.kernels.trigonometry import MAX_ANGLE, cosine, near_cosine, near_sine, sine
 from coartic.robot import BASE_DOF, HANDS, Arm, Robot
 
 SLOTS = 72
@@ -172,8 +172,10 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
         "target": (np.float64, width),  # of a movement, as asked for; where A has ended
         "end": (np.float64, width),  # where the movement ends unless it stops: target with noise
         "preferred": (np.float64, width),  # preferred posture, in length units and rad
-        "drift": np.float64,  # share of the path to it by which the mean of exploration moves
-        "pull": np.float64,  # share of that path in an iteration of the corrective process
+        # Shares of the path to it: by which the mean of exploration moves, and which an iteration
+        # of the corrective process adds.
+        "nullspace_exploration_gain": np.float64,
+        "nullspace_correction_gain": np.float64,
         "goal": (np.float64, 2),  # x and y, in length units
         "hand": np.int64,  # the hand that is to hit the goal: 0 left, 1 right
         "world": np.uint64,  # key of the noise: see coartic.motion.kernels.noise
@@ -189,7 +191,7 @@ def batch_for(robot: Robot, count: int = SLOTS) -> Batch:
         "spent": np.int64,  # of these, of the corrections before the present one
         "corrections": np.int64,  # corrective movements made for the goal
         "iterations": np.int64,  # of the corrective process for the goal
-        "evaluations": np.int64,  # of forward kinematics, since the last account
+        "evaluations": np.int64,  # of forward kinematics, since the last record
     }
     record, corrected, moved = layout(_links_for(robot))
     slots = np.zeros(1, record)
@@ -232,7 +234,7 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
         "x": (links + 1,),  # of shoulder, joints and hand
         "y": (links + 1,),
         "status": (),
-        "pull": joints,  # what an iteration of a correction adds to q
+        "nullspace_change": joints,  # what an iteration of a correction adds to q
         "jacobian": (2, *joints),
     }
     kinds = dict.fromkeys(("run", "first_joint", "links"), np.int64)
@@ -378,7 +380,7 @@ def have_small_angles(slots: SlotArrays, count: int) -> bool:
     """
     large = 0
     for i in range(padded_count(count)):
-        large += 0 if winding(slots.q, i) < LARGEST else 1
+        large += 0 if winding(slots.q, i) < MAX_ANGLE else 1
     return large == 0
 
 

@@ -9,7 +9,7 @@ phases (paper, sections *Generating Movement for Each Goal* and *The Corrective 
    goal already.
 4. *correct*: if the goal is missed, the corrective process **A** looks for a configuration that
    hits the goal, and the robot moves to that configuration.
-5. *account*: the results at the goal are recorded. The trial goes on if the goal is hit.
+5. *record*: the results at the goal are recorded. The trial goes on if the goal is hit.
 
 Two loops consist of these phases: :func:`reach_kernel` moves to given targets, and
 :mod:`coartic.learner.kernel` explores around learned targets. The result of a run depends neither
@@ -30,7 +30,7 @@ from coartic.motion.kernels.correct import correct_runs
 from coartic.motion.kernels.move import CHECK, IDLE, MOVE, follow_paths, move_runs
 from coartic.motion.kernels.noise import hashed
 from coartic.motion.kernels.slots import Batch, RobotRecord, RunRecord
-from coartic.robot import LARGEST_ENTRY, Configs, Hands, Points
+from coartic.robot import MAX_ENTRY, Configs, Hands, Points
 
 COUNTED = (
     *("movement_ticks", "forward_kinematics", "corrective_iterations"),
@@ -39,12 +39,12 @@ COUNTED = (
 """Names of the counters of :class:`~coartic.method.Meter` that the kernels update, in the order of
 the columns of the arrays ``counts``."""
 TICKS, EVALUATIONS, ITERATIONS, CORRECTIONS, FAILURES = range(len(COUNTED))
-GoalAccount = Any
-"""Record of the results at one goal of a trial (:func:`account_type`)."""
+GoalRecord = Any
+"""Record of the results at one goal of a trial (:func:`goal_record_type`)."""
 
 
 @cache
-def account_type(width: int) -> np.dtype[np.void]:
+def goal_record_type(width: int) -> np.dtype[np.void]:
     """Return the NumPy dtype of the record of one goal in a trial.
 
     Configurations have ``width`` entries. If there are several movements to targets for a goal,
@@ -111,8 +111,8 @@ def aim(run: RunRecord, target: Any) -> None:
 
 
 @inlined
-def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
-    """Write a run's results at its goal into a record: phase 5, *account*.
+def record_goal(run: RunRecord, moved: int, goal: GoalRecord) -> None:
+    """Write a run's results at its goal into a record: phase 5, *record*.
 
     ``moved`` is the number of ticks of the run's movements to targets. If the run missed its goal,
     its trial ends. The run's count of evaluations becomes 0.
@@ -129,7 +129,7 @@ def account(run: RunRecord, moved: int, goal: GoalAccount) -> None:
 
 
 @inlined
-def count_goal(goal: GoalAccount, counts: Any) -> None:
+def count_goal(goal: GoalRecord, counts: Any) -> None:
     """Add the numbers in a goal's record to a trial's counts, in place.
 
     ``counts`` has shape ``(5,)``: ticks, evaluations, iterations, corrections and failures.
@@ -181,7 +181,7 @@ NO_REWARD = -(2**63 - 1)
 
 @inlined
 def _are_within(targets: Any) -> bool:
-    """Return whether no entry of a trial's targets is beyond :data:`LARGEST_ENTRY` in size.
+    """Return whether no entry of a trial's targets is beyond :data:`MAX_ENTRY` in size.
 
     ``targets`` has shape ``(G, M, dof)``. NaN means that a joint stays, and counts as within the
     bound.
@@ -190,7 +190,7 @@ def _are_within(targets: Any) -> bool:
     for g in range(targets.shape[0]):
         for m in range(targets.shape[1]):
             for j in range(targets.shape[2]):
-                large += abs(targets[g, m, j]) > LARGEST_ENTRY
+                large += abs(targets[g, m, j]) > MAX_ENTRY
     return large == 0
 
 
@@ -243,7 +243,7 @@ def _reach_lot(
             n, moved = offset + i, 0
             for m in range(goals.shape[2]):
                 moved += goals[n, g, m].moved
-            account(batch.runs[i], moved, goals[n, g, 0])
+            record_goal(batch.runs[i], moved, goals[n, g, 0])
             count_goal(goals[n, g, 0], counts[n])
 
 
@@ -255,7 +255,7 @@ def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any
     """Let every arm reach for its goals, as many at once as the batch holds.
 
     ``goals``, ``counts`` and ``rewards`` are the entries of
-    :class:`~coartic.motion.trials.Accounts`, filled in place; the caller sets ``counts`` to 0.
+    :class:`~coartic.motion.trials.TrialRecords`, filled in place; the caller sets ``counts`` to 0.
     ``arrays`` are the entries of :class:`Requests`, followed by the entries of a batch.
     """
     arms, batch = Requests(*arrays[:REQUESTED]), Batch(*arrays[REQUESTED:])

@@ -19,7 +19,7 @@ import numpy as np
 
 from coartic.motion.kernels.compile import scalar
 
-LARGEST = 1e5  # rad; up to here k * _HIGH and k * _MIDDLE below are exact
+MAX_ANGLE = 1e5  # rad; up to here k * _HIGH and k * _MIDDLE below are exact
 
 # π/2 in parts: the two leading ones have 33 significant bits each.
 _HIGH = 1.57079632673412561417
@@ -57,7 +57,7 @@ def _reduced(angle: float) -> tuple[float, float, int]:
 
 @scalar
 def near_cosine(angle: float) -> float:
-    """Return cos(angle), the same bits on every system, for |angle| < 1e5 rad (:data:`LARGEST`)."""
+    """Return cos(angle), the same bits on every system, for |angle| < :data:`MAX_ANGLE`."""
     sin, cos, quarter = _reduced(angle)
     value: float = sin if quarter & 1 else cos
     return -value if (quarter + 1) & 2 else value
@@ -65,7 +65,7 @@ def near_cosine(angle: float) -> float:
 
 @scalar
 def near_sine(angle: float) -> float:
-    """Return sin(angle), the same bits on every system, for |angle| < 1e5 rad (:data:`LARGEST`)."""
+    """Return sin(angle), the same bits on every system, for |angle| < :data:`MAX_ANGLE`."""
     sin, cos, quarter = _reduced(angle)
     value: float = cos if quarter & 1 else sin
     return -value if quarter & 2 else value
@@ -77,7 +77,7 @@ def cosine(angle: float) -> float:
 
     The bits are the same on every system for |angle| < 1e5 rad.
     """
-    return near_cosine(angle) if abs(angle) < LARGEST else math.cos(angle)
+    return near_cosine(angle) if abs(angle) < MAX_ANGLE else math.cos(angle)
 
 
 @scalar
@@ -86,4 +86,4 @@ def sine(angle: float) -> float:
 
     The bits are the same on every system for |angle| < 1e5 rad.
     """
-    return near_sine(angle) if abs(angle) < LARGEST else math.sin(angle)
+    return near_sine(angle) if abs(angle) < MAX_ANGLE else math.sin(angle)

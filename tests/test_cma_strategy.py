@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cma import recombination_weights
 
-from coartic.baselines.evolution import EvolutionStrategy
+from coartic.baselines.cma_strategy import EvolutionStrategy
 
 NOISE = np.random.default_rng(1)
 COSTS = {
