@@ -157,6 +157,8 @@ def _declarations(path: Path, shown: str) -> list[MethodInfo]:
             )
         if not isinstance(method.facts, Facts):
             raise CoarticError(f"{where}: facts must be Facts(...), not {method.facts!r}")
+        if hasattr(method, "why_not"):  # its old name, which would silently not be called
+            raise CoarticError(f"{where}: why_not is called inapplicable_reason now: rename it")
         function, arguments = "solve", "session"
         if issubclass(method, Optimiser):
             function, arguments = "optimise", "objective, rng"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coartic import CoarticError, MotionModel
+from coartic import CoarticError, MotionModel, load_task
 from coartic.analysis.study import load
 from coartic.benchmarks import scoring
 from coartic.benchmarks.registry import registry
@@ -72,6 +72,18 @@ def test_a_method_file_says_which_worlds_it_takes(tmp_path):
         path.write_text(text.replace('{"norm"}', wrong), encoding="utf-8")
         with pytest.raises(CoarticError, match="adapts_to must be None or a set of motor_noise, "):
             registry([path])
+
+
+@pytest.mark.process
+def test_the_old_name_of_the_reason_not_to_apply_is_refused(tmp_path):
+    """Otherwise the method would run on tasks that it says it does not apply to."""
+    path = tmp_path / "mine.py"
+    text = f"{TEXT}\n    def why_not(self, task):\n        return 'it never applies'\n"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CoarticError, match="NearestHand: why_not is called inapplicable_reason"):
+        registry([path])
+    path.write_text(text.replace("why_not", "inapplicable_reason"), encoding="utf-8")
+    assert registry([path])["nearest-hand"].inapplicable_reason(load_task("ascending"))
 
 
 @pytest.mark.process

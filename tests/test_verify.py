@@ -196,7 +196,11 @@ def test_a_movement_ends_as_in_coartic(seed, hand, kind, task, aim, scale, step,
     content = {"task": task.model_dump(mode="json"), "model": model._asdict()}
     content |= {"method": {"name": "", "defaults": {}}, "parameters": {}}
     judge = checker.stored_task(json.dumps(content))
-    points = checker.path(q, [middle, target], model) if on_path else checker.line(q, target, model)
+    points = (
+        checker.path(q, [middle, target], model)
+        if on_path
+        else checker.straight_path_points(q, target, model)
+    )
     through = round(aim[0] * (len(points.T) - 1))
     x, y = (row[through] for row in checker.hand_at(points, judge.arms[hand]))
     judge.goals[0] = goal = [x + 0.061, y - 0.083]
