@@ -38,6 +38,7 @@ from coartic.benchmarks.processes import CONTEXT, PROGRAM_CONTEXT, signal_name
 from coartic.benchmarks.worker import answer_of, fail, outcomes_from, perform_job
 from coartic.errors import CoarticError
 from coartic.internal.arguments import checked_arguments
+from coartic.internal.interruption import raise_if_interrupted
 from coartic.internal.limits import MAX_SECONDS, check_limits
 from coartic.internal.text import error_line, plain
 from coartic.internal.threads import begin_worker, end_with_parent, threads_for
@@ -185,6 +186,7 @@ class Local:
                     except RuntimeError:  # the pool is broken
                         group.waiting.appendleft((number, job))
                         break
+            raise_if_interrupted()
             # A broken pool can leave futures without an answer.
             done = wait(running, timeout=_LOOK_S, return_when=FIRST_COMPLETED).done
             for group in groups:

@@ -148,6 +148,34 @@ def test_an_interrupted_command_ends_with_a_sentence(tmp_path_factory, moment, n
     assert len(words.splitlines()) == 1
 
 
+LOST = """
+import os, signal, sys
+import coartic.__main__
+from coartic.benchmarks import pool
+
+class Finaliser:
+    def __del__(self):  # Python drops what is raised here
+        os.kill(os.getpid(), signal.SIGTERM)
+
+def perform(self, *arguments, perform=pool.Local.perform):
+    Finaliser()
+    return perform(self, *arguments)
+
+pool.Local.perform = perform
+sys.argv[1:] = ["run", "paper", "--runs", "500", "--trials", "30000", "--jobs", "1", "--out", "out"]
+coartic.__main__.main()
+"""
+
+
+@pytest.mark.process
+def test_a_command_ends_although_a_finaliser_has_dropped_the_interruption(tmp_path_factory):
+    tmp_path = tmp_path_factory.mktemp("it")
+    status, words = call_apart(tmp_path, [sys.executable, "-c", LOST], "temporary")
+    assert status == 143, words
+    assert "Exception ignored" in words
+    assert words.splitlines()[-1].startswith("Interrupted.")
+
+
 def call_apart(place, command, temporary, **environment):
     """Exit code and standard error of a command that leaves no process and no temporary folder."""
     (place / temporary).mkdir()

@@ -38,6 +38,16 @@ def catch_signals() -> None:
             signal.signal(number, interrupt)
 
 
+def raise_if_interrupted() -> None:
+    """Raise KeyboardInterrupt again if a signal raised it before and the program still runs.
+
+    Python drops an exception that a signal handler raises inside a finaliser or a callback of a
+    library.
+    """
+    if _received:
+        raise KeyboardInterrupt
+
+
 @contextmanager
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
     """Add a sentence to the message of :func:`end_if_interrupted` if the block is interrupted.
