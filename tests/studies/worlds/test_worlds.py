@@ -76,6 +76,10 @@ def test_verdicts():
     ]  # p is 0.014 for the fourth part of the level
     unsure = STUDY.verdicts(dict.fromkeys(range(4), values)).iloc[0]
     assert [unsure.all_tasks, unsure.without, unsure.verdict] == ["holds", "holds", "open"]
+    values = [-0.4, -0.1, 0.0, 0.3, 0.4, 0.6, 0.6, 0.7, 1.0, 1.1, 1.1, 4.2]
+    unsure = STUDY.verdicts(dict.fromkeys(range(2), values)).iloc[0]  # p is 0.003 and 0.022
+    assert unsure.p < 0.01 < unsure.p_without
+    assert [unsure.all_tasks, unsure.without, unsure.verdict] == ["holds", "holds", "open"]
 
 
 def test_the_first_verdicts_are_those_of_the_runs_that_the_first_matrix_had():
