@@ -55,7 +55,7 @@ from settings import (
 from coartic.analysis import TwoContexts, figures, load, mean, means
 from coartic.analysis.statistics import holm
 from coartic.estimates import LEVEL, Estimate, difference_of_means
-from common.judging import mean_beyond
+from common.judging import level_of, mean_beyond
 from common.writing import write_study
 
 HERE = Path(__file__).parent
@@ -72,8 +72,6 @@ BETTER = {
 is described, and is no claim."""
 SHARED = ("ascending", "descending")
 PARTS = ("all", "base", "joints")
-SKEWED, CERTAIN = 2.0, 0.01
-"""Skewness beyond which a p above the second number decides nothing."""
 
 
 def base_name(task):
@@ -227,10 +225,12 @@ def verdicts(cells):
         holds = (means > 0) & (table["p" + suffix] < LEVEL)
         turns = (means < 0) & (table["opposite_p" + suffix] < LEVEL)
         table[name] = np.select([holds, turns], ["holds", "reversed"], "open")
-    p = np.where(means > 0, table.p, table.opposite_p)
-    p_without = np.where(means > 0, table.p_without, table.opposite_p_without)
-    unsure = (table.skewness.abs() > SKEWED) & (np.fmax(p, p_without) > CERTAIN)
-    table["verdict"] = table.all_tasks.where((table.all_tasks == table.without) & ~unsure, "open")
+    p, p_without = (
+        np.where(means > 0, table["p" + suffix], table["opposite_p" + suffix])
+        for suffix in ("", "_without")
+    )
+    is_sure = np.fmax(p, p_without) < [level_of(each) for each in values]
+    table["verdict"] = table.all_tasks.where((table.all_tasks == table.without) & is_sure, "open")
     return table
 
 
