@@ -3,7 +3,8 @@
     python studies/practice/protocols.py results/practice
     PYTHONPATH=studies python studies/practice/study.py results/practice
 
-Table hands.csv also needs the stored rows of study noise. Table power.csv was made before, from development instances:
+Table hands.csv also needs the stored rows of study noise. Table power.csv was made before, from
+development instances:
 
     python studies/practice/protocols.py results/practice-development development
     PYTHONPATH=studies python studies/practice/study.py results/practice-development development
@@ -251,7 +252,7 @@ def tabulate_hands(runs, executions):
     ``given`` less ``own`` with its interval over tasks, and ``share`` is its part of ``learner``
     less ``own``.
     """
-    means = runs.groupby(["motor_noise", "task", "cell"]).gap.mean().unstack()
+    means = runs.pivot_table("gap", ["motor_noise", "task"], "cell")
     is_exact = (executions.target == "T") & (executions.motor_noise == 0)
     own = executions[
         (executions.method == "policy-gradient")
