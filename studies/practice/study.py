@@ -3,7 +3,8 @@
     python studies/practice/protocols.py results/practice
     PYTHONPATH=studies python studies/practice/study.py results/practice
 
-Table power.csv was made before, from development instances:
+Table hands.csv also needs the stored rows of study noise. Table power.csv was made before, from
+development instances:
 
     python studies/practice/protocols.py results/practice-development development
     PYTHONPATH=studies python studies/practice/study.py results/practice-development development
@@ -242,6 +243,37 @@ def measure_power(runs):
     return _with_rows(pd.DataFrame(rows), ["motor_noise", "effect"])
 
 
+def tabulate_hands(runs, executions):
+    """Tabulate how much of the learner's distance to the policy gradient is the choice of hands.
+
+    ``executions`` are the stored rows of study noise. They have the policy gradient that chooses
+    its hands, on the same tasks. There is a row for each world and family with two arms, and one
+    for all these families. ``learner``, ``given`` (cell d) and ``own`` are mean gaps. ``hands`` is
+    ``given`` less ``own`` with its interval over tasks, and ``share`` is its part of ``learner``
+    less ``own``.
+    """
+    means = runs.pivot_table("gap", ["motor_noise", "task"], "cell")
+    is_exact = (executions.target == "T") & (executions.motor_noise == 0)
+    own = executions[
+        (executions.method == "policy-gradient")
+        & executions.setting.isna()
+        & (is_exact | (executions.question == "answers"))
+    ]
+    own = own.assign(gap=100 * (-own.ticks / own.best_known - 1))
+    own = own.groupby(["motor_noise", "task"]).gap.mean().rename("own")
+    tasks = means[["learner", "d"]].rename(columns={"d": "given"}).join(own, how="inner")
+    family = tasks.index.get_level_values("task").str.partition("/").get_level_values(0)
+    tasks = tasks.assign(group=family)[family != "one-armed"]
+    rows = []
+    for noise, of_world in tasks.groupby(level="motor_noise"):
+        for group, found in {"two arms": of_world, **dict([*of_world.groupby("group")])}.items():
+            row = {"motor_noise": noise, "group": group, "n": len(found)}
+            row |= found[["learner", "given", "own"]].mean().to_dict()
+            row |= mean((found.given - found.own).to_numpy()).columns("hands")
+            rows.append(row | {"share": row["hands"] / (row["learner"] - row["own"])})
+    return _with_rows(pd.DataFrame(rows), ["motor_noise", "group"])
+
+
 LOOKS = {
     ("a", "b"): {"label": "hill climbing", "color": figures.PALETTE[0]},
     ("c", "d"): {"label": "policy gradient", "color": figures.PALETTE[1], "marker": "s"},
@@ -277,10 +309,12 @@ def measure(study):
     """Return the tables by name; each becomes a CSV file."""
     rows = stored(study)
     runs = measure_runs(rows)
+    executions = pd.read_csv(HERE.parent / "noise" / "runs.csv.xz", low_memory=False)
     return {
         "results": tabulate(runs),
         "effects": tabulate_effects(runs),
         "claims": judge_claims(runs),
+        "hands": tabulate_hands(runs, executions),
         "runs": rows,
     }
 

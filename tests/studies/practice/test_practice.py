@@ -161,3 +161,25 @@ def test_hill_climbing_keeps_the_targets_of_its_best_trial(model):
     if model is NOISY:
         targets = np.array([movement.target for movement in result.solution])
         np.testing.assert_array_equal(targets, centre)
+
+
+def test_the_share_of_hands_is_that_of_plain_arithmetic():
+    """Tasks, runs and gaps are made up; a policy gradient with another setting does not count."""
+    runs = pd.DataFrame(
+        {"motor_noise": 0.0, "task": f"long/v1/i00{task}", "run": run, "cell": cell, "gap": gap}
+        for cell, gaps in {"learner": (40, 60, 20, 40), "d": (20, 40, 10, 10)}.items()
+        for (task, run), gap in zip(((0, 0), (0, 1), (1, 0), (1, 1)), gaps, strict=True)
+    )
+    executions = pd.DataFrame(
+        {"question": "practised", "target": "T", "method": "policy-gradient", "setting": setting,
+         "motor_noise": noise, "task": f"long/v1/i00{task}", "ticks": ticks, "best_known": -100.0}
+        for task, noise, setting, ticks in (
+            (0, 0.0, None, 110), (1, 0.0, None, 105), (0, 0.01, None, 150),
+            (0, 0.0, "spread=fixed", 190),
+        )
+    )  # fmt: skip
+    table = STUDY.tabulate_hands(runs, executions)
+    assert [*table.index] == ["0.0, two arms", "0.0, long"]
+    row = table.loc["0.0, long"]
+    assert (row.learner, row.given, row.own) == pytest.approx((40, 20, 7.5))
+    assert row.share == pytest.approx((20 - 7.5) / (40 - 7.5))
