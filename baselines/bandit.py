@@ -1,20 +1,21 @@
-"""A bandit over hand sequences, each with its own search over target configurations.
+"""UCB1 bandit over hand sequences, each with its own search over target configurations.
 
-UCB1 chooses the search that makes the next generation of trials; the value of a search is the best
-reward of its hand sequence so far. Each search starts from the postures in which the corrective
-process **A** on its own hits the goals; finding them takes one trial.
+The arms of the bandit are the hand sequences. Pulling an arm lets the search of this hand sequence
+make one generation of trials. The value of an arm is the best reward of its hand sequence so far.
+Each search starts from the postures in which the corrective process **A** on its own hits the
+goals; finding these postures takes one trial.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from coartic.baselines.uninformed import Attempts
-from coartic.method import Session
+from coartic.baselines.uninformed import Attempts, SequenceParameters
+from coartic.method import Result, Session
 from coartic.method.optimisers import sequences_of
 from coartic.motion.solution import Movement, movements_of
 from coartic.robot import Array
@@ -79,14 +80,64 @@ class Search(ABC):
         """
 
 
-def sequences_to_try(session: Session, given: str | None) -> list[str]:
-    """Return the hand sequences that a bandit tries.
+def solve_by_bandit(
+    session: Session,
+    parameters: SequenceParameters,
+    make_search: Callable[[Attempts, str], Search],
+    exploration: float,
+) -> Result:
+    """Try each hand sequence once, then share the other trials between the sequences by UCB1.
 
-    - If ``given`` is a sequence, only that sequence is tried.
-    - Otherwise all hand sequences of the task are tried, if there are at most 4096.
-    - If there are more than 4096, only the task's initial sequence is tried.
+    1. For each hand sequence, ``make_search`` makes a search, which makes one trial in which only
+       the corrective process acts. A sequence whose trial fails gets no further trials.
+    2. Until no trial is left, UCB1 chooses the search that makes the next generation
+       (:func:`spend_trials`). If all trials of step 1 have failed, this step is left out.
+
+    All hand sequences of the task are tried, with two exceptions:
+
+    - If parameter ``sequence`` is given, only this sequence is tried.
+    - If the task has more than 4096 sequences, only the task's initial sequence is tried.
+
+    If fewer trials are left than there are sequences, the last sequences are not tried.
+
+    Parameters
+    ----------
+    session : Session
+        Session in which the trials are made and counted.
+    parameters : SequenceParameters
+        Parameters of the method; ``trials`` and ``sequence`` are used.
+    make_search : callable
+        Function that makes the search of a hand sequence. Its arguments are the Attempts of the run
+        and the hand sequence, such as ``"RRLR"``.
+    exploration : float
+        Constant c of UCB1, as a multiple of the range of the first rewards (at least 1 tick).
+
+    Returns
+    -------
+    Result
+        The movements of the best trial. With motor noise, the movements to the recommended mean
+        (:func:`recommend`). The details have ``best_trial``, the number of the best trial from 0,
+        and ``trials``, a dict that maps each hand sequence to its number of trials.
+
+    Raises
+    ------
+    MethodError
+        No trial is left to make, or no trial hits every goal.
+    NotApplicableError
+        No initial sequence is found where one is needed.
+    ValueError
+        Parameter ``sequence`` does not fit the task.
     """
-    return sequences_of(session) if given is None else [given]
+    attempts = Attempts(session, parameters.trials)
+    given = parameters.told_hands(session)
+    with session.solving():
+        sequences = sequences_of(session) if given is None else [given]
+        searches = [make_search(attempts, each) for each in sequences[: attempts.left]]
+        spend_trials(searches, attempts, exploration)
+    return attempts.result(
+        lambda: recommend(searches, attempts),
+        trials={search.hand_sequence: search.trials for search in searches},
+    )
 
 
 def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: float) -> None:

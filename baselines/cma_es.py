@@ -49,7 +49,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from coartic.baselines.bandit import Search, recommend, sequences_to_try, spend_trials
+from coartic.baselines.bandit import Search, recommend, solve_by_bandit
 from coartic.baselines.cma_strategy import EvolutionStrategy
 from coartic.baselines.uninformed import Attempts, SequenceParameters, UninformedParameters
 from coartic.method import Facts, Method, Result, Session
@@ -134,31 +134,13 @@ class CMAES(Method):
     Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until none is left, and return the movements of the best trial.
+        """Solve the task with CMA-ES for each hand sequence (:func:`.solve_by_bandit`)."""
+        parameters: BanditParameters = self.parameters
 
-        In noise, return movements to a mean (:func:`recommend`).
+        def make_strategy(attempts: Attempts, hand_sequence: str) -> Strategy:
+            return Strategy(session, attempts, hand_sequence, parameters.sigma)
 
-        The method first makes one trial with each hand sequence, in which only the corrective
-        process acts. If all of these trials fail, the method stops. It uses only one sequence in
-        two cases:
-
-        - If parameter ``sequence`` is given, the method uses that sequence.
-        - If there are more than 4096 sequences, the method uses the task's initial sequence.
-
-        Raises MethodError if no trial hits every goal.
-        """
-        attempts = Attempts(session, self.parameters.trials)
-        told = self.parameters.told_hands(session)
-        with session.solving():
-            strategies = [
-                Strategy(session, attempts, hand_sequence, self.parameters.sigma)
-                for hand_sequence in sequences_to_try(session, told)[: attempts.left]
-            ]
-            spend_trials(strategies, attempts, self.parameters.exploration)
-        return attempts.result(
-            lambda: recommend(strategies, attempts),
-            trials={s.hand_sequence: s.trials for s in strategies},
-        )
+        return solve_by_bandit(session, parameters, make_strategy, parameters.exploration)
 
 
 class GoalByGoalParameters(UninformedParameters):

@@ -45,7 +45,7 @@ import numpy as np
 from numpy import exp
 from pydantic import Field
 
-from coartic.baselines.bandit import Search, recommend, sequences_to_try, spend_trials
+from coartic.baselines.bandit import Search, solve_by_bandit
 from coartic.baselines.uninformed import Attempts, SequenceParameters
 from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
@@ -159,32 +159,13 @@ class PolicyGradient(Method):
     Parameters = PolicyGradientParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until none is left, and return the movements of the best trial.
-
-        In noise, return movements to a mean (:func:`.recommend`).
-
-        The method first makes one trial with each hand sequence, in which only the corrective
-        process acts. If all of these trials fail, the method stops. It uses only one sequence in
-        two cases:
-
-        - If parameter ``sequence`` is given, the method uses that sequence.
-        - If there are more than 4096 sequences, the method uses the task's initial sequence.
-
-        Raises MethodError if no trial hits every goal.
-        """
+        """Solve the task with a policy for each hand sequence (:func:`.solve_by_bandit`)."""
         parameters: PolicyGradientParameters = self.parameters
-        attempts = Attempts(session, parameters.trials)
-        told = parameters.told_hands(session)
-        with session.solving():
-            policies = [
-                Policy(session.rng, attempts, hand_sequence, parameters)
-                for hand_sequence in sequences_to_try(session, told)[: attempts.left]
-            ]
-            spend_trials(policies, attempts, _EXPLORATION)
-        return attempts.result(
-            lambda: recommend(policies, attempts),
-            trials={p.hand_sequence: p.trials for p in policies},
-        )
+
+        def make_policy(attempts: Attempts, hand_sequence: str) -> Policy:
+            return Policy(session.rng, attempts, hand_sequence, parameters)
+
+        return solve_by_bandit(session, parameters, make_policy, _EXPLORATION)
 
 
 METHODS: tuple[type[Method], ...] = (PolicyGradient,)
