@@ -22,7 +22,7 @@ from coartic.robot import Array
 
 
 class Search(ABC):
-    """Search over the targets of one hand sequence.
+    """Base class of the searches over the targets of one hand sequence.
 
     The constructor makes one trial, in which only the corrective process acts. If that trial fails,
     :attr:`reward` is -inf, and the search cannot make generations.
@@ -44,17 +44,26 @@ class Search(ABC):
         self.reward = float(corrective_trial.rewards[0])
         """Best reward so far; -inf if the corrective process does not complete the sequence."""
         self.first_mean: Array = corrective_trial.reached[0, attempts.explored]
-        """Explored joints of the postures of the corrective process, goal by goal, shape
-        ``(n,)``."""
+        """Explored joints of the postures in which the corrective process hit the goals, goal by
+        goal, shape ``(n,)``, in length units and rad."""
 
     def make_trials(self, values: Array) -> Array:
-        """Make the trials of a generation, and return their rewards; -inf for a failed trial.
+        """Make the trials of a generation, and return their rewards.
 
         Parameters
         ----------
         values : ndarray, shape (N, n)
-            Targets of the explored joints, goal by goal, in length units and rad. If fewer than N
-            trials are left, only the first ones are made; at least one must be left.
+            Targets of the n explored joints of all goals, goal by goal, in length units and rad.
+
+        Returns
+        -------
+        ndarray, shape (M,)
+            Rewards of the trials, -inf for a failed trial. If fewer than N trials are left, only
+            the first M are made.
+
+        Notes
+        -----
+        At least one trial must be left.
         """
         rewards = self._attempts.around(self.hand_sequence, values[: self._attempts.left]).rewards
         self.generations += 1
@@ -72,11 +81,12 @@ class Search(ABC):
     @property
     @abstractmethod
     def answer(self) -> tuple[float, Array]:
-        """Cost of the recommended mean, and that mean.
+        """Cost and targets that the search recommends.
 
-        - The cost is the mean cost of the last complete generation, in ticks. Without a complete
-          generation the cost is infinity.
-        - The mean has shape ``(n,)``, in length units and rad.
+        - The cost is the mean cost of the trials of a complete generation, in ticks. Without a
+          complete generation it is infinity.
+        - The targets are the mean of the search after that generation, shape ``(n,)``, in length
+          units and rad.
         """
 
 
@@ -141,11 +151,25 @@ def solve_by_bandit(
 
 
 def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: float) -> None:
-    """Let searches make generations until no trial of ``attempts`` is left.
+    """Let UCB1 divide the remaining trials among searches, one generation at a time.
 
-    The next generation comes from the search with the highest upper confidence bound (UCB1). The
-    constant c of UCB1 is ``exploration`` times the range of the searches' first rewards (at least 1
-    tick). A search makes no generation if the corrective process failed with its hand sequence.
+    The next generation is made by the search with the highest upper confidence bound ::
+
+        R + c sqrt(2 ln(N) / n)
+
+    Here R is the best reward of the search so far, n is the number of its generations, N is the
+    number of generations of all searches, and c is ``exploration`` times the range of the first
+    rewards of the searches (at least 1 tick). The first trial of a search counts as a generation.
+    Searches whose first trial failed do not take part.
+
+    Parameters
+    ----------
+    searches : sequence of Search
+    attempts : Attempts
+        Trials of the run. The function returns when no trial is left, or if the first trials of all
+        searches have failed.
+    exploration : float
+        Constant of UCB1, as a multiple of the range of the first rewards.
     """
     promising = [search for search in searches if search.reward > -math.inf]
     rewards = [search.reward for search in promising] or [0.0]
@@ -162,9 +186,10 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
 
 
 def recommend(searches: Iterable[Search], attempts: Attempts) -> tuple[Movement, ...]:
-    """Return movements to the recommended mean with the lowest cost (:attr:`Search.answer`).
+    """Return movements to the recommended targets with the lowest cost (:attr:`Search.answer`).
 
-    If no search has a complete generation, the mean of the best trial's hand sequence is returned.
+    If no search has a complete generation, the targets are those of the search whose hand sequence
+    is that of the best trial.
     """
     best = min(
         searches, key=lambda each: (each.answer[0], each.hand_sequence != attempts.hand_sequence)
