@@ -42,7 +42,7 @@ class Aim(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A simulated movement to a goal, from the start or from the hit of the goal before."""
+    """A simulated movement to a goal from the start or the goal before."""
 
     movement: Movement
     """Movement of kind ``path`` to the goal."""
@@ -67,7 +67,7 @@ class _StuckError(Exception):
 
 @dataclass
 class Controller(ABC):
-    """Base class of controllers, which move the hands of a simulated robot to the goals of a task.
+    """Base class of controllers, which move a simulated robot to goals.
 
     In this class *joints* are all entries of a configuration that are not locked: base coordinates
     and joint angles. The session counts the evaluations of the kinematics and the iterations of the

@@ -111,7 +111,7 @@ class NextGoalController(HandController):
         return q
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the part of the change to the posture that is due in one control step.
+        """Return the change towards the posture that is due in one control step.
 
         This is the change from ``q`` to the posture ``memory``, divided by the number of control
         steps to the goal (at least 1). A change with a norm above 1 is scaled down to norm 1.

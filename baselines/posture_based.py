@@ -397,7 +397,7 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Linearise the position of the hand in the postures in which it is far from (x, y).
+    """Linearise the hand's position in postures in which it is far from (x, y).
 
     Parameters
     ----------

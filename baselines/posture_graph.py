@@ -50,10 +50,11 @@ _NEAR = 2.0  # in length units: at a larger distance the base first moves the ha
 def _sample_postures(
     task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
-    """Sample a posture near each of N configurations in which a hand is inside a goal's disc.
+    """Sample postures in which a hand is inside a goal's disc.
 
-    Gaussian noise displaces the configurations, and Gauss-Newton steps then bring the hand to a
-    random point of the disc. Samples whose hand does not come into the disc are left out.
+    There is a sample for each of N configurations. Gaussian noise displaces the configuration, and
+    Gauss-Newton steps then bring the hand to a random point of the disc. Samples whose hand does
+    not come into the disc are left out.
 
     Parameters
     ----------
@@ -124,11 +125,12 @@ class PrefixCosts(NamedTuple):
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
-    """Sample the nodes of a posture graph: postures that hit a goal, for each goal and hand.
+    """Sample the nodes of a posture graph for each goal and hand.
 
-    Each sample begins with a random configuration, which is then corrected until the hand is inside
-    the goal's disc. Half of the random configurations are drawn around nodes of the goal before, of
-    either hand, if there are any. The others are drawn around the task's start.
+    A node is a posture in which the hand is inside the goal's disc. Each sample begins with a
+    random configuration, which is then corrected until the hand is inside the disc. Half of the
+    random configurations are drawn around nodes of the goal before, of either hand, if there are
+    any. The others are drawn around the task's start.
 
     Parameters
     ----------
@@ -209,7 +211,7 @@ def chains_of(
 def _extend(
     task: Task, layers: Layers, begun: PrefixCosts, base_weight: float
 ) -> Iterator[PrefixCosts]:
-    """Extend a prefix by one goal: yield the longer prefix for each hand with nodes at the goal.
+    """Extend a prefix by one goal, with each hand that has nodes there.
 
     ``begun`` is the table of the prefix. ``layers`` and ``base_weight`` are as in
     :func:`chains_of`.

@@ -230,9 +230,9 @@ class PostureController(Controller):
         return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
     def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
-        """Return the constraint that a hand is in the polygon of its goal, to first order.
+        """Return the linearised constraint that a hand is in its goal's polygon.
 
-        The constraint is A x >= b for the change x of the joints.
+        To first order, the constraint is A x >= b for the change x of the joints.
 
         Parameters
         ----------

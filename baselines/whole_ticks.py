@@ -72,7 +72,7 @@ class Rounding:
         return self.divide(plan, [round(length) for length in exact], ())
 
     def iter_roundings(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
-        """Yield the 64 roundings of a plan to whole steps that are nearest to the plan.
+        """Yield the 64 nearest roundings of a plan to whole steps.
 
         The nearest rounding comes first. Each segment except the last is rounded up or down; the
         last segment is rounded up. The distance of a rounding from the plan is the sum of the

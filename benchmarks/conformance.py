@@ -199,7 +199,7 @@ def _noise(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 
 
 def _is_best_trial(run: Row) -> bool:
-    """Return whether the solution of a run with motor noise seems to be its best trial.
+    """Return whether the solution of a noisy run seems to be its best trial.
 
     The solution is executed with the noise draw of the best trial. If the solution has the
     movements of the best trial, this execution takes as many ticks as the best trial; another
@@ -246,7 +246,7 @@ def _seeds(info: MethodInfo, runs: _Runs) -> str:
 
 
 def _hopeless(info: MethodInfo, runs: _Runs) -> str:
-    """Return a sentence on the run of the method on a task whose goal is out of reach."""
+    """Return a sentence on the run on a task that is out of reach."""
     for run in runs.get("hopeless", {}).values():
         return f"a task out of reach gives {run['status']}: {run['reason']}"
     return "the method does not apply to a task out of reach"
@@ -278,7 +278,7 @@ second function returns a sentence on what was checked; it is called if there is
 
 
 def _hopeless_task(like: Task) -> Task:
-    """Return a copy of a task whose base is locked and whose only goal is out of reach."""
+    """Return a copy of a task with one goal, which is out of reach."""
     return like.model_copy(
         update={
             "name": "hopeless",

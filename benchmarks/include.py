@@ -209,7 +209,7 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of each folder that lacks runs of its plan, or has too few runs of a cell.
+    """Warn of each folder that lacks runs, or has too few runs of a cell.
 
     A cell has too few runs if its method is stochastic, the command does not ask for the cell, and
     the joined plan has fewer runs of the cell than the largest number in ``asked``.
@@ -248,7 +248,7 @@ def _warn_of_gaps(
 
 
 def _named(jobs: Sequence[Job]) -> str:
-    """Return the methods and tasks of the first three jobs, and the number of the others."""
+    """Describe the first three jobs, and say how many others there are."""
     names = [f"{job.cell.label} on {job.cell.task.name}" for job in jobs[:3]]
     more = f" and {len(jobs) - 3} more" if len(jobs) > 3 else ""
     return f"{', '.join(names)}{more}"

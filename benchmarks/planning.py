@@ -1,4 +1,4 @@
-"""Plan a suite: make a job for each combination of a method, its parameters and a task."""
+"""Plan a suite: make a job for each method with parameters on each task."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _task_or_name(value: Any) -> Task | str:
 
 
 def _runs_asked(value: Any) -> int | range | None:
-    """Validate a number of runs, a range of numbers of runs with step 1, or None."""
+    """Validate a number of runs, a range with step 1, or None."""
     is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:
@@ -72,7 +72,7 @@ def _runs_asked(value: Any) -> int | range | None:
 
 
 class Request(FileData):
-    """What a command asks for: which tasks, methods and runs of a suite, and their limits."""
+    """What a command asks for: tasks, methods and runs of a suite, and limits."""
 
     tasks: tuple[Annotated[Any, PlainValidator(_task_or_name)], ...] = ()
     """Tasks to run: names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, paths of
@@ -122,7 +122,7 @@ def request_for(**options: Any) -> Request:
 
 
 def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
-    """Plan the runs of a suite, or of the part of it that the options select.
+    """Plan the runs of a suite, or those that the options select.
 
     Parameters
     ----------
@@ -352,7 +352,7 @@ def _world_of(request: Request) -> MotionModel:
 
 
 def _worlds_beside(jobs: Sequence[Job], request: Request) -> list[MotionModel]:
-    """Return the motion models of the methods and tasks that a request adds to a suite.
+    """Return the motion models for methods and tasks that a request adds.
 
     - If the request has a model, only that model is returned.
     - If the suite has no jobs, or has a job in the paper's world, only the paper's model is

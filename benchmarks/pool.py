@@ -1,4 +1,4 @@
-"""Perform jobs in worker processes on this machine, each with limits of CPU and wall time.
+"""Perform jobs in worker processes on this machine, with limits of CPU and wall time.
 
 Built-in methods share worker processes. Each method from a file has its own processes, so that it
 cannot break other methods. There are two limits:
@@ -231,7 +231,7 @@ class Local:
 
     @staticmethod
     def _replace_pool(group: _Group, running: dict[Future[Any], tuple[_Group, int, Job]]) -> None:
-        """Close the broken process pool of a group; the next job of the group starts a new pool.
+        """Close the broken process pool of a group; its next job starts a new one.
 
         The jobs of the broken pool that have no answer yet wait for the new pool. ``running`` is a
         dict that maps the future of each such job to its group, its number and the job. Raises
@@ -301,7 +301,7 @@ class _Group:
 
     @property
     def is_broken(self) -> bool:
-        """True if the pool has broken, so that it accepts no jobs and gives no answers."""
+        """True if the pool has broken: it accepts no jobs and gives no answers."""
         return self._pool is not None and not self._pool.active
 
     @property

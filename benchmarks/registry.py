@@ -1,4 +1,4 @@
-"""Look up methods by their ids: the built-in methods, and the methods of the user's files.
+"""Look up built-in methods, and methods of the user's files, by their ids.
 
 Method files are imported in separate processes (:mod:`coartic.benchmarks.method_files`).
 """

@@ -276,7 +276,7 @@ def perform(
 
 
 def _note_quickest(run: Row, quickest: dict[str, Row]) -> None:
-    """Enter a run into ``quickest`` if it is the quickest run of its method so far.
+    """Enter a run into ``quickest`` if it is the quickest of its method.
 
     ``quickest`` is a dict that maps the id of each method from a file to its quickest run. Runs
     that were the first of their method in a process count as slower than all other runs. Runs whose
@@ -298,7 +298,7 @@ def _repeat_runs(
     workers: int,
     tell: Callable[[Cell | None], None],
 ) -> None:
-    """Perform a run of each method from a file again, and mark the stored run if they differ.
+    """Perform a run of each method from a file again, and mark differences.
 
     Parameters
     ----------
@@ -368,7 +368,7 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs into smaller jobs for workers, and return these in the order of their start.
+    """Divide jobs into smaller jobs for workers, in the order of their start.
 
     - *Size.* A method that makes many runs side by side takes less time than for the same runs one
       by one. So a job has as many runs as the method allows (:meth:`.Method.max_batch`), but it

@@ -84,7 +84,7 @@ def _answer_of(outcome: Outcome) -> dict[str, list[Movement]]:
 
 
 def with_noise(runs: Sequence[Row]) -> list[Row]:
-    """Execute the solutions of runs 100 times each with motor noise, and add the mean ticks.
+    """Execute each solution 100 times with motor noise, and add the mean ticks.
 
     - In the paper's world, ``noisy_ticks`` is the mean number of ticks over the executions with
       motor noise 0.01, or None if one of them fails. The seed of the noise is the hexadecimal
@@ -145,7 +145,7 @@ def _number(value: float) -> float | None:
 
 
 def _final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
-    """Return the final status of a run, and the reason why the run is not ok.
+    """Return the final status of a run, and why the run is not ok.
 
     The status is
 

@@ -101,7 +101,7 @@ class Move(FileData):
 
 
 class _Block(FileData):
-    """A block of a suite: methods that are run on tasks, with a grid of parameters."""
+    """A block of a suite: methods on tasks, with a grid of parameters."""
 
     tasks: _Names
     """Names of tasks, paths of task files, or ranges of instances such as ``long/v1/i000..i039``.
@@ -219,7 +219,7 @@ def check_kind(name: str, *kinds: str) -> None:
 
 
 def suites() -> dict[str, Suite]:
-    """Read the shipped suites, and return a new dict that maps their names to the suites."""
+    """Read the shipped suites, and return a dict that maps names to suites."""
     return {path.stem: _read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 
@@ -266,7 +266,7 @@ def _read_suite(path: Path) -> Suite:
 
 @contextmanager
 def errors_of_block(suite: Suite, number: int) -> Iterator[None]:
-    """Add the name of a suite and the number of its block to errors of a ``with`` block.
+    """Add a suite's name and a block's number to errors of a ``with`` block.
 
     The message of each CoarticError begins with them. ``number`` counts the blocks from 1.
     """
@@ -311,7 +311,7 @@ def tasks_of(block: _Block, own: Collection[str], task_named: TaskNamed) -> Iter
 
 
 def _changed_tasks(task: Task, block: _Block) -> list[Task]:
-    """Return the tasks that take the place of a task in a block of a suite.
+    """Return the tasks that a block of a suite makes of a task.
 
     - With ``free_base`` the base is freed.
     - With ``move`` there is a task for each displacement of the goal.

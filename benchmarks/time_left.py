@@ -1,4 +1,4 @@
-"""Estimate how long the missing runs of a plan will take, from the times of earlier runs."""
+"""Estimate how long the missing runs of a plan will take."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class TimeLeft:
         self._lock = threading.Lock()
 
     def expect(self, jobs: Iterable[Job]) -> None:
-        """Set the runs that are still to be made: all runs of ``jobs``, and no others."""
+        """Set the runs that are still to be made to those of ``jobs``."""
         with self._lock:
             self._waiting.clear()
             for job in jobs:
@@ -137,7 +137,7 @@ def _kind_of(cell: Cell) -> _Kind:
 
 
 def _shipped_s(kind: _Kind) -> float:
-    """Return the expected time of a run of a kind on the machine of the shipped results (in s).
+    """Return the expected time of a run by the shipped results (in s).
 
     The time is the mean wall time of the shipped runs of the method on the task (on all tasks, if
     none are shipped for this one), in proportion to the number of trials. If no runs of the method
@@ -151,7 +151,7 @@ def _shipped_s(kind: _Kind) -> float:
 
 @cache
 def _shipped_means() -> Mapping[str, Mapping[str, float]]:
-    """Return a dict that maps methods to dicts that map tasks to mean wall times (in s).
+    """Return the mean wall times of shipped runs (in s), keyed by method, then task.
 
     The means are over the shipped runs in the paper's world with the default parameters.
     """

@@ -1,4 +1,4 @@
-"""Let a method solve a task in a worker process, and return the outcome as JSON.
+"""Let methods solve tasks in worker processes, and return the outcomes as JSON.
 
 A method can run any code. Therefore the parent process does not import method files. It checks the
 form of the outcome that the worker sends, and executes and scores the solution itself.
@@ -269,7 +269,7 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
 
 
 def _plain_details(details: Any) -> dict[str, Any]:
-    """Return a copy of the details of a result as plain data, by way of JSON.
+    """Return a copy of the details of a result as plain data.
 
     Raises TypeError, ValueError or RecursionError for details that JSON cannot represent, or whose
     JSON has more than 10,000,000 characters.

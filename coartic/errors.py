@@ -18,7 +18,7 @@ class SolutionError(CoarticError):
 
 
 class NotApplicableError(CoarticError):
-    """A method or an exploration condition does not apply to a task, or no hands are found.
+    """A method or condition does not apply to a task.
 
     For example, an exploration condition uses a hand that the task or the first solution does not
     have, or a search for the initial hands finds no sequence that completes the task.

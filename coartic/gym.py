@@ -76,7 +76,7 @@ trial."""
 
 
 class TaskEnv(gymnasium.Env):
-    """Environment in which a robot makes the trials of a task or of a family, one after another.
+    """Environment in which a robot makes trials of a task or family.
 
     - *Episode.* An episode is a trial. In each step the robot reaches for the next goal, so that a
       trial has at most as many steps as the task has goals. Trials are never truncated.

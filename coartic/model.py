@@ -96,7 +96,7 @@ class MotionModel(NamedTuple):
         return self if self.motor_noise == 0.0 else self._replace(motor_noise=0.0)
 
     def stored(self, radius: float) -> dict[str, Any]:
-        """Return a dict that maps the names of constants to their values, as stored in files.
+        """Return a dict that maps constants to values, as stored in files.
 
         Tolerances that are None are replaced by those for goals of ``radius`` (in length units).
         Constants of :data:`WORLD` that have the paper's value are left out, so that the ids of runs

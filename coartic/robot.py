@@ -61,7 +61,7 @@ class Arm(NamedTuple):
 
 
 def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
-    """Compute the positions of the shoulder, the joints and the hand of an arm, in place.
+    """Compute the positions of an arm's shoulder, joints and hand, in place.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class Robot:
 
     @cached_property
     def scale(self) -> float:
-        """Scale of drawings: length of the shorter arm, as a multiple of that of the paper's.
+        """Scale of drawings: length of the shorter arm as a multiple of the paper's.
 
         The paper's arms have length 4.
         """
@@ -432,7 +432,7 @@ class Robot:
 
 
 def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[Any]]:
-    """Return the x and the y of the shoulder, the joints and the hand of an arm, as two lists.
+    """Return lists of x and y of an arm's shoulder, joints and hand.
 
     The parameters are those of :func:`chain`.
     """

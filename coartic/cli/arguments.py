@@ -80,7 +80,7 @@ def ranged_option(option: str, what: str, least: float, most: float) -> Any:
 
 
 def parse_run_range(text: str) -> Any:
-    """Parse a number of runs, such as ``20``, or a range of runs, such as ``50..99``.
+    """Parse a number of runs, ``20``, or a range of runs, ``50..99``.
 
     A range includes both ends. Any other string is returned unchanged, and refused later by the
     plan. Raises CoarticError for a range whose second number is lower than the first.

@@ -91,7 +91,7 @@ def report(
 
 
 def say_ranking(study: Study, folder: Path) -> None:
-    """Print the ranking of each world of a study, and the command that writes a report.
+    """Print the ranking of each world, and the command for a report.
 
     Each ranking has the name of its world as a heading, unless the paper's world is the only one.
     ``folder`` is the results folder of the study.
@@ -456,7 +456,7 @@ def draw(
 def _film(
     folder: Path, run_ids: Sequence[str], out: Path, initial: bool, width: int, replace: bool
 ) -> None:
-    """Write a film that shows one or two runs of a results folder side by side.
+    """Write a film of one or two stored runs, side by side.
 
     Parameters
     ----------

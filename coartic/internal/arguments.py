@@ -23,7 +23,7 @@ _STRICT = ConfigDict(strict=True, arbitrary_types_allowed=True)
 
 
 class ArgumentError(CoarticError, ValueError, TypeError):
-    """An argument of a call is missing or unknown, or has a wrong type or value."""
+    """An argument is missing or unknown, or has a wrong type or value."""
 
 
 def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:

@@ -73,7 +73,7 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
-    """Make a folder if it is missing, and check that files can be written into it.
+    """Make a folder if it is missing, and check that it can be written.
 
     Parameters
     ----------

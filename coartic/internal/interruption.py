@@ -40,7 +40,7 @@ def catch_signals() -> None:
 
 @contextmanager
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
-    """Add a sentence to the final message of the program if a ``with`` block is interrupted.
+    """Add a sentence to the final message if a ``with`` block is interrupted.
 
     If the block raises KeyboardInterrupt, the function ``sentence`` is called for the sentence, and
     the error is raised again. :func:`end_if_interrupted` prints the message.

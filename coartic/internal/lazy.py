@@ -1,4 +1,4 @@
-"""Import the modules that define the names of a package only when a name is first used.
+"""Import the modules that define a package's names at first use.
 
 Numba and some other libraries are slow to import, and most commands do not need them.
 """

@@ -62,7 +62,7 @@ def threads_for(jobs: int) -> int:
 
 
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
-    """Divide a range of indices into slices, and call a function with each in its own thread.
+    """Call a function with slices of a range of indices, in parallel threads.
 
     The slices cover ``range(count)``. Their number is at most the environment variable
     ``OMP_NUM_THREADS`` or, if that is not set to a number, the number of cores that the process may

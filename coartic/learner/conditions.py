@@ -185,7 +185,7 @@ class ExplorationCondition:
 
     @property
     def drifts(self) -> tuple[float, ...]:
-        """The values of field ``drift`` (κ) as a tuple, also if it is a single number."""
+        """The values of field ``drift`` (κ) as a tuple, also for a single number."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     @property

@@ -160,7 +160,7 @@ class Results(NamedTuple):
 
 
 class _Workspace(NamedTuple):
-    """Work space of N runs, which are all at the same goal of the same trial."""
+    """Work space of N runs that are at the same goal of a trial."""
 
     batch: Batch
     counts: NDArray[np.int64]
@@ -518,7 +518,7 @@ def _copy_accounts(source: Any, destination: Any) -> None:
 def _learn_from(
     number: int, learner: LearnerParameters, tables: Any, results: Results, workspace: _Workspace
 ) -> None:
-    """Enter a trial of each run into the results, and learn from it if it was completed.
+    """Enter a trial of each run into the results, and learn from it.
 
     ``number`` is the number of the trial, from 0. For each state that a completed trial passed
     through and the hand that it chose there, the reward of the trial (or the return of the goal) is

@@ -241,7 +241,7 @@ def _learn_together(
     seeds: Sequence[int],
     trials: int,
 ) -> list[LearningRun]:
-    """Run the learner side by side for at most 72 seeds, without checks of the arguments.
+    """Run the learner side by side for at most 72 seeds, without checks.
 
     Return the runs in the order of seeds. ``initial`` has the movement for each goal in trial 0; if
     a movement has no target, only the corrective process acts at this goal. With ``trials`` 0 the

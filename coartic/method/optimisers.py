@@ -232,7 +232,7 @@ class Objective:
 
     @property
     def best_known(self) -> int | float | None:
-        """Lowest known cost of any solution of the task (in ticks), or None if none is known.
+        """Lowest known cost of a solution of the task (in ticks), or None.
 
         The solution may have any hand sequence, and may hit goals without a movement. With motor
         noise the cost is a mean. It is None if no such cost is shipped with coartic, as for

@@ -194,7 +194,7 @@ def execute_many(
 
 
 class Requested(NamedTuple):
-    """Requested movements of K solutions as arrays, at most M movements for each of G goals."""
+    """Requested movements of K solutions for G goals, as arrays."""
 
     hands: Hands
     """Shape ``(K, G)``, 0 left or 1 right."""

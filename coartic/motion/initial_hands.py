@@ -29,7 +29,7 @@ MAX_SEQUENCES = 4096  # largest number of hand sequences that are all tried
 def ranked_sequences(
     task: Task, sequences: Collection[str], *, model: MotionModel = PAPER
 ) -> list[tuple[str, int | None, str, dict[str, int]]]:
-    """Rank hand sequences by the reward of a trial in which only the corrective process acts.
+    """Rank hand sequences by the reward of the corrective process on its own.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Check hands, and return them as a tuple; return all hands of the task for None.
+    """Check hands and return them as a tuple; None stands for all hands.
 
     Raises ValueError if ``hands`` is empty or names a hand that the task does not have.
     """

@@ -113,7 +113,7 @@ def noise_draws(seeds: ArrayLike, draws: ArrayLike) -> NDArray[np.uint64]:
 
 
 def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> TrialRecords:
-    """Let N arms reach for G goals in order, and return the records of their trials.
+    """Let N arms reach for G goals in order, and return the records.
 
     An arm that misses a goal makes no movement for later goals. A trial with a target beyond
     :data:`MAX_ENTRY` fails without a movement; nothing else is checked. ``parameters`` come
@@ -322,7 +322,7 @@ _outside = 0
 
 
 def count_trials(count: int) -> None:
-    """Add to the number of trials that this process has made outside the sessions of runs.
+    """Add to the number of trials made outside the sessions of runs.
 
     All trials are added here when they are made. The session of a run then subtracts its own
     trials, with a negative ``count``. :func:`trials_outside` returns the number.
@@ -364,7 +364,7 @@ def reach_next(
     first: int,
     worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> TrialRecords:
-    """Let a robot go on with a trial: reach for some consecutive goals of a task.
+    """Continue a trial: let a robot reach for consecutive goals of a task.
 
     The trial is not counted.
 

@@ -226,7 +226,7 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return a dict that maps the parameters of a method to their defaults, as plain data.
+    """Return a dict that maps the parameters of a method to defaults.
 
     The value of a parameter without a default is None. Raises CoarticError for a default that is
     infinite or NaN.
@@ -239,7 +239,7 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 
 
 def _plain_parameters(method: type[Method], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a dict that maps the parameters of a method to their values, as plain data.
+    """Return a dict that maps parameters to values, as plain data.
 
     Raises CoarticError for a value with infinity or NaN, which JSON does not have.
     """

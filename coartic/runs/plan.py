@@ -72,7 +72,7 @@ class Cell:
 
     @cached_property
     def definition(self) -> dict[str, Any]:
-        """The task as plain data: a dict that maps its fields, such as ``goals``, to values."""
+        """The task as plain data: a dict that maps its fields to values."""
         return self.task.model_dump(mode="json")
 
     @cached_property
@@ -219,7 +219,7 @@ def reference_seed(suite_seed: int, task: str) -> int:
 
 
 def _seed_of(suite_seed: int, text: str, number: int) -> int:
-    """Derive a seed from 0 to 2^63 - 1 from another seed, a text and a number."""
+    """Derive a 63-bit seed from another seed, a text and a number."""
     words = np.frombuffer(hashlib.sha256(text.encode()).digest()[:16], dtype="<u4")
     sequence = np.random.SeedSequence(suite_seed, spawn_key=(*map(int, words), number))
     return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))

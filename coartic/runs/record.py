@@ -218,7 +218,7 @@ def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date
 
 
 def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
-    """Return a learner's numbers of corrections in trial 0 and in each tenth of later trials.
+    """Return a learner's corrections in trial 0 and each tenth of later trials.
 
     ``details`` are those of the run. The result is None if the corrections were not counted.
     """
@@ -230,7 +230,7 @@ def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
 
 
 def _practice_of(rewards: Sequence[int | None]) -> str:
-    """Return the mean ticks of the completed trials in each tenth of the trials, as JSON.
+    """Return the mean ticks in each tenth of the trials, as JSON.
 
     The JSON is a list of ten numbers, with null for a tenth without a completed trial.
     """

@@ -470,7 +470,7 @@ class Store:
                 yield run_id, _unpack(blob)
 
     def outdated_noise(self) -> list[list[str]]:
-        """Return the ids of the runs whose ticks follow another version of the rule of noise.
+        """Return the ids of runs whose ticks follow another rule of noise.
 
         Only runs of the plan with status ``ok`` are considered. The result has a list of ids for
         each cell with such runs.
@@ -714,7 +714,7 @@ def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
 
 
 def _add_columns(connection: sqlite3.Connection) -> None:
-    """Update a file of an older format: add the columns that it lacks, and replace its views."""
+    """Update a file of an older format: add columns, and replace views."""
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if version == FORMAT:
         return

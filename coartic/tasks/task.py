@@ -99,7 +99,7 @@ class Address(NamedTuple):
 
 
 def address_of(name: str) -> Address | None:
-    """Parse the name of an instance of a family; return None if the name has another form.
+    """Parse the name of an instance, or return None for another form.
 
     The number has at least three digits, without needless zeros: ``i017``, but not ``i0017``.
     Whether the family exists is not checked.
@@ -390,7 +390,7 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
 
 
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
-    """Return by how much a goal is out of the reach of a hand (in length units).
+    """Return how far a goal is out of a hand's reach (length units).
 
     The result is above 0 if the goal is out of reach, and otherwise at most 0. It is the difference
     between two distances: how far the goal's centre is outside the range of distances that the hand

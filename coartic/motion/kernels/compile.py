@@ -49,7 +49,7 @@ def python_files(*folders: str) -> list[Path]:
 
 
 def hash_of_files(files: Iterable[Path]) -> str:
-    """Return a hash of the names and contents of files: 16 hex digits of their SHA-256."""
+    """Return 16 hex digits of the SHA-256 of file names and contents."""
     texts = (path.name.encode() + b"\0" + path.read_bytes() for path in files)
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
 
@@ -163,10 +163,11 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 
 @intrinsic
 def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
-    """Return the signature and the code builder of a call that makes a NumPy generator in a kernel.
+    """Build the call that makes a NumPy generator in a kernel.
 
     The call makes the generator from the addresses of its state and its functions
-    (:func:`addresses`). As in every intrinsic of Numba, the arguments here are types of Numba.
+    (:func:`addresses`). As in every intrinsic of Numba, the arguments of this function are types of
+    Numba, and the result is a pair: the signature of the call, and a function that builds its code.
     """
     from numba.core import cgutils, types
 
@@ -382,7 +383,7 @@ class _MachineCode:
         self.lock: IO[bytes] | None = None  # held while this process compiles
 
     def load_overload(self, *signature: Any) -> Any:
-        """Return the machine code for a signature, or None if this process has to compile it.
+        """Return a signature's machine code, or None if it has to be compiled.
 
         If another process compiles the same code, this process waits for it
         (:meth:`wait_for_lock`). The first time that code is to be compiled, a message is logged.

@@ -83,7 +83,7 @@ def largest_square(length: float) -> float:
 
 @inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
-    """Return a lower bound of the number of steps until a hand can be in a disc.
+    """Return a lower bound of the steps until a hand can enter a disc.
 
     The bound is usually not an integer. It is 0 if the hand may be in the disc already.
 
@@ -167,7 +167,7 @@ def divide_steps(slots: SlotArrays, count: int, model: Any) -> bool:
 
 @inner
 def _place_between(slots: SlotArrays, count: int, step: float) -> None:
-    """Set ``q`` in the first ``count`` slots to the point of the movement at its present step.
+    """Set ``q`` in the first ``count`` slots to the present point of the movement.
 
     ``step`` is the length of a step in joint space.
     """
@@ -330,7 +330,7 @@ def _corner(run: RunRecord, waypoints: Any, k: int, j: int, noisy: bool) -> Any:
 def _sum_of_squares(
     run: RunRecord, waypoints: Any, k: int, entries: Any, noisy: bool, weight: float
 ) -> float:
-    """Return the sum of squares of the changes of some entries between two corners of a path.
+    """Return the squared distance over some entries between two corners of a path.
 
     The corners are ``k`` - 1 and ``k``. Base coordinates are multiplied by ``weight`` first.
     """
@@ -372,7 +372,7 @@ def _segment_length(run: RunRecord, waypoints: Any, k: int, model: Any) -> float
 
 @inner
 def follow(run: RunRecord, waypoints: Any, robot: RobotRecord, slots: SlotArrays) -> None:
-    """Move a run along a path, until its hand hits the goal or the path ends.
+    """Move a run along a path, until its hand hits or the path ends.
 
     ``waypoints`` has shape ``(W, dof)``. Point k of n = ceil(length / m) lies k m along the path;
     point n is the last waypoint. With noise, one displacement is drawn, and waypoint k of W is

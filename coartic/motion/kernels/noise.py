@@ -42,7 +42,7 @@ _LN_2 = math.log(2.0)
 
 @inner
 def hashed(word: Any, number: int) -> Any:
-    """Return the hash of a 64-bit word and an integer from 0, by a step of SplitMix64."""
+    """Hash a 64-bit word and an integer from 0 by SplitMix64."""
     mixed = word + _GOLDEN * (_WORD(number) + _WORD(1))
     mixed = (mixed ^ (mixed >> _30)) * _FIRST
     mixed = (mixed ^ (mixed >> _27)) * _SECOND

@@ -252,7 +252,7 @@ REQUESTED = len(Requests._fields)
 
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any) -> None:
-    """Let each arm reach for its goals, as many arms at a time as the batch has runs.
+    """Let each arm reach for its goals, a batch of arms at a time.
 
     ``goals``, ``counts`` and ``rewards`` are the entries of
     :class:`~coartic.motion.trials.TrialRecords`, filled in place; the caller sets ``counts`` to 0.

@@ -35,7 +35,7 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n
 
 @scalar
 def _reduced(angle: float) -> tuple[float, float, int]:
-    """Reduce an angle to a quarter turn, and return the sine and the cosine of what remains.
+    """Reduce an angle, and return sine and cosine of the remainder.
 
     The angle (in rad, |angle| < 1e5) is the sum of an integer number of quarter turns and a
     remainder from -π/4 to π/4. Return the sine and the cosine of the remainder, and the number of
