@@ -1,27 +1,28 @@
-"""A bandit over hand sequences, each with its own search over target configurations.
+"""UCB1 bandit over hand sequences, each with its own search over target configurations.
 
-UCB1 chooses the search that makes the next generation of trials; the value of a search is the best
-reward of its hand sequence so far. Each search starts from the postures in which the corrective
-process **A** on its own hits the goals; finding them takes one trial.
+The arms of the bandit are the hand sequences. Pulling an arm lets the search of this hand sequence
+make one generation of trials. The value of an arm is the best reward of its hand sequence so far.
+Each search starts from the postures in which the corrective process **A** on its own hits the
+goals; finding these postures takes one trial.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from coartic.baselines.uninformed import Attempts
-from coartic.method import Session
+from coartic.baselines.uninformed import Attempts, SequenceParameters
+from coartic.method import Result, Session
 from coartic.method.optimisers import sequences_of
 from coartic.motion.solution import Movement, movements_of
 from coartic.robot import Array
 
 
 class Search(ABC):
-    """Search over the targets of one hand sequence.
+    """Base class of the searches over the targets of one hand sequence.
 
     The constructor makes one trial, in which only the corrective process acts. If that trial fails,
     :attr:`reward` is -inf, and the search cannot make generations.
@@ -43,17 +44,26 @@ class Search(ABC):
         self.reward = float(corrective_trial.rewards[0])
         """Best reward so far; -inf if the corrective process does not complete the sequence."""
         self.first_mean: Array = corrective_trial.reached[0, attempts.explored]
-        """Explored joints of the postures of the corrective process, goal by goal, shape
-        ``(n,)``."""
+        """Explored joints of the postures in which the corrective process hit the goals, goal by
+        goal, shape ``(n,)``, in length units and rad."""
 
     def make_trials(self, values: Array) -> Array:
-        """Make the trials of a generation, and return their rewards; -inf for a failed trial.
+        """Make the trials of a generation, and return their rewards.
 
         Parameters
         ----------
         values : ndarray, shape (N, n)
-            Targets of the explored joints, goal by goal, in length units and rad. If fewer than N
-            trials are left, only the first ones are made; at least one must be left.
+            Targets of the n explored joints of all goals, goal by goal, in length units and rad.
+
+        Returns
+        -------
+        ndarray, shape (M,)
+            Rewards of the trials, -inf for a failed trial. If fewer than N trials are left, only
+            the first M are made.
+
+        Notes
+        -----
+        At least one trial must be left.
         """
         rewards = self._attempts.around(self.hand_sequence, values[: self._attempts.left]).rewards
         self.generations += 1
@@ -71,30 +81,95 @@ class Search(ABC):
     @property
     @abstractmethod
     def answer(self) -> tuple[float, Array]:
-        """Cost of the recommended mean, and that mean.
+        """Cost and targets that the search recommends.
 
-        - The cost is the mean cost of the last complete generation, in ticks. Without a complete
-          generation the cost is infinity.
-        - The mean has shape ``(n,)``, in length units and rad.
+        - The cost is the mean cost of the trials of a complete generation, in ticks. Without a
+          complete generation it is infinity.
+        - The targets are the mean of the search after that generation, shape ``(n,)``, in length
+          units and rad.
         """
 
 
-def sequences_to_try(session: Session, given: str | None) -> list[str]:
-    """Return the hand sequences that a bandit tries.
+def solve_by_bandit(
+    session: Session,
+    parameters: SequenceParameters,
+    make_search: Callable[[Attempts, str], Search],
+    exploration: float,
+) -> Result:
+    """Try each hand sequence once, then share the other trials between the sequences by UCB1.
 
-    - If ``given`` is a sequence, only that sequence is tried.
-    - Otherwise all hand sequences of the task are tried, if there are at most 4096.
-    - If there are more than 4096, only the task's initial sequence is tried.
+    1. For each hand sequence, ``make_search`` makes a search, which makes one trial in which only
+       the corrective process acts. A sequence whose trial fails gets no further trials.
+    2. Until no trial is left, UCB1 chooses the search that makes the next generation
+       (:func:`spend_trials`). If all trials of step 1 have failed, this step is left out.
+
+    All hand sequences of the task are tried, with two exceptions:
+
+    - If parameter ``sequence`` is given, only this sequence is tried.
+    - If the task has more than 4096 sequences, only the task's initial sequence is tried.
+
+    If fewer trials are left than there are sequences, the last sequences are not tried.
+
+    Parameters
+    ----------
+    session : Session
+        Session in which the trials are made and counted.
+    parameters : SequenceParameters
+        Parameters of the method; ``trials`` and ``sequence`` are used.
+    make_search : callable
+        Function that makes the search of a hand sequence. Its arguments are the Attempts of the run
+        and the hand sequence, such as ``"RRLR"``.
+    exploration : float
+        Constant c of UCB1, as a multiple of the range of the first rewards (at least 1 tick).
+
+    Returns
+    -------
+    Result
+        The movements of the best trial. With motor noise, the movements to the recommended mean
+        (:func:`recommend`). The details have ``best_trial``, the number of the best trial from 0,
+        and ``trials``, a dict that maps each hand sequence to its number of trials.
+
+    Raises
+    ------
+    MethodError
+        No trial is left to make, or no trial hits every goal.
+    NotApplicableError
+        No initial sequence is found where one is needed.
+    ValueError
+        Parameter ``sequence`` does not fit the task.
     """
-    return sequences_of(session) if given is None else [given]
+    attempts = Attempts(session, parameters.trials)
+    given = parameters.told_hands(session)
+    with session.solving():
+        sequences = sequences_of(session) if given is None else [given]
+        searches = [make_search(attempts, each) for each in sequences[: attempts.left]]
+        spend_trials(searches, attempts, exploration)
+    return attempts.result(
+        lambda: recommend(searches, attempts),
+        trials={search.hand_sequence: search.trials for search in searches},
+    )
 
 
 def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: float) -> None:
-    """Let searches make generations until no trial of ``attempts`` is left.
+    """Let UCB1 divide the remaining trials among searches, one generation at a time.
 
-    The next generation comes from the search with the highest upper confidence bound (UCB1). The
-    constant c of UCB1 is ``exploration`` times the range of the searches' first rewards (at least 1
-    tick). A search makes no generation if the corrective process failed with its hand sequence.
+    The next generation is made by the search with the highest upper confidence bound ::
+
+        R + c sqrt(2 ln(N) / n)
+
+    Here R is the best reward of the search so far, n is the number of its generations, N is the
+    number of generations of all searches, and c is ``exploration`` times the range of the first
+    rewards of the searches (at least 1 tick). The first trial of a search counts as a generation.
+    Searches whose first trial failed do not take part.
+
+    Parameters
+    ----------
+    searches : sequence of Search
+    attempts : Attempts
+        Trials of the run. The function returns when no trial is left, or if the first trials of all
+        searches have failed.
+    exploration : float
+        Constant of UCB1, as a multiple of the range of the first rewards.
     """
     promising = [search for search in searches if search.reward > -math.inf]
     rewards = [search.reward for search in promising] or [0.0]
@@ -111,9 +186,10 @@ def spend_trials(searches: Sequence[Search], attempts: Attempts, exploration: fl
 
 
 def recommend(searches: Iterable[Search], attempts: Attempts) -> tuple[Movement, ...]:
-    """Return movements to the recommended mean with the lowest cost (:attr:`Search.answer`).
+    """Return movements to the recommended targets with the lowest cost (:attr:`Search.answer`).
 
-    If no search has a complete generation, the mean of the best trial's hand sequence is returned.
+    If no search has a complete generation, the targets are those of the search whose hand sequence
+    is that of the best trial.
     """
     best = min(
         searches, key=lambda each: (each.answer[0], each.hand_sequence != attempts.hand_sequence)

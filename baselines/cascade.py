@@ -1,12 +1,12 @@
 """A cascade of two prioritised quadratic programmes over changes x of the joints.
 
-Level 1 meets an inequality task as nearly as damping allows::
+Level 1 finds the change x that violates an inequality task least, up to damping::
 
     min  s² + λ² |x|²     subject to   A x + s >= b,       |x_i| <= L
     s, x
 
-Level 2 finds the change x that is nearest to the preferred change z. The violation of the task may
-exceed the violation at the solution of level 1 by at most ε::
+Level 2 finds the change x that is nearest to the preferred change z. It may violate the task by at
+most ε more than the solution of level 1 does::
 
     min  |x - z|²         subject to   A x >= b - s⁺ - ε,  |x_i| <= L
      x
@@ -31,19 +31,20 @@ from coartic.method import MethodError
 from coartic.robot import Array
 
 DAMPING = 0.01
-"""λ, in length units per unit of change. Damping costs about 1e-4 of the task where the singular
-value of A is 1, and keeps changes small where the singular value is 0."""
+"""λ, in length units per unit of change. In directions in which the singular value of A is 1,
+damping leaves about 1e-4 of the task undone. In directions in which it is 0, damping keeps changes
+small."""
 
 LIMIT = 2.0
 """L, the largest absolute change of a joint."""
 
 SLACK = 1e-6
-"""ε, in length units. Without this slack, a single point may remain for level 2 where limits
-bind."""
+"""ε, in length units. Without this slack, the feasible set of level 2 could be a single point when
+the limits of the changes bind."""
 
 
 class Solution(NamedTuple):
-    """Solution of both levels."""
+    """Solution of both levels of the cascade."""
 
     changes: Array
     """Changes of the joints by both levels, shape ``(joints,)``."""

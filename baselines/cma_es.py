@@ -14,17 +14,18 @@ sequences, the method uses only the initial sequence. Then UCB1 chooses the stra
 next generation of trials; the value of a strategy is the best reward of its sequence so far. The
 exploration bonus of UCB1 is scaled by the range of the rewards of the first trials.
 
-``cma-es/goal-by-goal`` keeps a table with a value for each goal, hand at the goal before, and hand
-at this goal. The value is the best reward of the hand sequences tried so far that contain these two
-hands. The method chooses the hands of a sequence from the first goal to the last: the hand with the
-higher value, or a random hand with probability ε. When a sequence is chosen for the first time, the
-method makes one trial with only the corrective process. If that trial succeeds, each later choice
-of the sequence makes one generation of the sequence's own strategy.
+``cma-es/goal-by-goal`` keeps a value table keyed by goal, hand at the goal before, and hand at this
+goal. The value of an entry is the best reward of all hand sequences tried so far that have these
+two hands at these two goals. The method chooses the hands of a sequence from the first goal to the
+last: the hand with the higher value, or a random hand with probability ε. When a sequence is chosen
+for the first time, the method makes one trial with only the corrective process. If that trial
+succeeds, each later choice of the sequence makes one generation of the strategy of this sequence.
 
-With motor noise the best trial was partly lucky, so the answer is a mean of CMA-ES. The candidates
-are the last means of all restarts of all hand sequences. The answer is the candidate whose last
-complete generation has the lowest mean cost. In this mean cost a failed trial counts as twice the
-ticks of the corrective process.
+With motor noise the best trial was partly lucky, so the solution has the mean of a strategy as its
+targets. The candidates are the last means of all restarts of the strategies of all hand sequences.
+The solution is the candidate whose last complete generation has the lowest mean cost. In this mean
+cost a failed trial counts as twice the ticks that the corrective process takes with this hand
+sequence, or as 1 tick more than the worst completed trial of the generation, if that is larger.
 
 Tuning, with three or four runs for each value:
 
@@ -49,7 +50,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from coartic.baselines.bandit import Search, recommend, sequences_to_try, spend_trials
+from coartic.baselines.bandit import Search, recommend, solve_by_bandit
 from coartic.baselines.cma_strategy import EvolutionStrategy
 from coartic.baselines.uninformed import Attempts, SequenceParameters, UninformedParameters
 from coartic.method import Facts, Method, Result, Session
@@ -93,8 +94,9 @@ class Strategy(Search):
     def generation(self) -> None:
         """Make the trials of a generation, and update CMA-ES from their rewards.
 
-        If the generation is cut short because no trial is left, CMA-ES is not updated. If CMA-ES
-        has ended, it first restarts with twice the population.
+        If a stopping criterion of CMA-ES is met, the strategy first restarts from the first mean
+        with twice the population size. If fewer trials are left than the population size, only
+        these trials are made, and the strategy is not updated.
         """
         evolution = self.evolution
         if evolution is None or evolution.has_ended():
@@ -114,10 +116,11 @@ class Strategy(Search):
 
     @property
     def answer(self) -> tuple[float, Array]:
-        """Cost of the best restart, and the last mean of that restart.
+        """Cost of the best restart of CMA-ES, and the last mean of that restart.
 
-        The cost of a restart is the mean cost of its last complete generation, in ticks. Without a
-        complete generation the answer is infinity and the first mean, shape ``(n,)``.
+        The cost of a restart is the mean cost of its last complete generation (in ticks); the mean
+        has shape ``(n,)``, in length units and rad. Without a complete generation, the cost is
+        infinity, and the mean is the first mean.
         """
         return min(self._means, key=itemgetter(0))
 
@@ -134,31 +137,13 @@ class CMAES(Method):
     Parameters = BanditParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until none is left, and return the movements of the best trial.
+        """Solve the task with CMA-ES for each hand sequence (:func:`.solve_by_bandit`)."""
+        parameters: BanditParameters = self.parameters
 
-        In noise, return movements to a mean (:func:`recommend`).
+        def make_strategy(attempts: Attempts, hand_sequence: str) -> Strategy:
+            return Strategy(session, attempts, hand_sequence, parameters.sigma)
 
-        The method first makes one trial with each hand sequence, in which only the corrective
-        process acts. If all of these trials fail, the method stops. It uses only one sequence in
-        two cases:
-
-        - If parameter ``sequence`` is given, the method uses that sequence.
-        - If there are more than 4096 sequences, the method uses the task's initial sequence.
-
-        Raises MethodError if no trial hits every goal.
-        """
-        attempts = Attempts(session, self.parameters.trials)
-        told = self.parameters.told_hands(session)
-        with session.solving():
-            strategies = [
-                Strategy(session, attempts, hand_sequence, self.parameters.sigma)
-                for hand_sequence in sequences_to_try(session, told)[: attempts.left]
-            ]
-            spend_trials(strategies, attempts, self.parameters.exploration)
-        return attempts.result(
-            lambda: recommend(strategies, attempts),
-            trials={s.hand_sequence: s.trials for s in strategies},
-        )
+        return solve_by_bandit(session, parameters, make_strategy, parameters.exploration)
 
 
 class GoalByGoalParameters(UninformedParameters):
@@ -169,7 +154,7 @@ class GoalByGoalParameters(UninformedParameters):
 
 
 class GoalByGoal(Method):
-    """CMA-ES for each hand sequence; the hands are chosen goal by goal from a value table."""
+    """CMA-ES for each hand sequence, with hands chosen goal by goal from a value table."""
 
     name = "cma-es/goal-by-goal"
     version = 2
@@ -187,13 +172,13 @@ class GoalByGoal(Method):
     def solve(self, session: Session) -> Result:
         """Make trials, and return the movements of the best trial.
 
-        In noise, return movements to a mean (:func:`recommend`).
+        With motor noise, return movements to the recommended mean (:func:`recommend`). The method
+        stops in three cases:
 
-        The method stops if
-
-        - no trial is left;
-        - all hand sequences have failed;
-        - ``epsilon`` is 0 and a failed sequence is chosen again.
+        - No trial is left.
+        - The corrective process has failed with all hand sequences.
+        - ``epsilon`` is 0, and a hand sequence with which the corrective process has failed is
+          chosen again.
 
         Raises MethodError if no trial hits every goal.
         """

@@ -1,18 +1,18 @@
-"""CMA-ES with the same points as the package ``cma``, bit for bit, but faster.
+"""CMA-ES that draws the same points as the package ``cma``, bit for bit, but faster.
 
 The algorithm is that of N. Hansen (2016), The CMA evolution strategy: a tutorial
-(arXiv:1604.00772), with negative weights. Symbols are the tutorial's, and numbers in brackets are
-those of its equations. Constants, stopping criteria and the order of operations come from the
-package ``cma`` 4.5 with its default options, so that the points agree to the last bit. There are
-two differences:
+(arXiv:1604.00772), with negative weights. Symbols are those of the tutorial; numbers in round
+brackets are the numbers of its equations. Constants, stopping criteria and the order of operations
+are those of the package ``cma`` 4.5 with its default options, so that the points agree to the last
+bit. There are two differences:
 
-- The package mirrors some points of a generation with fewer than six points. This strategy does
-  not.
+- In a generation with fewer than six points, the package mirrors some of the points. This strategy
+  does not.
 - The package rescales the coordinates when the ratio of two variances exceeds 1e8 or the condition
   number of the covariance exceeds 1e12. This strategy stops instead.
 
-Weights are added from left to right, as ``sum`` adds them in Python 3.11 and earlier. The ``sum``
-of later versions of Python rounds differently.
+Weights are added from left to right, as the function ``sum`` does in Python 3.11 and earlier. In
+later versions of Python ``sum`` compensates rounding errors, and gives other bits.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ def _sum(weights: list[float]) -> float:
 
 
 class EvolutionStrategy:
-    """Evolution strategy with covariance matrix adaptation and an ask-and-tell interface.
+    """Evolution strategy with covariance matrix adaptation (CMA-ES), asked and told by the caller.
 
-    Until :meth:`has_ended` returns True, get points from :meth:`ask` and pass their costs to
-    :meth:`tell`.
+    In each generation, get points from :meth:`ask`, and pass the points and their costs to
+    :meth:`tell`. Stop when :meth:`has_ended` returns True.
 
     Parameters
     ----------
@@ -60,6 +60,15 @@ class EvolutionStrategy:
         Number λ of points in a generation.
     rng : numpy.random.Generator
         Generator of all random numbers.
+
+    Examples
+    --------
+    >>> strategy = EvolutionStrategy(np.ones(3), 0.5, 8, np.random.default_rng(0))
+    >>> while not strategy.has_ended():
+    ...     points = strategy.ask()
+    ...     strategy.tell(points, (points**2).sum(axis=1))
+    >>> bool(np.abs(strategy.mean).max() < 1e-4)
+    True
     """
 
     def __init__(self, mean: Array, sigma: float, size: int, rng: np.random.Generator) -> None:
@@ -152,6 +161,7 @@ class EvolutionStrategy:
         Returns
         -------
         ndarray, shape (size, dim)
+            The points, one in each row.
         """
         if self._generation >= self._decomposed_at + self._lazy_gap:
             self._C = (self._C + self._C.T) / 2
@@ -217,7 +227,10 @@ class EvolutionStrategy:
             self._moved_to, self._moved_at = self._mean, self._generation
 
     def _note_costs(self, costs: Array) -> None:
-        """Enter the costs of a generation into the histories of the stopping criteria."""
+        """Add the costs of a generation to the histories that the stopping criteria use.
+
+        ``costs`` has shape ``(size,)``, in the order in which the points were drawn.
+        """
         least = int(np.argmin(costs))
         if costs[least] < self._best:
             self._best, self._best_point = float(costs[least]), self._generation * self.size
@@ -267,7 +280,7 @@ class EvolutionStrategy:
         )
 
     def _stagnates(self) -> bool:
-        """Return whether neither the best nor the median cost has improved for many generations."""
+        """Return whether best and median costs have not improved for many generations."""
         entries = len(self._long_best)
         recent = int(max(self._patience / 10, entries / 10))
         evaluations = self._generation * self.size

@@ -1,9 +1,11 @@
 """Controllers of a hand by prioritised quadratic programmes, and the search over hand sequences.
 
 A controller makes control steps of at most ``period`` ticks until the hand is in its goal. The
-cascade (:mod:`coartic.baselines.cascade`) computes each step: level 1 moves the hand, and level 2
-chooses among the joint changes that do so. The search is best-first over prefixes of hand
-sequences: it extends the prefix with the fewest ticks by the next goal.
+cascade (:mod:`coartic.baselines.cascade`) computes each control step: level 1 moves the hand, and
+level 2 chooses among the joint changes that move the hand in this way.
+
+Best-first search over prefixes of hand sequences finds the best hand sequence. A priority queue
+holds the prefixes by their ticks; the prefix with the fewest ticks is extended by the next goal.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ class Aim(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A simulated path to a goal, from the start or from the goal before."""
+    """A simulated movement to a goal from the start or the goal before."""
 
     movement: Movement
     """Movement of kind ``path`` to the goal."""
@@ -49,8 +51,7 @@ class Leg(NamedTuple):
     q: Array
     """Configuration in which the hand hits the goal, shape ``(dof,)``."""
     memory: Any
-    """Memory of the controller after the last control step; the next leg begins with this
-    memory."""
+    """State of the controller after the last control step; the next leg begins with it."""
     steps: NDArray[np.int64]
     """Numbers of control steps, shape ``(3,)``:
 
@@ -61,15 +62,16 @@ class Leg(NamedTuple):
 
 
 class _StuckError(Exception):
-    """Raised if a hand cannot reach its goal, or no longer comes nearer to its goal."""
+    """A hand cannot reach its goal, or no longer comes nearer to its goal."""
 
 
 @dataclass
 class Controller(ABC):
-    """Simulate the control of a hand on a task.
+    """Base class of controllers, which move a simulated robot to goals.
 
-    *Joints* are the entries of a configuration that are not locked, base coordinates among them.
-    The session counts evaluations and iterations.
+    In this class *joints* are all entries of a configuration that are not locked: base coordinates
+    and joint angles. The session counts the evaluations of the kinematics and the iterations of the
+    solver.
     """
 
     session: Session
@@ -90,7 +92,8 @@ class Controller(ABC):
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Any) -> Any:
         """Return the memory with which the controller begins a leg.
 
-        The memory is data that the controller passes from step to step.
+        The memory is any data that the controller passes from one control step to the next, such as
+        postures that it has found.
 
         Parameters
         ----------
@@ -122,7 +125,8 @@ class Controller(ABC):
         Returns
         -------
         Solution
-            Solution of the cascade. Its changes are in lengths of a control step.
+            Solution of the cascade. The unit of its changes is ``length``, the largest joint-space
+            length of a control step.
         ndarray, shape (joints,)
             Preferred changes of the joints, in the same unit.
         object
@@ -135,14 +139,21 @@ class Controller(ABC):
         Parameters
         ----------
         before : Leg or None
-            The leg before, from whose end the simulation begins; None to begin at the task's start.
+            The leg to the goal before, at whose end the simulation begins; None to begin at the
+            start of the task.
         aims : tuple of Aim
             Goal of the leg with its hand, then the goals ahead with theirs.
+
+        Returns
+        -------
+        Leg
+            The movement to the goal, its ticks, and where it ends.
 
         Raises
         ------
         _StuckError
-            The hand does not reach its goal.
+            The goal is out of reach, or the hand comes less than a tenth of a control step nearer
+            to the goal in 50 control steps.
         MethodError
             The solver fails.
         """
@@ -184,7 +195,10 @@ class Controller(ABC):
         return Leg(movement, followed.ticks, followed.q, memory, steps)
 
     def solve(self, rows: Array, least: Array, preferred: Array) -> Solution:
-        """Solve the cascade by :func:`solve_cascade`; count the programmes and the iterations."""
+        """Solve the cascade, and count the programmes and the iterations of the solver.
+
+        Parameters, returned values and errors are those of :func:`solve_cascade`.
+        """
         solution = solve_cascade(rows, least, preferred)
         self.solves += 2
         self.session.spend(solver_iterations=solution.iterations)
@@ -193,7 +207,7 @@ class Controller(ABC):
     def error(self, q: Array, aim: Aim) -> Array:
         """Return the vector from a hand to the centre of its goal.
 
-        The session counts an evaluation.
+        The session counts one evaluation of the forward kinematics.
 
         Parameters
         ----------
@@ -212,9 +226,10 @@ class Controller(ABC):
         )
 
     def add(self, q: Array, change: Array) -> Array:
-        """Return a copy of configuration ``q``, ``(dof,)``, changed by ``change``, ``(joints,)``.
+        """Return a copy of a configuration with a change of its joints added.
 
-        The base coordinates are in length units, the angles in rad.
+        ``q`` and the result have shape ``(dof,)``, ``change`` has shape ``(joints,)``; all are in
+        length units (base) and rad (angles).
         """
         result = q.copy()
         result[self.moving] += change
@@ -244,15 +259,19 @@ class Control(Method):
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
-        """Find the hand sequence that takes the controller the fewest ticks.
+        """Find the hand sequence with which the controller takes the fewest ticks.
 
-        The search is best-first over prefixes of hand sequences. It extends the prefix with the
-        fewest ticks by the path to the next goal, until the prefix with the fewest ticks is a
-        complete sequence. Ties are broken by the smaller number of changes of hand, then by the
-        order of the sequences. The result has a movement for each goal; the details have the counts
-        of the search.
+        The search is best-first over prefixes of hand sequences, with a priority queue. The prefix
+        with the fewest ticks is extended by the movement to the next goal, until the prefix with
+        the fewest ticks is a complete sequence. Ties are broken by the smaller number of changes of
+        hand, then by the order of the sequences. Hand sequences with a common prefix share the
+        simulation of their movements, as far as they also agree in the hands of the goals ahead.
 
-        Raises MethodError if the hand gets stuck in all sequences, or the solver fails.
+        The result has a movement for each goal. The details have the numbers of hand sequences, of
+        sequences in which a hand got stuck, of simulated movements, of quadratic programmes, and of
+        control steps, and in how many control steps each level binds.
+
+        Raises MethodError if a hand gets stuck in all sequences, or if the solver fails.
         """
         task = session.reveal(Information.GOALS, Information.FORWARD_KINEMATICS)
         controller = self.controller(session, task, self.parameters.period)

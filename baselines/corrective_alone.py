@@ -1,8 +1,8 @@
 """The corrective process alone, with the task's hands or with the best hands.
 
-The best hands come from the paper's exhaustive strategy (section *Exploration Condition 3*). This
-strategy tries all 2^G hand sequences for G goals. The corrective process **A** chooses each target,
-and nothing else is explored.
+The best hands come from the paper's exhaustive strategy (section *Exploration Condition 3*), which
+tries all 2^G hand sequences for G goals and two hands. The corrective process **A** finds each
+target; nothing else is explored.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class GivenHands(Method):
     def solve(self, session: Session) -> Result:
         """Make one trial with the task's initial hands, and return the movements of the trial.
 
-        Raises MethodError if the trial misses a goal.
+        Only the corrective process acts in the trial. Raises MethodError if it misses a goal.
         """
         hands = session.find_initial_hands()
         with session.solving():
@@ -52,10 +52,11 @@ class BestHands(GivenHands):
         return task.too_many_sequences
 
     def solve(self, session: Session) -> Result:
-        """Make a trial for each hand sequence, and return the movements of the best trial.
+        """Make a trial with each hand sequence, and return the movements of the best trial.
 
-        The method stops early if the trial budget is used up. Of trials with equal rewards, the
-        trial with the fewest changes of hand is best.
+        The sequences are tried in alphabetical order, until the trial budget is used up. The best
+        trial is the one with the highest reward; among trials with equal rewards it is the one with
+        the fewest changes of hand.
 
         Raises MethodError if no trial hits every goal.
         """

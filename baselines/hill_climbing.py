@@ -1,16 +1,17 @@
-"""Hill climbing: Gaussian noise and random hands, with a (1+1) climber for each hand sequence.
+"""Hill climbing: a (1+1) search with Gaussian noise for each hand sequence, and random hands.
 
-Each hand sequence has a centre. In the first trial of a sequence only the corrective process **A**
-acts (parameter ``begin`` can change this). The configurations in which this trial hits the goals
-are the first centre. The targets of each later trial are the centre plus noise on all explored
-joints. If a trial is better than the centre, the configurations in which the trial hit the goals
-become the new centre, as in the learner. Taking the trial's targets as the new centre would gain
-more: on the paper's tasks random search with 1,000 ``stages`` gains 0 to 16 ticks more with
-targets.
+Each hand sequence has a centre: a configuration for each goal. In the first trial of a sequence
+only the corrective process **A** acts (parameter ``begin`` can change this). The configurations in
+which this trial hits the goals are the first centre. The targets of each later trial are the centre
+plus Gaussian noise on all explored joints. If the reward of a trial is higher than that of the
+centre, the configurations in which the trial hit the goals become the new centre, as in the
+learner. The method would gain more if the targets of the trial became the new centre: on the
+paper's tasks, random search with 1,000 ``stages`` gains 0 to 16 ticks more with targets than with
+these configurations.
 
-Hands are explored as in the learner: for each goal of the best sequence known, with probability ε,
-a random hand replaces the hand. The default standard deviation and ε are the learner's; they were
-not tuned.
+Hands are explored as in the learner: the hands of a trial are those of the best sequence known,
+except that at each goal, with probability ε, a random hand takes the place of the hand. The default
+standard deviation and ε are the learner's; they were not tuned.
 
 With ``spread="learned"`` each hand sequence has its own standard deviation σ, which follows the
 one-fifth rule (Beyer and Schwefel 2002). A trial succeeds if it is at least as good as the centre
@@ -20,8 +21,8 @@ around which it was drawn. After every W trials with the sequence
 - otherwise σ is divided by 1.5^(1/4);
 - σ is then clipped to the interval from ``floor`` to 0.3.
 
-With motor noise the value of a centre is the reward of one trial, the trial that made this centre.
-That trial was partly lucky. The learner has the same bias.
+With motor noise the value of a centre is the reward of a single trial: the trial whose
+configurations became the centre. That trial was partly lucky. The learner has the same bias.
 """
 
 from __future__ import annotations
@@ -85,10 +86,10 @@ class HillClimbing(Method):
     Parameters = HillClimbingParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until none is left or all hand sequences have failed.
+        """Make trials until none is left, and return the movements of the best trial.
 
-        Return the movements of the best trial. With motor noise, return movements to the present
-        centre of the best trial's hand sequence.
+        With motor noise, return movements to the last centre of the hand sequence of the best
+        trial. The method stops early if the corrective process has failed with all hand sequences.
 
         Raises MethodError if no trial hits every goal.
         """
@@ -107,10 +108,11 @@ class HillClimbing(Method):
         hopeless: set[str] = set()  # sequences that the corrective process does not complete
 
         def draw() -> str:
-            """Draw a hand sequence that is not hopeless.
+            """Draw a hand sequence with which the corrective process has not failed.
 
-            Its hands are random before the first success. Later they are the hands of the best
-            trial, each replaced by a random hand with probability 0.2.
+            Before the first success all hands are random. Later they are the hands of the best
+            trial, except that at each goal, with probability 0.2, a random hand takes the place of
+            the hand.
             """
             if given is not None:
                 return given
@@ -123,7 +125,10 @@ class HillClimbing(Method):
                     return hand_sequence
 
         def adapt(hand_sequence: str, is_good: bool) -> None:
-            """Count a trial of a hand sequence, and follow the one-fifth rule."""
+            """Count a trial with a hand sequence, and adapt its spread by the one-fifth rule.
+
+            ``is_good`` is True if the trial is at least as good as its centre.
+            """
             since[hand_sequence] += 1
             good[hand_sequence] += is_good
             if since[hand_sequence] == window:

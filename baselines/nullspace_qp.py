@@ -1,25 +1,29 @@
 """Prioritised null-space control by quadratic programmes: the hand first, then the joints.
 
-At each control step level 1 of the cascade (:mod:`coartic.baselines.cascade`) moves the hand
+At each control step, level 1 of the cascade (:mod:`coartic.baselines.cascade`) moves the hand
 straight towards the centre of its goal. Many joint changes x move the hand in this way; they differ
-by motion in the null space of the hand's Jacobian J. Level 2 chooses one of these changes. Level 1
-is::
+by motion in the null space of the hand's Jacobian J. Level 2 chooses one of these joint changes.
+The task of level 1 is::
 
     J x = v J J⁺ u,  that is  A = (J; -J),  b = A v J⁺ u,      v = min(1 / |J⁺ u|, d)
 
 Here u is the unit vector from the hand to the centre, d is the distance from the hand to the
-centre, and v is the speed of the hand. The unit of length is the length of a control step. The
-speed v is the speed of the minimum-norm solution, but at most d. If the solution of level 2 is
-longer than a control step, it is scaled down to the length of a control step: the hand still goes
-straight, but slower.
+centre, and v is the speed of the hand. Lengths are in units of the largest joint-space length of a
+control step. The speed v is that of the minimum-norm change of length 1 in the direction u, but at
+most d, with which the hand would arrive at the centre. If the change that level 2 chooses is longer
+than 1, it is scaled down to length 1: the hand still goes straight, but slower.
 
-Level 2 chooses the x that is nearest to
+Level 2 chooses the joint change x that is nearest to a preferred change:
 
-- 0 in ``least-motion``, so that x is almost v J⁺ u;
-- a step towards a posture of the next goal in ``next-goal-posture``. The step is the change to that
-  posture divided by the number of control steps to the goal, but no longer than a control step.
-  When a goal becomes current, the corrective process finds the posture of the next goal from the
-  robot's configuration.
+- ``least-motion``: the preferred change is 0, so that x is almost the minimum-norm change v J⁺ u.
+- ``next-goal-posture``: the preferred change is a step towards a posture of the next goal. The step
+  is the difference between that posture and the present configuration, divided by the number of
+  control steps to the current goal, but no longer than a control step. When a goal becomes current,
+  the corrective process finds the posture of the next goal, starting from the configuration of the
+  robot.
+
+Where neither the limits of the joint changes nor damping matter, this is the null-space projection
+x = v J⁺ u + (I − J⁺ J) z of the preferred change z.
 
 Sources: Y. Nakamura, H. Hanafusa, T. Yoshikawa (1987), Task-priority based redundancy control of
 robot manipulators; O. Kanoun, F. Lamiraux, P.-B. Wieber (2011); with the next goal as the objective
@@ -39,8 +43,8 @@ from coartic.robot import Array
 class HandController(Controller):
     """Move the hand straight towards its goal with the least joint changes.
 
-    Controllers that prefer other joint changes are subclasses. The memory is a configuration, shape
-    ``(dof,)``.
+    Controllers that prefer other joint changes are subclasses, which override :meth:`preferred`.
+    The memory is a configuration, shape ``(dof,)``.
     """
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
@@ -67,7 +71,7 @@ class HandController(Controller):
         return solution, preferred, memory
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the preferred joint changes of a control step, which are 0 in this class.
+        """Return the preferred joint changes of a control step: 0 in this class.
 
         Parameters
         ----------
@@ -81,7 +85,7 @@ class HandController(Controller):
         Returns
         -------
         ndarray, shape (joints,)
-            Changes in lengths of a control step.
+            Preferred changes, in units of the largest joint-space length of a control step.
         """
         return np.zeros(len(self.moving))
 
@@ -89,16 +93,16 @@ class HandController(Controller):
 class NextGoalController(HandController):
     """Move the hand straight towards its goal, and the joints towards the next goal's posture.
 
-    The hand goes first: the joints change only as far as its movement allows. The memory is the
-    posture, shape ``(dof,)``.
+    The movement of the hand has priority: the joints move towards the posture only as far as the
+    movement of the hand allows. The memory is the posture, shape ``(dof,)``.
     """
 
     def begin(self, q: Array, aims: tuple[Aim, ...], memory: Array | None) -> Array:
-        """Find a posture for the next goal, shape ``(dof,)``, and return it as the memory.
+        """Find a posture of the next goal, shape ``(dof,)``, and return it as the memory.
 
         The corrective process starts from ``q`` and tries the goals ahead in order. The memory is
         the posture of the first goal for which the process converges, or ``q`` if it converges for
-        none.
+        none of them.
         """
         for hand, goal in aims[1:]:
             correction = self.session.correct(q, hand, goal + 1)
@@ -107,17 +111,18 @@ class NextGoalController(HandController):
         return q
 
     def preferred(self, q: Array, memory: Array, steps: float) -> Array:
-        """Return the change from ``q`` to the posture ``memory``, divided by the steps to the goal.
+        """Return the change towards the posture that is due in one control step.
 
-        The divisor is ``max(steps, 1)``. A change with a norm above 1 is scaled to norm 1. Shapes
-        and units are those of the base class.
+        This is the change from ``q`` to the posture ``memory``, divided by the number of control
+        steps to the goal (at least 1). A change with a norm above 1 is scaled down to norm 1.
+        Parameters, shapes and units are those of :meth:`HandController.preferred`.
         """
         path = (memory - q)[self.moving] / self.length
         return np.asarray(path / max(steps, float(np.linalg.norm(path)), 1.0))
 
 
 class LeastMotion(Control):
-    """Null-space control with the least joint changes."""
+    """Null-space control in which the joints change as little as possible."""
 
     name = "nullspace-qp/least-motion"
     version = 2

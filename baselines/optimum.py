@@ -1,27 +1,33 @@
-"""The search for the optimum, the best reward that a global search finds.
+"""The search for the optimum: the best reward that a global search finds.
 
-A trial loses reward in proportion to the length of its path in joint space. So this method
-searches, over hand sequences, for the shortest path that touches the discs of all goals in their
-order. The starts of the search are the shortest paths through posture graphs, which dynamic
-programming finds. The method then rounds the best plans to whole control ticks. In some roundings a
-goal takes no movement, because the hand is already inside the goal when its turn comes.
+A trial without motor noise loses reward in proportion to the length of its path in joint space. So
+``optimum/search`` searches, over all hand sequences, for the path that touches the discs of all
+goals in their order and is shortest in the Euclidean norm:
+
+1. Dynamic programming finds the shortest paths through graphs of sampled postures
+   (:mod:`coartic.baselines.posture_graph`).
+2. IPOPT shortens each of these paths to a local minimum
+   (:mod:`coartic.baselines.trajectory_problem`).
+3. The best paths are rounded to whole control ticks (:mod:`coartic.baselines.whole_ticks`). In some
+   roundings there is no movement to a goal, because the hand is already inside the goal when the
+   goal becomes current.
 
 The method is the reference for the gaps of all other methods, not a competitor. The study
-``studies/optima`` proves bounds on the optima.
+``studies/optima`` proves bounds on the optima. ``trajectory-optimisation/path-length`` searches for
+the same paths from other graphs and starts.
 
-``trajectory-optimisation/path-length`` searches for the same paths from other graphs and starts.
-
-With motor noise the shortest path is not the best solution, and in the maximum norm it is not even
-the shortest. ``optimum/in-model`` searches in any motion model: CMA-ES varies the targets to
-minimise the mean ticks. CMA-ES runs from two starts:
+``optimum/in-model`` searches in any world. With motor noise the shortest path is not the best
+solution; and in the maximum norm, the path that is shortest in the Euclidean norm is not the
+shortest. So CMA-ES varies the targets of the movements to minimise the mean ticks, from two starts:
 
 - the path that ``optimum/search`` finds (in the maximum norm with Euclidean lengths);
-- the postures of the corrective process with its best hands.
+- the postures that the corrective process reaches with its best hands.
 
-With motor noise, all solutions of a generation are executed with the same 100 noise draws, and
-each generation has new draws. The start and the results of each search are then compared on 1,000
-draws that no generation has used. The solution with the fewest mean ticks on these draws is the
-best known solution in this model; nothing proves that it is the optimum.
+With motor noise, all solutions of a generation are executed with the same 100 noise draws (*common
+random numbers*), and each generation has new draws. The start and the results of each search are
+then compared on 1,000 draws with another noise seed, which no generation has used. The solution
+with the fewest mean ticks on these draws is the best known solution in this world; nothing proves
+that it is the optimum.
 """
 
 from __future__ import annotations
@@ -71,7 +77,7 @@ MAX_KEPT = 64  # hand sequences whose shortest paths are stored with the solutio
 
 
 class OptimumParameters(Parameters):
-    """Parameters: restrictions of the movements, and effort of the search."""
+    """Parameters of the search for the optimum: restrictions of movements, and effort."""
 
     other_arm: Literal["free", "still"] = "free"
     """``"still"`` if the arm whose hand is not chosen for a goal must not move on the way to the
@@ -80,12 +86,14 @@ class OptimumParameters(Parameters):
     """Base coordinates to lock in addition to the task's own locks: ``"y"``, ``"xy"``, or
     ``"task"`` for none."""
     nodes: Nodes = 200
-    """Largest number of postures in a graph for each pair of goal and hand."""
+    """Number of postures that are sampled in a graph for each pair of goal and hand."""
     graphs: Count = 3
-    """Least number of independent graphs. More graphs are made until there are enough chains."""
+    """Smallest number of independent posture graphs. More graphs are made until there are
+    ``chains`` chains."""
     chains: Count = 100
-    """Least number of chains, over all graphs and hand sequences. With three chains the search
-    missed the best known path on 9 of 40 random tasks for one arm."""
+    """Smallest number of chains (paths through a graph) from which IPOPT starts, over all graphs
+    and hand sequences. With three chains the search missed the best known path on 9 of 40 random
+    tasks for one arm."""
 
 
 class OptimumSearch(Method):
@@ -103,12 +111,11 @@ class OptimumSearch(Method):
     quick = QUICK
 
     def solve(self, session: Session) -> Result:
-        """Search for the movements with the fewest ticks.
+        """Search for the movements with the fewest ticks, and return them.
 
-        At most 64 hand sequences are searched in each graph.
-
-        Raises MethodError if no movements that hit every goal are found, or the locks of the base
-        make the task invalid.
+        In each posture graph, at most 64 hand sequences are searched, which a beam search selects.
+        Raises MethodError if no movements that hit every goal are found, or if the task is not
+        valid with the locks of parameter ``base``.
         """
         parameters: OptimumParameters = self.parameters
         still = parameters.other_arm == "still"
@@ -146,18 +153,23 @@ class OptimumSearch(Method):
 
 
 def with_locks(task: Task, base: str) -> Task:
-    """Return a task with further base coordinates locked.
+    """Return a task in which further base coordinates are locked.
 
     Parameters
     ----------
     task : Task
     base : {"task", "y", "xy"}
-        Coordinates to lock; ``"task"`` for none.
+        Coordinates to lock in addition to the task's own; ``"task"`` for none.
+
+    Returns
+    -------
+    Task
+        The task itself for ``"task"``, otherwise a copy.
 
     Raises
     ------
     MethodError
-        The task with these locks is not valid.
+        The task with these locks is not valid, for example because a goal is out of reach.
     """
     if base == "task":
         return task
@@ -170,12 +182,14 @@ def with_locks(task: Task, base: str) -> Task:
 
 
 class InModelParameters(Parameters):
-    """Parameters: effort of the search in any motion model."""
+    """Parameters of the search for the optimum in any motion model: its effort."""
 
     evaluations: Annotated[int, Field(ge=0)] = 4000
-    """Number of solutions that CMA-ES tries from each start; the last generation is completed."""
+    """Number of solutions that CMA-ES tries from each start. The last generation is completed, so
+    that the number can be slightly larger."""
     executions: Annotated[int, Field(ge=1, le=10_000)] = 100
-    """Number of executions of each solution in noise; ten times as many judge it in the end."""
+    """With motor noise, the number of executions of each solution that CMA-ES tries. The start and
+    the results of each search are compared over ten times as many executions."""
     nodes: Nodes = 200
     graphs: Count = 3
     chains: Count = 100
@@ -194,7 +208,7 @@ class _Start(NamedTuple):
 
 
 class InModel(Method):
-    """Search for the solution with the fewest mean ticks in any motion model, noisy or not."""
+    """Search for the solution with the fewest mean ticks in any motion model."""
 
     name = "optimum/in-model"
     tuned_on = "ascending and two-armed-2: two step sizes"
@@ -215,10 +229,12 @@ class InModel(Method):
     def solve(self, session: Session) -> Result:
         """Search from both starts, and return the movements with the fewest mean ticks.
 
-        The details have, for each start, its hands and two mean ticks over the judging draws:
-        ``start``, of the start itself, and ``end``, of the best solution found from it.
+        The details map the name of each start to a dict with its hand sequence (``hands``) and two
+        mean ticks over the noise draws of the final comparison: those of the start itself
+        (``start``), and those of the best solution that was found from it (``end``).
 
-        Raises MethodError if no path is found and the corrective process completes no sequence.
+        Raises MethodError if ``optimum/search`` finds no path, and the corrective process completes
+        the task with no hand sequence.
         """
         task, noise = session.reveal(*self.information), session.model.motor_noise
         executions = self.parameters.executions if noise else 1
@@ -249,9 +265,9 @@ class InModel(Method):
         return Result(movements, details)
 
     def _path(self, session: Session, task: Task) -> _Start | None:
-        """Return the shortest path of ``optimum/search``, or None if it finds none.
+        """Return the solution of ``optimum/search`` as a start, or None if it finds none.
 
-        In the maximum norm, lengths are Euclidean.
+        The search measures lengths in the Euclidean norm, whatever the norm of the session's model.
         """
         effort = self.parameters.model_dump(include={*OptimumParameters.model_fields})
         model = session.model._replace(norm=PAPER.norm)
@@ -271,9 +287,10 @@ class InModel(Method):
 
 
 def _postures(session: Session, task: Task) -> _Start | None:
-    """Return the postures of the corrective process with its best hands (:func:`.best_hands`).
+    """Return the postures of the corrective process with its best hands as a start.
 
-    The result is None if the process does not complete the task.
+    The hands are those of :func:`.best_hands`. The result is None if the process completes the task
+    with no hand sequence.
     """
     best = best_hands(task, session.model)
     if best is None:
@@ -290,18 +307,25 @@ def _postures(session: Session, task: Task) -> _Start | None:
 
 
 def with_entries(targets: Configs, points: Array) -> Configs:
-    """Return N copies of targets, in which the entries that are not NaN are replaced.
+    """Return N copies of targets in which all entries that are not NaN are replaced.
 
     Parameters
     ----------
     targets : ndarray, shape (G, dof)
-        Targets, of which n entries are not NaN.
+        Targets; n of their entries are not NaN.
     points : ndarray, shape (N, n)
-        For each copy, the values of these n entries, goal by goal.
+        For each copy, the new values of these n entries, goal by goal.
 
     Returns
     -------
     ndarray, shape (N, G, dof)
+        The copies.
+
+    Examples
+    --------
+    >>> with_entries(np.array([[1.0, np.nan], [2.0, 3.0]]), np.array([[7.0, 8.0, 9.0]]))
+    array([[[ 7., nan],
+            [ 8.,  9.]]])
     """
     copies = np.repeat(targets[None], len(points), axis=0)
     copies[:, ~np.isnan(targets)] = points
@@ -316,11 +340,28 @@ of executions of each point."""
 
 
 def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed: int) -> MeanTicks:
-    """Return a function that computes the mean ticks of points, with the hands of a start.
+    """Return a function that computes the mean ticks of points.
 
-    A point is a vector of the target entries that are not NaN in the start. All points are executed
-    with the same noise draws, whose seed no session uses. A failed execution counts as ``worst``
-    ticks.
+    A point is a vector of the entries of the targets that are not NaN in the start
+    (:func:`with_entries`). In one call of the function, all points are executed with the same noise
+    draws. No session uses the seed of these draws.
+
+    Parameters
+    ----------
+    session : Session
+        Session that counts the evaluations.
+    task : Task
+    start : _Start
+        Hand sequence of all points, and the targets whose entries the points replace.
+    worst : int
+        Number of ticks that a failed execution counts as.
+    seed : int
+        Number from which the noise seed is derived.
+
+    Returns
+    -------
+    callable
+        The function (:data:`MeanTicks`).
     """
     compiled = compiled_task(task, session.model)
     world = noise_seed(seed, _SEARCH)
@@ -350,11 +391,11 @@ def mean_ticks_in(session: Session, task: Task, start: _Start, worst: int, seed:
 def minima(
     mean_ticks: MeanTicks, start: Array, evaluations: int, executions: int
 ) -> Iterator[Array]:
-    """Minimise mean ticks by CMA-ES, and yield two solutions of each restart.
+    """Minimise mean ticks by CMA-ES with restarts, and yield two points of each restart.
 
-    The two solutions are the last mean, and the best point: the point with the fewest mean ticks
-    of all generations of the restart. The next restart begins at the best point, with twice the
-    population size.
+    The two points are the last mean of CMA-ES, and the best point: the point with the fewest mean
+    ticks in all generations of this restart. The next restart begins at the best point, with twice
+    the population size.
 
     Parameters
     ----------
@@ -370,6 +411,7 @@ def minima(
     Yields
     ------
     ndarray, shape (n,)
+        The last mean of a restart, then its best point.
     """
     rng, tried, draw = np.random.default_rng(0), 0, 0
     size = 4 + int(3 * math.log(max(len(start), 1)))

@@ -1,4 +1,4 @@
-"""Policy gradient: the mean and spread of Gaussian targets follow the gradient of reward.
+"""Policy gradient: mean and spread of a Gaussian policy follow the gradient of the reward.
 
 The rule is REINFORCE (Williams 1992) for a Gaussian policy. Haith (2025) proposes it as a theory of
 how people improve a movement by practice: after each trial the mean *and* the spread of their
@@ -6,9 +6,10 @@ movements change in the direction that makes better movements more frequent.
 
 Each hand sequence has a Gaussian policy over the targets of all explored joints, with mean m and a
 standard deviation e^ν for each coordinate. The first mean consists of the postures in which the
-corrective process **A** on its own hits the goals; finding them takes one trial. The first standard
-deviations are ``sigma``. A batch has B trials with targets m + e^ν z, where z is standard normal.
-After a batch with rewards R the policy is updated by ::
+corrective process **A** on its own hits the goals; finding these postures takes one trial. The
+first standard deviations are ``sigma``. A batch has B trials with targets m + e^ν z, where the
+entries of z are standard normal. After a batch with rewards R, the policy is updated with the
+advantages A of the trials::
 
     A = (R - b) / d, at least -3 and at most 3
     m <- m + α e^ν mean(A z)
@@ -16,24 +17,27 @@ After a batch with rewards R the policy is updated by ::
 
 - The baseline b is an exponential moving average of the rewards.
 - The scale d is an exponential moving average of 1.25 |R - b|, an estimate of the standard
-  deviation. Where d is below 1 tick, A is computed with 1 tick.
-- A batch is updated with the b and d before this batch; the first batch is updated with its own
-  mean reward and its own mean of 1.25 |R - b|. After the update, b and d move by a tenth of the
-  difference towards the values of the batch, where |R - b| is computed with the old b.
+  deviation of the rewards. If d is below 1 tick, A is computed with 1 tick instead.
+- The update after a batch uses the values of b and d from before this batch. The update after the
+  first batch uses the mean reward and the mean of 1.25 |R - b| of this batch itself. After each
+  update, b and d move by a tenth of the difference towards the values of the batch, for which
+  |R - b| is computed with the old b.
 - Without the bounds on A, a single bad batch can move the policy far away.
 - A failed trial counts as the worst reward of all batches so far, less one tick. Until a trial of a
   batch has hit every goal, a failed trial counts as minus twice the ticks of the corrective
   process.
 - An incomplete last batch does not change the policy.
 
-With ``spread="fixed"`` ν does not change. The hands are chosen by the same bandit as in
-``cma-es/bandit``. A softmax policy over the hands of each goal, whose preferences follow the same
-gradient, was tried on the development instances on which the method was tuned. With the better of
-two step sizes for the preferences, the answers of the softmax policy take 23 % more ticks than the
-answers of the bandit (geometric means over runs; 10 to 46 % in the four families with two arms).
+With ``spread="fixed"`` ν does not change.
 
-With motor noise the answer is the mean m of one hand sequence: the sequence whose last complete
-batch has the best mean reward.
+The hands are chosen by the same bandit as in ``cma-es/bandit``. An alternative was tried on the
+development instances on which the method was tuned: a softmax policy over the hands of each goal,
+whose preferences follow the same gradient. With the better of two step sizes for the preferences,
+its solutions take 23 % more ticks than those with the bandit (geometric means over runs; 10 to 46 %
+in the four families with two arms).
+
+With motor noise the targets of the solution are the mean m of one hand sequence: the sequence whose
+last complete batch has the best mean reward.
 """
 
 from __future__ import annotations
@@ -45,7 +49,7 @@ import numpy as np
 from numpy import exp
 from pydantic import Field
 
-from coartic.baselines.bandit import Search, recommend, sequences_to_try, spend_trials
+from coartic.baselines.bandit import Search, solve_by_bandit
 from coartic.baselines.uninformed import Attempts, SequenceParameters
 from coartic.method import Facts, Method, Result, Session
 from coartic.method.optimisers import OPTIMISER_INFORMATION
@@ -66,12 +70,13 @@ class PolicyGradientParameters(SequenceParameters):
     """``"fixed"`` if the standard deviation of each coordinate is always ``sigma``; ``"learned"``
     if it begins with ``sigma`` and follows the gradient."""
     batch: Annotated[int, Field(ge=2)] | None = None
-    """Number B of trials in a batch. None stands for the value that was tuned for the given
-    ``spread``; so it does for ``step`` and ``spread_step``."""
+    """Number B of trials in a batch. Here, and in ``step`` and ``spread_step``, None stands for the
+    value that was tuned for the given ``spread``."""
     step: Annotated[float, Field(gt=0, le=1000)] | None = None
-    """Step α of the mean."""
+    """Step size α of the mean."""
     spread_step: Annotated[float, Field(gt=0, le=1000)] | None = None
-    """Step β of the logarithm of the spread; without effect if ``spread`` is ``"fixed"``."""
+    """Step size β of the logarithm of the spread. It has no effect if ``spread`` is
+    ``"fixed"``."""
 
     @property
     def steps(self) -> tuple[int, float, float]:
@@ -83,11 +88,12 @@ class PolicyGradientParameters(SequenceParameters):
 
 
 class Policy(Search):
-    """Gaussian policy over the targets of one hand sequence.
+    """Gaussian policy over the targets of one hand sequence, and its policy gradient.
 
     Parameters
     ----------
     rng : numpy.random.Generator
+        Generator of the random numbers z.
     attempts : Attempts
         Makes and counts the trials of the run.
     hand_sequence : str
@@ -115,7 +121,10 @@ class Policy(Search):
         self._cost = math.inf
 
     def generation(self) -> None:
-        """Make the trials of a batch, and update mean and spread by the gradient."""
+        """Make the trials of a batch, and update mean and spread by the policy gradient.
+
+        If fewer trials are left than a batch has, only these are made, and nothing is updated.
+        """
         z = self._rng.standard_normal((self._batch, len(self.mean)))
         spread = exp(self.log_spread)
         rewards = self.make_trials(self.mean + spread * z)
@@ -159,32 +168,13 @@ class PolicyGradient(Method):
     Parameters = PolicyGradientParameters
 
     def solve(self, session: Session) -> Result:
-        """Make trials until none is left, and return the movements of the best trial.
-
-        In noise, return movements to a mean (:func:`.recommend`).
-
-        The method first makes one trial with each hand sequence, in which only the corrective
-        process acts. If all of these trials fail, the method stops. It uses only one sequence in
-        two cases:
-
-        - If parameter ``sequence`` is given, the method uses that sequence.
-        - If there are more than 4096 sequences, the method uses the task's initial sequence.
-
-        Raises MethodError if no trial hits every goal.
-        """
+        """Solve the task with a policy for each hand sequence (:func:`.solve_by_bandit`)."""
         parameters: PolicyGradientParameters = self.parameters
-        attempts = Attempts(session, parameters.trials)
-        told = parameters.told_hands(session)
-        with session.solving():
-            policies = [
-                Policy(session.rng, attempts, hand_sequence, parameters)
-                for hand_sequence in sequences_to_try(session, told)[: attempts.left]
-            ]
-            spend_trials(policies, attempts, _EXPLORATION)
-        return attempts.result(
-            lambda: recommend(policies, attempts),
-            trials={p.hand_sequence: p.trials for p in policies},
-        )
+
+        def make_policy(attempts: Attempts, hand_sequence: str) -> Policy:
+            return Policy(session.rng, attempts, hand_sequence, parameters)
+
+        return solve_by_bandit(session, parameters, make_policy, _EXPLORATION)
 
 
 METHODS: tuple[type[Method], ...] = (PolicyGradient,)

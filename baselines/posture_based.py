@@ -1,31 +1,33 @@
-"""Posture-based planning: stored postures, a constraint hierarchy, diffusion.
+"""Posture-based planning: find a goal posture from stored postures, then move to it.
 
-For each goal the planner first finds a posture, and then moves to it straight in joint space
-(Rosenbaum, Meulenbroek, Vaughan & Jansen 2001):
+The theory is that of Rosenbaum, Meulenbroek, Vaughan & Jansen (2001). For each goal the planner
+first finds a posture in which the hand is at the goal. Then the robot moves straight in joint space
+to that posture:
 
-1. *Instance retrieval.* The stored postures are corrected towards the goal. Of the corrected
-   postures whose hand is at the goal, the posture with the lowest cost of travel is retrieved.
-2. *Instance generation.* Until a deadline the planner generates postures that resemble the
-   retrieved one, and corrects and evaluates the new postures in the same way. Feedforward
-   correction improves their accuracy (Rosenbaum, Loukopoulos, Meulenbroek, Vaughan & Engelbrecht
-   1995).
-3. An internal simulation computes where the movement ends. The planned postures are added to the
-   store.
+1. *Instance retrieval.* Each stored posture is corrected so that the hand comes to the goal. Among
+   the corrected postures whose hand is at the goal, the planner retrieves the one with the lowest
+   travel cost.
+2. *Instance generation.* Until a deadline, the planner generates random postures near the retrieved
+   one (*diffusion*). They are corrected and evaluated in the same way. The feedforward correction
+   improves their accuracy (Rosenbaum, Loukopoulos, Meulenbroek, Vaughan & Engelbrecht 1995).
+3. *Simulation.* An internal simulation computes where the movement will end. The planned postures
+   are added to the stored ones.
 
-With a horizon of two goals the cost of travel includes the path from the posture to a posture for
-the next goal. Only the first movement is made. The second posture is planned again when the first
-goal is hit. The authors name anticipation as an extension (1995); this form of it is ours.
+With a horizon of two goals, the travel cost includes the path from the posture to a posture at the
+next goal. Only the first movement is made; the posture at the next goal is planned again when the
+first goal is hit. The authors name anticipation as an extension (1995); this form of it is ours.
 
 The method differs from the theory in these points:
 
-- The cost of travel is the joint-space distance, because the tasks charge it. In the theory each
-  joint has its own expense.
-- The hierarchy has two levels, because there are no obstacles.
-- The store begins with random postures of the arms around the start. The base is placed so that the
-  hand is at the goal.
-- Diffusion becomes narrower until the deadline, around a weighted sum of the better postures (the
-  rule of 1995). The narrowing makes the search converge.
-- The hand is planned together with the posture.
+- The travel cost is the joint-space distance, on which the reward of the tasks depends. In the
+  theory each joint has its own expense factor.
+- The constraint hierarchy has two levels (accuracy, then travel cost), because there are no
+  obstacles.
+- At first the stored postures are random postures of the arms around the start. The base is placed
+  so that the hand is at the goal.
+- The generated postures are drawn around a weighted sum of the better postures (the rule of 1995),
+  with a standard deviation that falls until the deadline. So the search converges.
+- The hand is chosen together with the posture.
 """
 
 from __future__ import annotations
@@ -76,7 +78,7 @@ class PostureBasedParameters(Parameters):
     """
 
     stored: Annotated[int, Field(ge=0, le=2000)] = 300
-    """Number of random postures in the first store, in addition to the starting posture."""
+    """Number of random postures that are stored at first, in addition to the starting posture."""
     rounds: Annotated[int, Field(ge=0)] = 60
     """Number of rounds of generation for each goal. The end of the last round is the deadline."""
 
@@ -92,9 +94,10 @@ class PostureBased(Method):
     quick: ClassVar[Mapping[str, Any]] = {"stored": 50, "rounds": 15}
 
     def solve(self, session: Session) -> Result:
-        """Plan the movements to the goals in their order; return them and their expected ticks.
+        """Plan the movements to the goals one after the other, and return them.
 
-        Raises MethodError if correction brings no posture to a goal.
+        The details have the expected ticks of each movement. Raises MethodError if no stored
+        posture can be corrected so that a hand is at a goal.
         """
         with session.building():
             planner = PosturePlanner(session, self.parameters, self.horizon)
@@ -133,10 +136,11 @@ METHODS: tuple[type[Method], ...] = (OneGoal, TwoGoals)
 
 
 class PosturePlanner:
-    """Plan the movements of a task from a store of postures.
+    """Plan the movements of a task from stored postures.
 
-    Attribute ``store`` has the postures, shape ``(n, dof)``. Attribute ``q`` is the configuration
-    in which the movements planned so far are expected to end, shape ``(dof,)``.
+    Attribute ``store`` has the stored postures, shape ``(n, dof)``. Attribute ``q`` is the
+    configuration in which the movements planned so far are expected to end, shape ``(dof,)``. Both
+    are in length units (base) and rad (joints).
     """
 
     def __init__(
@@ -156,7 +160,8 @@ class PosturePlanner:
             mask[:BASE_DOF] = mask[session.joints(hand)] = True
         self.movable: Mask = explored_joints(session)
         self.free = {hand: self.movable & mask for hand, mask in self.base_and_arm.items()}
-        """True for joints that may move towards a posture, by hand, shape ``(dof,)``."""
+        """Dict that maps each hand to a mask, shape ``(dof,)``: True for the free base coordinates
+        and the joints of the arm of this hand."""
         # SDs are uniform from zero: postures are dense near the start and sparse far from it.
         sds = _SPREAD * session.rng.uniform(size=(parameters.stored, 1))
         noise = session.rng.standard_normal((parameters.stored, session.dof))
@@ -181,7 +186,7 @@ class PosturePlanner:
         Raises
         ------
         MethodError
-            Correction brings no posture to a goal.
+            No stored posture can be corrected so that a hand is at the goal.
         """
         movements, ticks, step = [], [], self.session.model.step
         for goal in range(len(self.goals)):
@@ -219,7 +224,7 @@ class PosturePlanner:
         return tuple(movements), ticks
 
     def retrieve(self, goals: range) -> Layers:
-        """Correct the stored postures towards the goals, and return those that hit them.
+        """Correct the stored postures towards goals, and return those that hit the goals.
 
         For each goal and hand, each stored posture is corrected in three steps:
 
@@ -237,7 +242,8 @@ class PosturePlanner:
         Returns
         -------
         dict
-            Maps each pair (goal, hand) to the postures that hit, shape ``(n, dof)``.
+            Dict that maps each pair (goal, hand) to the postures in which this hand is at this
+            goal, shape ``(n, dof)``.
         """
         retrieved: Layers = {}
         for goal, hand in itertools.product(goals, self.session.hands):
@@ -290,7 +296,7 @@ class PosturePlanner:
         Parameters
         ----------
         promising : dict
-            Maps each hand sequence to its retrieved postures, shape ``(goals, dof)``.
+            Dict that maps each hand sequence to its retrieved postures, shape ``(goals, dof)``.
         noises : ndarray, shape (hand sequences, rounds, PER_ROUND, goals, dof)
             Standard normal noise.
         goals : range
@@ -334,9 +340,10 @@ class PosturePlanner:
         return list(zip(costs.tolist(), sequences, best, strict=True))
 
     def correct(self, postures: Array, goal: int, hand: Hand, steps: int) -> Mask:
-        """Correct postures in place, so that a hand comes to a goal.
+        """Correct postures by damped Gauss-Newton steps, so that a hand comes to a goal.
 
-        The session counts the evaluations.
+        The free base coordinates and the joints of the hand's arm change, in place. The session
+        counts the evaluations of the forward kinematics and the Jacobians.
 
         Parameters
         ----------
@@ -390,13 +397,34 @@ def _linearise_far(
     xs: Any,
     ys: Any,
 ) -> int:
-    """Linearise the hand in postures that are far from (x, y), and return their number.
+    """Linearise the hand's position in postures in which it is far from (x, y).
 
-    ``far`` has indices of rows of ``postures``. The indices of postures whose hand is farther than
-    ``tolerance`` from (x, y) are moved to the beginning of ``far``. For each of them, one entry of
-    ``wanted`` is set to the hand's step towards (x, y), at most 0.5 long. The same entry of
-    ``jacobian`` is filled in the columns of the arm's joints; the columns of the base stay as they
-    are. ``xs`` and ``ys`` are work space for the points of an arm.
+    Parameters
+    ----------
+    postures : ndarray, shape (N, dof)
+        Postures, in length units and rad.
+    far : ndarray of int, shape (F,)
+        Indices of the postures to look at. Those in which the hand is farther than ``tolerance``
+        from (x, y) are moved to the beginning, in place.
+    arm : Arm
+        Arm of the hand, with n links.
+    x, y : float
+        Centre of the goal, in length units.
+    tolerance : float
+        Distance, in length units.
+    wanted : ndarray, shape (F, 2, 1)
+        Entry k is set to the step of the hand towards (x, y) in posture ``far[k]``, at most 0.5
+        length units long.
+    jacobian : ndarray, shape (F, 2, dof)
+        In entry k, the columns of the joints of the arm are set to the derivatives of the hand's
+        position in posture ``far[k]``. The columns of the base do not change.
+    xs, ys : ndarray, shape (n + 1,)
+        Work space.
+
+    Returns
+    -------
+    int
+        Number of postures in which the hand is far from (x, y).
     """
     tip = len(arm.links)
     left = 0
@@ -419,9 +447,10 @@ def _linearise_far(
 
 
 def _path_length(q: Array, postures: Array) -> Array:
-    """Return the joint-space length of paths from ``q`` ``(dof,)`` through k postures in turn.
+    """Return the joint-space lengths of paths from a configuration through k postures.
 
-    The result has shape ``(...)`` for postures of shape ``(..., k, dof)``.
+    ``q`` has shape ``(dof,)`` and ``postures`` shape ``(..., k, dof)``. The result has shape
+    ``(...)``, in a mix of length units and rad.
     """
     start = np.broadcast_to(q, (*postures.shape[:-2], 1, postures.shape[-1]))
     legs = np.diff(np.concatenate([start, postures], axis=-2), axis=-2)

@@ -1,12 +1,14 @@
-"""Layered dynamic programming over sampled inverse-kinematics postures and hands.
+"""Dynamic programming over a layered graph of sampled inverse-kinematics postures.
 
-Each goal is a layer. Its nodes are postures (base and one arm) that put a hand inside the goal's
-disc. A movement moves the base and the chosen arm; the other arm stays in the posture in which it
-was last used. So the state at a goal is a pair of nodes, one for each arm. Dynamic programming over
-prefixes of the hand sequence finds the cheapest path through the layers exactly. Such a path, with
-a node for each goal, is called a *chain*.
+Each goal is a layer of the graph. Its nodes are postures (base and one arm) in which a hand is
+inside the disc of the goal. The cost of an edge is the joint-space length of the movement from one
+node to the next. A movement moves the base and the arm that hits the goal; the other arm stays in
+the posture in which it was last used. So the state at a goal is a pair of nodes, one for each arm.
+For each hand sequence, dynamic programming over the prefixes of the sequence finds the shortest
+path through the layers exactly. Such a path, with a node for each goal, is called a *chain*.
 
-This is the global part of a search. The local part is :mod:`coartic.baselines.trajectory_problem`.
+A planner uses the chains as starts of a local search by IPOPT
+(:mod:`coartic.baselines.trajectory_problem`).
 """
 
 from __future__ import annotations
@@ -25,22 +27,21 @@ from coartic.robot import BASE_DOF, HANDS, Array, Hand
 from coartic.tasks.task import Task
 
 KINEMATICS = frozenset({Information.GOALS, Information.FORWARD_KINEMATICS, Information.JACOBIAN})
-"""Information that planners use about goals and hands."""
+"""Information on goals and hands that all planners use."""
 HandSequence = tuple[Hand, ...]
 Chain = tuple[HandSequence, Array]
-"""A hand sequence, and the configurations at the goals, shape ``(G, dof)``: a solver's start."""
+"""A chain: a hand sequence, and the configurations at the goals, shape ``(G, dof)``."""
 Layers = dict[tuple[int, Hand], Array]
 """Dict that maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``."""
 Nodes = Annotated[int, Field(ge=10, le=1000)]
-"""Parameter: number of samples for a layer."""
+"""Type of a parameter: number of samples for each pair of goal and hand, from 10 to 1000."""
 Count = Annotated[int, Field(ge=1)]
-"""Parameter: a number of graphs, chains or starts."""
+"""Type of a parameter: number of graphs, chains or starts, at least 1."""
 BEAM_WIDTH = 64
-"""Largest number of hand sequences that are planned for each graph. With two hands and up to six
-goals this includes all sequences. For more goals, a beam search of this width over the goals
-chooses the sequences."""
+"""Largest number of hand sequences that are planned in a graph. With two hands and up to six goals,
+all sequences are planned. With more goals, a beam search of this width selects the sequences."""
 QUICK = {"nodes": 40, "graphs": 1, "chains": 1}
-"""Parameters of a planner for a check that takes seconds."""
+"""Parameters with which a planner can be checked in seconds."""
 _PROJECTIONS = 25  # Gauss-Newton steps that bring a sample into a disc
 _NARROWEST, _WIDEST = 0.05, 1.5  # SD of samples, in length units (base) and rad (joints)
 _NEAR = 2.0  # in length units: at a larger distance the base first moves the hand this near
@@ -49,11 +50,29 @@ _NEAR = 2.0  # in length units: at a larger distance the base first moves the ha
 def _sample_postures(
     task: Task, goal: int, hand: Hand, starts: Array, rng: np.random.Generator, spent: Counter[str]
 ) -> Array:
-    """Sample a posture around each of ``starts`` that puts a hand inside a goal's disc.
+    """Sample postures in which a hand is inside a goal's disc.
 
-    Samples that do not get into the disc are left out. The other arm stays as in its start.
-    ``starts`` has shape ``(count, dof)``, the result ``(n, dof)``; ``goal`` is from 0. Evaluations
-    are added to ``spent``.
+    There is a sample for each of N configurations. Gaussian noise displaces the configuration, and
+    Gauss-Newton steps then bring the hand to a random point of the disc. Samples whose hand does
+    not come into the disc are left out.
+
+    Parameters
+    ----------
+    task : Task
+    goal : int
+        Number of the goal, from 0.
+    hand : {"left", "right"}
+    starts : ndarray, shape (N, dof)
+        Configurations, in length units and rad. The other arm and locked base coordinates keep
+        their values.
+    rng : numpy.random.Generator
+    spent : Counter
+        Counter to which the numbers of evaluations are added.
+
+    Returns
+    -------
+    ndarray, shape (n, dof)
+        The n <= N samples.
     """
     robot, count = task.robot, len(starts)
     moving = np.zeros(robot.dof, dtype=np.bool_)
@@ -84,31 +103,34 @@ def _sample_postures(
 
 
 class PrefixCosts(NamedTuple):
-    """A prefix of hand sequences, with the costs of its cheapest paths.
+    """Table of dynamic programming for one prefix of hand sequences.
 
-    Dynamic programming over prefixes: the state is a pair of last nodes, namely the last node of
-    the left hand and the last node of the right hand. For each pair, the class stores the cost of
-    the cheapest path through the layers of the prefix.
+    The state is a pair of last nodes: the node at which the left hand was last used, and the node
+    at which the right hand was last used. For each pair, the table has the cost of the cheapest
+    path through the layers of the prefix that ends in these nodes.
     """
 
     hands: HandSequence
     nodes: dict[Hand, Array]
-    """Nodes of the layer in which each hand was last used, shape ``(n, dof)``. For a hand that was
-    not used yet, the only node is the start."""
+    """Dict that maps each hand to the nodes of the layer in which the hand was last used, shape
+    ``(n, dof)``. For a hand that was not used yet, the only node is the start."""
     cost: Array
     """``cost[i, j]`` is the joint-space length of the shortest path whose last nodes are node i of
     the hand used last and node j of the other hand."""
     predecessors: tuple[NDArray[np.int32], ...]
-    """Predecessors, an array for each goal. Entry ``[i, j]`` is the index of the node before node i
-    of the same hand, on the cheapest path to the pair (i, j)."""
+    """Predecessors on the cheapest paths, an array for each goal of the prefix. Node i is a node of
+    the hand at this goal, and node j a node of the other hand. Entry ``[i, j]`` is the index of the
+    node of the hand at this goal that comes before node i on the cheapest path to the pair
+    (i, j)."""
 
 
 def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Layers, Counter[str]]:
-    """Sample postures that hit the goal, for each pair of goal and hand.
+    """Sample the nodes of a posture graph for each goal and hand.
 
-    Sampling projects a random configuration onto the goal's disc. Half of the configurations are
-    drawn around nodes of the goal before, for either hand, if there are any nodes. The other
-    configurations are drawn around the task's start.
+    A node is a posture in which the hand is inside the goal's disc. Each sample begins with a
+    random configuration, which is then corrected until the hand is inside the disc. Half of the
+    random configurations are drawn around nodes of the goal before, of either hand, if there are
+    any. The others are drawn around the task's start.
 
     Parameters
     ----------
@@ -120,8 +142,9 @@ def sample_layers(task: Task, count: int, rng: np.random.Generator) -> tuple[Lay
     Returns
     -------
     dict
-        Maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``.
-            Counter
+        Dict that maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``, in
+        length units and rad.
+    Counter
         Numbers of evaluations, keyed by ``forward_kinematics`` and ``jacobians``.
     """
     spent: Counter[str] = Counter()
@@ -147,10 +170,10 @@ def chains_of(
     ----------
     task : Task
     layers : dict
-        Maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``.
-            most : int, optional
-                Width of the beam search: at each goal only this many prefixes, the cheapest, are
-                continued. By default all prefixes are continued.
+        Dict that maps each pair of goal (from 0) and hand to its nodes, shape ``(n, dof)``.
+    most : int, optional
+        Width of a beam search over the goals. At each goal, only this number of prefixes of hand
+        sequences, the cheapest ones, are extended. By default all prefixes are extended.
     base_weight : float
         Weight of the base in the length of a movement (:class:`.MotionModel`).
 
@@ -188,7 +211,11 @@ def chains_of(
 def _extend(
     task: Task, layers: Layers, begun: PrefixCosts, base_weight: float
 ) -> Iterator[PrefixCosts]:
-    """Yield ``begun`` extended by one goal, for each hand with a node at that goal."""
+    """Extend a prefix by one goal, with each hand that has nodes there.
+
+    ``begun`` is the table of the prefix. ``layers`` and ``base_weight`` are as in
+    :func:`chains_of`.
+    """
     hands, nodes, cost, predecessors = begun
     goal = len(hands)
     for hand in sorted(task.hands):  # left before right
@@ -232,19 +259,20 @@ def cheapest_chains(
     nodes : int
         Number of samples in a graph for each pair of goal and hand.
     graphs : int
-        Least number of graphs.
+        Smallest number of graphs.
     chains : int
-        Least number of chains. More graphs are made until there are this many chains.
+        Smallest number of chains over all graphs. More graphs are made until there are this many.
     most : int
-        Largest number of hand sequences of a graph (:func:`chains_of`).
+        Largest number of hand sequences in a graph (:func:`chains_of`).
     spread : bool
         True to yield, after each chain of a task for two hands, a copy in which the idle arm moves
-        in equal steps (:func:`move_other_arm`). The copies do not count for ``chains``.
+        in equal steps (:func:`move_other_arm`). The copies do not count towards ``chains``.
 
     Yields
     ------
     tuple
-        Hand sequence and configurations, shape ``(G, dof)``.
+        A chain: hand sequence, and configurations at the goals, shape ``(G, dof)``, in length units
+        and rad.
 
     Raises
     ------
@@ -274,9 +302,9 @@ def cheapest_chains(
 def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
     """Return a copy of a chain in which idle arms move towards their next posture.
 
-    Between two goals that its hand hits, an arm moves by the same change on the way to each goal.
-    The same holds between the start and the first goal that its hand hits. After the last goal that
-    its hand hits, an arm does not move.
+    In a chain, an arm moves only on the way to the goals that its hand hits. In the copy, the
+    movement of an arm from one such goal (or the start) to the next is divided into equal changes,
+    one for each goal on the way. After the last goal that its hand hits, an arm does not move.
 
     Parameters
     ----------
@@ -284,11 +312,12 @@ def move_other_arm(task: Task, hands: HandSequence, chain: Array) -> Array:
     hands : tuple of str
         Hand of each goal.
     chain : ndarray, shape (G, dof)
-        Configuration at each goal.
+        Configuration at each goal, in length units and rad.
 
     Returns
     -------
     ndarray, shape (G, dof)
+        Configuration at each goal in the copy.
     """
     configurations = chain.copy()
     for hand in task.hands:

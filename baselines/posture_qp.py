@@ -1,30 +1,32 @@
-"""Posture QP: a controller that goes straight in joint space to postures that hit the goals.
+"""Posture QP: a controller that goes straight in joint space to goal postures.
 
-Unlike null-space control (:mod:`coartic.baselines.nullspace_qp`), this controller mainly plans
-postures. The priority of the hand rarely binds, because the joints prefer to go straight to a
-posture that hits the goal. The ``details`` of a run count how often the priority binds.
+A goal posture is a configuration in which the hand is in its goal. Unlike null-space control
+(:mod:`coartic.baselines.nullspace_qp`), this controller mainly plans postures. The priority of the
+hand rarely binds, because the joints prefer to go straight to a posture that hits the goal anyway.
+The ``details`` of a run count the control steps in which the priority binds.
 
-The controller has a **posture** for the current goal and for each goal ahead. The cascade
-(:mod:`coartic.baselines.cascade`) computes both the changes of postures and the control steps:
-level 1 moves the hand into a disc, and level 2 moves the joints towards the preferred
-configuration. A regular polygon replaces the disc, so that the constraint is linear in the change x
-of the joints::
+The controller has a **posture** for the current goal and for each goal ahead. The cascade of two
+quadratic programmes (:mod:`coartic.baselines.cascade`) computes both the changes of the postures
+and the control steps: level 1 moves the hand into a disc, and level 2 moves the joints towards a
+preferred configuration. A regular polygon inscribed in the disc takes the place of the disc, so
+that the constraint is linear in the change x of the joints::
 
     n_i · (c - p(q) - J x) <= ρ  for all i,  that is  A = (n_i · J),  b = (n_i · (c - p(q)) - ρ)
 
 Here p(q) is the position of the hand, J its Jacobian, c the centre of the disc, n_i are the normals
 of the polygon's sides and ρ is the distance of the sides from c.
 
-- *Postures.* The disc is the goal's disc. The preferred configurations shorten the path through
-  the postures, which is measured in the metric of the reward (Euclidean in joint space). The
-  postures converge to a local minimum.
-- *Control steps.* The disc around the goal shrinks from the hand's present distance to the goal's
-  radius. The preferred configuration lies straight ahead towards the posture. So the hand comes
-  nearer with each step, on any path that suits the joints.
+- *Postures.* The disc is that of the goal. The preferred configurations are chosen so that the path
+  through the postures becomes shorter; its length is that of the reward (Euclidean in joint space).
+  The postures converge to a local minimum.
+- *Control steps.* The disc is centred on the goal. Its radius shrinks from the present distance of
+  the hand to the radius of the goal. The preferred configuration lies on the straight line to the
+  posture. So the hand comes nearer to the goal with each control step, and otherwise the joints
+  move as they prefer.
 
-Descent finds each posture once. After that, each control step also moves the postures by a step;
-the first control step to a goal does not. The two methods differ in the objective that chooses the
-posture for the current goal:
+An iterative descent finds each posture once. After that, the postures are improved by one iteration
+in each control step, except the first control step to a goal. The two methods differ in the
+objective of the posture for the current goal:
 
 - ``current-goal``: the posture that is nearest to the robot's configuration;
 - ``goals-ahead``: the posture that makes the path through the postures of this goal and the next
@@ -32,25 +34,33 @@ posture for the current goal:
 
 The controller was tuned only on thirty development instances (``d000`` to ``d009`` of families
 one-armed, two-armed and aligned): 12 settings of the controller and, before that, some 50 settings
-of a prototype. The table has the mean gap of ``goals-ahead`` to the best known path for the 12
-settings, which were changed one at a time. A star marks the value that is used. *Speed* is the
-lower bound on the speed of the hand towards the goal:
+of a prototype. Three numbers were varied, one at a time:
 
-=========================  ====================================================================
-least speed of the hand    0: 2.2 %, 0.03 ★: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
-(share of even speed)      1: 6.9 %
-weight of paths to come    0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1 ★: 2.3 %, 1.2: 2.6 %
-(speed of 0.1)
-goals ahead                none: 20.1 %, 1: 5.6 %, 2 ★: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for all
-(speed of 0.1)
-=========================  ====================================================================
+- *Least speed.* Lower bound on the speed with which the hand comes nearer to the goal, as a
+  fraction of the speed with which it would come there evenly, in the number of control steps that
+  the joints need for the straight line to the posture.
+- *Weight of the next segment.* Each posture minimises a weighted sum of the lengths of two segments
+  of the path: the segment from the configuration before to the posture has weight 1, and the
+  segment from the posture to the next posture has this weight.
+- *Goals ahead.* Number of goals after the current goal whose postures are part of the path.
+
+The table has the mean gap of ``goals-ahead`` to the best known path for each value. A star marks
+the value that is used. The second and the third number were varied with a least speed of 0.1:
+
+==========================  ===================================================================
+least speed                 0: 2.2 %, 0.03 ★: 2.2 %, 0.1: 2.3 %, 0.3: 2.6 %, 0.6: 3.4 %,
+                            1: 6.9 %
+weight of the next segment  0.5: 6.9 %, 0.7: 4.0 %, 0.85: 2.7 %, 1 ★: 2.3 %, 1.2: 2.6 %
+goals ahead                 none: 20.1 %, 1: 5.6 %, 2 ★: 2.3 %, 3: 2.2 %; a prototype: 2.0 % for
+                            all
+==========================  ===================================================================
 
 On the same instances the gap of the corrective process on its own, with its best hand sequence, is
 24.8 %. The gap of ``current-goal`` is 20.1 %.
 
-The remaining gap comes from local minima. Postures are found by descent from the robot's
-configuration, and another branch of the inverse kinematics may be far shorter (35 % on the worst of
-the thirty instances).
+The remaining gap comes from local minima. The descent that finds a posture starts from the
+configuration of the robot; the path to a posture of another branch of the inverse kinematics may be
+far shorter (35 % on the worst of the thirty instances).
 """
 
 from __future__ import annotations
@@ -63,8 +73,8 @@ from coartic.method import Facts, Information
 from coartic.robot import Array, directions
 
 FACES = 16
-"""Number of sides of the polygon that replaces a goal's disc. The polygon is inscribed in the disc;
-the distance from its sides to the rim is at most 2 % of the radius."""
+"""Number of sides of the polygon that is inscribed in a goal's disc. The distance between a side
+and the rim of the disc is at most 2 % of the radius."""
 
 _FACE_NORMALS = directions(2 * np.pi * np.arange(FACES) / FACES)
 _INSET = float(directions(np.pi / FACES)[0])
@@ -80,22 +90,24 @@ _SHORTEST = 0.02  # shorter paths get the weight of this length, in length units
 class PostureController(Controller):
     """Go straight in joint space to a posture that hits the current goal.
 
-    The memory is a dict that maps each aim (the current goal and the goals ahead, each with its
-    hand) to a posture, shape ``(dof,)``.
+    The memory of the controller is a dict that maps each aim (a goal with its hand: the current
+    goal and the goals ahead) to the posture for this goal, shape ``(dof,)``, in length units (base)
+    and rad (joints).
     """
 
     def begin(
         self, q: Array, aims: tuple[Aim, ...], memory: dict[Aim, Array] | None
     ) -> dict[Aim, Array]:
-        """Return the memory: a dict that maps each aim to a posture that hits its goal.
+        """Find a posture for each aim, and return them as the memory.
 
-        1. If ``memory`` has a posture for the aim, that posture is used. Otherwise descent finds a
-           posture; the descent begins at the posture of the aim before, or at ``q`` for the first
-           aim.
-        2. If there is more than one aim, all postures then move to shorten the path from ``q``
-           through the postures.
+        1. If ``memory`` has a posture for an aim, that posture is used. Otherwise an iterative
+           descent finds one. The descent begins at the posture for the aim before, or at ``q`` for
+           the first aim.
+        2. If there is more than one aim, all postures are then moved to shorten the path from ``q``
+           through the postures (:meth:`sweep`).
 
-        A search that does not converge ends after 400 steps; its posture may then miss the goal.
+        Each of these iterations ends after at most 400 steps. If it has not converged by then, a
+        posture may miss its goal.
 
         Parameters
         ----------
@@ -104,12 +116,13 @@ class PostureController(Controller):
         aims : tuple of Aim
             Hand and goal: the current goal, then the goals ahead.
         memory : dict or None
-            Maps each aim to its posture, shape ``(dof,)``; None for the first movement.
+            Dict that maps each aim of the movement before to its posture, shape ``(dof,)``; None
+            for the first movement.
 
         Returns
         -------
         dict
-            Maps each aim to its posture, shape ``(dof,)``.
+            Dict that maps each aim to its posture, shape ``(dof,)``.
         """
         earlier, postures = memory or {}, list[Array]()
         for aim in aims:
@@ -130,9 +143,9 @@ class PostureController(Controller):
     ) -> tuple[Solution, Array, dict[Aim, Array]]:
         """Compute a control step towards the posture of the current goal.
 
-        Before the control step, the postures of ``memory`` move by a step (:meth:`sweep`); not so
-        at the first control step of a movement. Parameters and returned values are those of
-        :meth:`Controller.step`.
+        Before the control step, the postures in ``memory`` are improved by one iteration
+        (:meth:`sweep`), except before the first control step of a movement. Parameters and returned
+        values are those of :meth:`Controller.step`.
         """
         postures = [memory[aim] for aim in aims]
         if not first:
@@ -146,12 +159,12 @@ class PostureController(Controller):
         return solution, preferred, dict(zip(aims, postures, strict=True))
 
     def sweep(self, q: Array, aims: tuple[Aim, ...], postures: list[Array]) -> float:
-        """Move each posture by a step that shortens the path from ``q`` through all of them.
+        """Shorten the path from ``q`` through all postures, by one step of each posture.
 
-        Each posture steps towards a preferred posture (:meth:`step_nearer`). The preferred posture
-        is the mean of the two neighbours on the path, weighted by inverse distances (Weiszfeld
-        1937). The neighbour before the first posture is ``q``. For the last posture, which has only
-        one neighbour, the preferred posture is this neighbour.
+        Each posture makes a step towards a preferred posture (:meth:`step_nearer`). The preferred
+        posture is the mean of the two neighbours of the posture on the path, weighted by the
+        inverse of their distances (Weiszfeld's algorithm, 1937). The neighbour before the first
+        posture is ``q``. The last posture has only one neighbour, which is its preferred posture.
 
         Parameters
         ----------
@@ -165,7 +178,8 @@ class PostureController(Controller):
         Returns
         -------
         float
-            Length of the longest step before it was limited, in a mix of length units and rad.
+            Length of the longest of the steps before steps were limited to 0.1, in a mix of length
+            units and rad.
         """
         largest = 0.0
         for k, aim in enumerate(aims):
@@ -181,10 +195,10 @@ class PostureController(Controller):
         return largest
 
     def step_nearer(self, posture: Array, preferred: Array, aim: Aim) -> tuple[Array, float]:
-        """Make a Gauss-Newton step to the posture that hits a goal nearest to ``preferred``.
+        """Make a Gauss-Newton step towards the goal posture that is nearest to ``preferred``.
 
-        If the step brings the hand hardly any nearer to the goal, the step also bends the arm.
-        Joints do not have limits.
+        If the step would bring the hand hardly nearer to the goal, because the arm is singular, the
+        step also bends the arm. Joints do not have limits.
 
         Parameters
         ----------
@@ -216,9 +230,9 @@ class PostureController(Controller):
         return self.add(posture, change * min(1.0, _POSTURE_STEP / max(length, 1e-12))), length
 
     def faces(self, q: Array, aim: Aim) -> tuple[Array, Array]:
-        """Return the constraint that a hand is in its goal's polygon.
+        """Return the linearised constraint that a hand is in its goal's polygon.
 
-        The constraint is A x >= b, to first order.
+        To first order, the constraint is A x >= b for the change x of the joints.
 
         Parameters
         ----------
@@ -256,7 +270,7 @@ class CurrentGoal(Control):
 
 
 class GoalsAhead(CurrentGoal):
-    """Posture QP that chooses its postures for the current goal and the next two goals together."""
+    """Posture QP that plans postures for the current goal and the next two goals together."""
 
     name = "posture-qp/goals-ahead"
     title = "posture QP, goals ahead"

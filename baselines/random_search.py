@@ -1,17 +1,18 @@
-"""Random search: the paper's learner without its table. The solution is the best trial.
+"""Random search: the paper's learner without its table.
 
-In the first trials only the corrective process acts. Each later trial draws Gaussian noise around
-the postures in which the corrective process hits the goals, by default with the learner's standard
-deviation. With one stage, the default, the noise does not depend on earlier rewards. So random
-search cannot learn to coarticulate: its best trial shows what selection alone does, when one of
-many noisy trials is selected by the reward of the whole task. Random search is therefore the
-control for signatures of coarticulation (:mod:`coartic.analysis.control`). Random search remembers
-nothing but its best trial. With motor noise its answer is therefore movements to the targets of
-that trial.
+In the first trials only the corrective process acts. The targets of each later trial are the
+postures in which the corrective process hits the goals, plus Gaussian noise, by default with the
+learner's standard deviation. The solution is the best trial.
 
-With ``stages`` above 1 the trials are divided into equal parts. After each part the centre of the
+With one stage, the default, the noise does not depend on earlier rewards. So random search cannot
+learn to coarticulate. Its best trial shows what selection alone does: one of many noisy trials is
+selected by the reward of the whole task. Therefore random search is the control for the signatures
+of coarticulation (:mod:`coartic.analysis.control`). Random search stores nothing but its best
+trial; so with motor noise, too, its solution has the targets of the best trial.
+
+With ``stages`` above 1 the trials are divided into equal parts. After each part, the centre of the
 noise moves to the best trial so far. Parameter ``keep`` decides whether the new centre consists of
-the postures that this trial reached or of its targets.
+the postures that this trial reached, or of its targets.
 
 ``random-search`` uses the hands of its parameter or, by default, the hands with which the
 corrective process on its own gets the highest reward. ``random-search/hands`` divides its trials
@@ -40,7 +41,7 @@ _POINTS_AT_ONCE = 500
 
 
 class RandomSearchHandsParameters(Parameters):
-    """Parameters of random search with every hand sequence."""
+    """Parameters of random search over all hand sequences."""
 
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Number of trials of a run, including those in which only the corrective process acts."""
@@ -48,12 +49,13 @@ class RandomSearchHandsParameters(Parameters):
     """Standard deviation of the noise on each explored joint, in length units (base) and rad
     (joints). The default is the learner's."""
     stages: Annotated[int, Field(ge=1)] = 1
-    """Number r of equal parts of the T trials with a hand sequence. Part k ends after ⌊kT/r⌋
-    trials; the next part draws noise around the best trial so far. With one stage the centre does
-    not move."""
+    """Number r of equal parts into which the T trials with a hand sequence are divided. Part k
+    (from 1) ends after ⌊kT/r⌋ trials; in the next part the noise is centred on the best trial so
+    far. With one stage the centre does not move."""
     keep: Literal["postures", "targets"] = "postures"
-    """Centre of the noise after a part: the postures in which the best trial hit its goals, or the
-    targets that it aimed at. This parameter has no effect with one stage."""
+    """Centre of the noise after a part: the postures in which the best trial hit the goals
+    (``"postures"``), or the targets of the best trial (``"targets"``). This parameter has no effect
+    with one stage."""
     idle_arm: bool = True
     """True if the idle arm (the arm of the hand that is not chosen for a goal) gets noise as well.
     If False, the idle arm does not move, as under the learner's condition EC3."""
@@ -71,21 +73,23 @@ class RandomSearchParameters(RandomSearchHandsParameters):
     """Parameters of random search."""
 
     hands: str | None = None
-    """Hand sequence, such as ``"RRLR"``. By default the method tries the corrective process with
-    each sequence, while trials are left, and uses the sequence with the highest reward. If there
-    are more than 4096 sequences, it uses the task's initial one."""
+    """Hand sequence, such as ``"RRLR"``. By default the method first makes a trial with each
+    sequence, in which only the corrective process acts, while trials are left; then it uses the
+    sequence with the highest reward. If there are more than 4096 sequences, it uses the task's
+    initial sequence."""
 
 
 def draw_trials(
     session: Session, hands: str | None, parameters: RandomSearchHandsParameters
 ) -> tuple[Attempts, int]:
-    """Draw trials with Gaussian noise around a centre until the trial budget is used up.
+    """Make trials with Gaussian noise around a centre, until the trial budget is used up.
 
-    The first centre consists of the postures that the corrective process reached.
+    The first centre consists of the postures in which the corrective process hit the goals.
 
     Parameters
     ----------
     session : Session
+        Session in which the trials are made and counted.
     hands : str or None
         Hand sequence, or None for the default of :class:`RandomSearchParameters`.
     parameters : RandomSearchHandsParameters
@@ -139,7 +143,7 @@ def draw_trials(
 class RandomSearchHands(Method):
     """Random search that divides its trials equally among all hand sequences.
 
-    If there are more than 4096 sequences, it uses only the task's initial one.
+    If the task has more than 4096 sequences, the method uses only the task's initial sequence.
     """
 
     name = "random-search/hands"
@@ -166,9 +170,11 @@ class RandomSearchHands(Method):
         """Divide the trials among the hand sequences, and return the movements of the best trial.
 
         The numbers of trials of two sequences differ by at most one. If the corrective process
-        fails with a sequence, the other trials of this sequence are not made.
+        fails with a sequence, the other trials of this sequence are not made. The details have the
+        number of sequences with which the corrective process has hit every goal.
 
-        Raises MethodError if the corrective process completes no hand sequence that has a trial.
+        Raises MethodError if the corrective process hits every goal with no sequence that has a
+        trial.
         """
         parameters: RandomSearchHandsParameters = self.parameters
         sequences, left = sequences_of(session), session.trials_left
@@ -197,8 +203,8 @@ class RandomSearch(RandomSearchHands):
     def solve(self, session: Session) -> Result:
         """Make trials until none is left, and return the movements of the best trial.
 
-        Raises MethodError if no trial is left to make, or the corrective process completes no hand
-        sequence tried.
+        The details have the number of trials with noise. Raises MethodError if no trial is left to
+        make, or if the corrective process completes the task with none of the sequences tried.
         """
         parameters: RandomSearchParameters = self.parameters
         with session.solving():

@@ -1,23 +1,24 @@
 """A planner that looks a fixed number of goals ahead (model predictive control).
 
-The window of the planner is the current goal and ``horizon`` goals after it. The planner searches,
-over hand sequences, for the shortest path through the window, makes the first movement, and plans
-again from the end of that movement.
+The window of the planner consists of the current goal and the next ``horizon`` goals. The planner
+searches, over all hand sequences, for the shortest path through the goals of the window. It makes
+the first movement of this path, and then plans again from the end of the movement.
 
 - With ``horizon`` 0 the planner takes the shortest path to each goal.
-- In a window that contains the last goal, all movements are made, because planning again would find
-  the same movements.
-- With a horizon of all goals the planner plans the whole task at once. The gap to the optimum is
-  then due only to the smaller search.
+- If the window contains the last goal, all its movements are made, because planning again would
+  find the same movements.
+- If the horizon covers all goals, the planner plans the whole task at once. Its gap to the optimum
+  is then due only to its smaller search effort.
 
-A window is planned as ``optimum/search`` plans a task (:mod:`.shortest_paths`): chains of posture
-graphs, IPOPT, whole ticks. To save time, there are fewer chains, the graphs for two hands are
-smaller, and IPOPT starts only from the shortest ``starts`` chains.
+A window is planned as ``optimum/search`` plans a task (:mod:`.shortest_paths`): by chains of
+posture graphs, IPOPT, and rounding to whole ticks. To save time, there are fewer chains, the graphs
+for two hands have fewer postures, and IPOPT starts only from the shortest ``starts`` chains.
 
-Movements are rounded to whole ticks in each window. Otherwise each goal would lose half a tick on
-average, at any horizon. With rounding, half a tick is lost only at the last goal of a window of
-which all movements are made: once in the whole task, or at each goal if the horizon is 0.
-``path_length`` in the details is summed before rounding, and does not have this loss.
+The movements of each window are rounded to whole ticks together. If each movement were rounded up
+separately, each would lose half a tick on average. Rounded together, only the last movement of a
+window loses half a tick on average. This movement is made only if all movements of the window are
+made: once in a task, or at each goal if the horizon is 0. The ``path_length`` in the details is the
+length before rounding, without this loss.
 """
 
 from __future__ import annotations
@@ -44,23 +45,23 @@ from coartic.tasks.task import MAX_GOALS, Start
 
 
 class RecedingHorizonParameters(Parameters):
-    """Parameters: the horizon, and the effort of the search."""
+    """Parameters of the receding-horizon planner: the horizon, and the effort of the search."""
 
     horizon: Annotated[int, Field(ge=0, lt=MAX_GOALS)] = 1
-    """Number of goals in a window after the current goal. At the end of a task the window has fewer
-    goals."""
+    """Number of goals after the current goal that belong to a window. At the end of a task fewer
+    goals are left."""
     nodes: Nodes = 200
-    """Largest number of postures in a posture graph for each goal. With two hands, each hand has at
-    most half of this number."""
+    """Number of postures that are sampled in a posture graph for each goal. With two hands, half of
+    this number is sampled for each hand."""
     graphs: Count = 3
-    """Least number of independent graphs for each window. More graphs are made until there are
-    enough chains."""
+    """Smallest number of independent posture graphs for each window. More graphs are made until
+    there are ``chains`` chains."""
     chains: Count = 24
-    """Least number of chains of each window, over all graphs and hand sequences."""
+    """Smallest number of chains for each window, over all graphs and hand sequences."""
     starts: Count = 24
-    """Largest number of starts of each window from which IPOPT solves. The starts are the shortest
-    chains. With two hands and more than one goal, they may also be copies of chains in which the
-    idle arm moves in equal steps."""
+    """Largest number of starts from which IPOPT solves in each window. The starts are the shortest
+    of the chains. With two hands and more than one goal in the window, copies of chains in which
+    the idle arm moves in equal steps can be starts as well."""
 
 
 class RecedingHorizon(Method):
@@ -83,9 +84,11 @@ class RecedingHorizon(Method):
     quick = QUICK
 
     def solve(self, session: Session) -> Result:
-        """Plan and move window by window, and return the movements that were made.
+        """Plan window by window, and return the movements that were made.
 
-        Raises MethodError if no path is found.
+        The details have the length of the path before rounding (``path_length``, in a mix of length
+        units and rad), and the numbers of windows, of solves and of failed solves. Raises
+        MethodError if no path through a window is found.
         """
         task, parameters = session.reveal(*self.information), self.parameters
         exact = session.model.without_noise()

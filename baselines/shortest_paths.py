@@ -1,9 +1,12 @@
-"""The shortest path over hand sequences, in whole control ticks.
+"""Find the shortest path over all hand sequences, and round it to whole control ticks.
 
-The search for the optimum and the planner with a receding horizon share this code. IPOPT solves
-from each start. For each hand sequence, the shortest plan is then rounded to whole ticks, unless
-even its approximate lower bound is not below the best rounding so far. In some roundings a goal
-takes no movement, because the hand is already inside the goal when its turn comes.
+The search for the optimum and the receding-horizon planner share this code:
+
+1. IPOPT finds a locally shortest path from each start (:func:`shortest_plans`).
+2. The shortest path of each hand sequence is rounded to whole ticks (:func:`fewest_ticks`). A path
+   is skipped if an approximate lower bound of its ticks is not below the ticks of the best rounding
+   so far. In some roundings there is no movement to a goal, because the hand is already inside the
+   goal when the goal becomes current.
 """
 
 from __future__ import annotations
@@ -19,29 +22,30 @@ from coartic.baselines.whole_ticks import Rounding, movements
 from coartic.method import Information, MethodError, Session
 
 REWARD_INFORMATION = MODEL_BASED | {Information.REWARD_FORMULA}
-"""Information of a method that starts from posture graphs and rounds to whole ticks."""
+"""Information that a method uses if it searches for shortest paths in this way."""
 
 
 class ShortestPlans(NamedTuple):
-    """Shortest plans of the hand sequences, and the counts of the solves."""
+    """Shortest plan of each hand sequence, and how often IPOPT was called."""
 
     ranked: list[PathPlan]
-    """Shortest plan of each hand sequence for which a solve converged, in the order of length."""
+    """Shortest plan of each hand sequence for which IPOPT converged, in the order of length, the
+    shortest first."""
     solves: int
-    """Number of solves, one for each start."""
+    """Number of calls of IPOPT, one for each start."""
     failed: int
-    """Number of solves that did not converge."""
+    """Number of calls in which IPOPT did not converge."""
 
 
 class PlanInTicks(NamedTuple):
-    """A plan in whole ticks."""
+    """A plan that was rounded to whole ticks, as movements."""
 
     movements: tuple[Movement, ...]
     """A movement for each goal."""
     execution: Execution
     """Execution of these movements."""
     plan: PathPlan
-    """The plan that was rounded."""
+    """The plan before rounding."""
 
 
 def shortest_plans(
@@ -52,19 +56,20 @@ def shortest_plans(
     *,
     still: bool,
 ) -> ShortestPlans:
-    """Find the shortest path of each hand sequence, solving from a number of starts.
+    """Find the shortest path of each hand sequence, by IPOPT from many starts.
 
     Parameters
     ----------
     session : Session
-        Session that counts the effort.
+        Session that counts the effort of the solver.
     task : Task
     problem : TrajectoryProblem
         Problem of cost ``path-length``.
     starts : iterable of tuple
-        A tuple (hand sequence, configurations of shape ``(G, dof)``) for each start.
+        Tuple (hand sequence, configurations of shape ``(G, dof)``) for each start.
     still : bool
-        True if, on the way to a goal, the arm whose hand is not chosen must not move.
+        True if the idle arm (the arm whose hand is not chosen for a goal) must not move on the way
+        to that goal.
 
     Returns
     -------
@@ -73,7 +78,7 @@ def shortest_plans(
     Raises
     ------
     MethodError
-        No solve finds a path.
+        IPOPT converges from no start.
     """
     best: dict[HandSequence, PathPlan] = {}
     solves = failed = 0
@@ -96,9 +101,8 @@ def fewest_ticks(
 ) -> PlanInTicks:
     """Round plans to whole ticks, and return the rounding with the fewest ticks.
 
-    Each rounding is executed; roundings that miss a goal are discarded. Of roundings with equal
-    ticks, the rounding with the fewest corrections is returned. Two kinds of roundings are not
-    tried:
+    Each rounding is executed, and discarded if it misses a goal. Among roundings with equal ticks,
+    the one with the fewest corrective movements is returned. Two kinds of roundings are not tried:
 
     - all roundings of a plan except the 64 nearest to it (:meth:`.Rounding.iter_roundings`);
     - roundings whose estimated ticks (:meth:`.Rounding.estimated_ticks`), an approximate lower

@@ -1,17 +1,18 @@
 """Trajectory optimisation: informed search with the objective as a formula.
 
 There is a method for each cost. The cost *path length* corresponds to the task's reward. The other
-costs are the smoothness objectives of theories of coarticulation in which the mover has a model:
+costs are smoothness objectives, from theories of coarticulation in which the mover has a model of
+its own kinematics:
 
 - the sum of squared joint displacements (Jordan 1986, 1992);
 - acceleration of the joints;
 - jerk of the joints;
 - jerk of the hand (Flash & Hogan 1985).
 
-For the last three costs the durations of the movements are variables with a constant sum.
+For the last three costs, the durations of the movements are variables whose sum is constant.
 
-Each method solves for a plan for each hand sequence, from the cheapest chains of posture graphs,
-and returns the plan that is cheapest *by its own cost*.
+For each hand sequence, a method finds plans with locally minimal cost by IPOPT, from the cheapest
+chains of posture graphs. It returns the plan that is cheapest *by its own cost*.
 """
 
 from __future__ import annotations
@@ -51,57 +52,58 @@ SAMPLES = 200  # points of a smooth path from goal to goal; with 800 no reward c
 
 
 class TrajectoryParameters(Parameters):
-    """Parameters: hand sequences that are planned, and starts of the solver."""
+    """Parameters of trajectory optimisation: hand sequences to plan, and starts of IPOPT."""
 
     most_sequences: Count = BEAM_WIDTH
-    """Largest number of hand sequences that are planned in a graph. With two hands and six goals
-    there are 64 sequences. If there are more sequences than this number, a beam search of this
-    width over the goals chooses the sequences."""
+    """Largest number of hand sequences that are planned in a graph. If a task has more sequences, a
+    beam search of this width over the goals selects them. With two hands and six goals there are 64
+    sequences."""
     nodes: Nodes = 150
-    """Largest number of postures for a goal and hand in a graph."""
+    """Number of postures that are sampled in a graph for each pair of goal and hand."""
     graphs: Count = 3
-    """Least number of independent graphs. Each graph gives at most two starts for a hand sequence.
-    With one graph the best path was missed on 3 of 23 small random tasks."""
+    """Smallest number of independent posture graphs. Each graph gives at most two starts for a hand
+    sequence. With one graph the best path was missed on 3 of 23 small random tasks."""
     chains: Count = 30
-    """Least number of chains, over all hand sequences. More graphs are made until there are
-    enough."""
+    """Smallest number of chains, over all graphs and hand sequences. More graphs are made until
+    there are this many chains."""
     noisy_starts: Annotated[int, Field(ge=0)] = 4
-    """Number of further starts for each hand sequence. Each is the first start with Gaussian noise,
-    whose standard deviation is drawn from 0.1 to 1."""
+    """Number of further starts for each hand sequence. Each of them is the first start of the
+    sequence plus Gaussian noise, whose standard deviation is drawn log-uniformly from 0.1 to 1, in
+    length units and rad."""
 
 
 class SmoothParameters(TrajectoryParameters):
-    """Parameters: hand sequences, starts, and whether plans stop at goals."""
+    """Parameters for smoothness costs, with the option to stop at each goal."""
 
     stop: Literal[0, 1] = 0
-    """1 if the plan stops at each goal: the velocities at the goals are 0, and for jerk also the
-    accelerations. 0 if the plan need not stop."""
+    """1 if the plan has to stop at each goal: velocities at the goals are 0, and for jerk
+    accelerations, too. 0 if the plan need not stop."""
 
 
 class JerkParameters(SmoothParameters):
     """Parameters for jerk, by default without noisy starts.
 
-    Noisy starts find cheaper plans for four of 34 hand sequences of the paper's tasks, but change
-    neither hands nor ticks of the solutions.
+    On the paper's tasks, noisy starts find cheaper plans for four of 34 hand sequences, but change
+    neither the hands nor the ticks of the solutions.
     """
 
     noisy_starts: Annotated[int, Field(ge=0)] = 0
-    """Number of further starts for each hand sequence. Each is the first start with Gaussian noise,
-    whose standard deviation is drawn from 0.1 to 1."""
+    """Number of further starts for each hand sequence, as in :class:`TrajectoryParameters`."""
 
 
 class HandJerkParameters(JerkParameters):
-    """Parameters for jerk of the hand, by default with one start for a hand sequence.
+    """Parameters for jerk of the hand, by default with one start for each hand sequence.
 
-    A plan takes four times as long as with jerk of the joints. On the paper's tasks a second start
-    did not find any other plan.
+    A plan takes four times as long to compute as one for jerk of the joints. On the paper's tasks a
+    second start did not find any other plan.
     """
 
     graphs: Count = 1
-    """Least number of independent graphs. Each graph gives one start for a hand sequence."""
+    """Smallest number of independent posture graphs. Each graph gives at most one start for a hand
+    sequence."""
     chains: Count = 1
-    """Least number of chains, over all hand sequences. More graphs are made until there are
-    enough."""
+    """Smallest number of chains, over all graphs and hand sequences. More graphs are made until
+    there are this many chains."""
 
 
 def cheapest_plan(
@@ -112,12 +114,12 @@ def cheapest_plan(
     *,
     stops: bool = False,
 ) -> PathPlan:
-    """Solve a problem from a number of starts, and return the cheapest converged plan.
+    """Solve a problem from several starts, and return the cheapest converged plan.
 
     Parameters
     ----------
     session : Session
-        Session that counts the effort.
+        Session that counts the effort of the solver.
     problem : TrajectoryProblem
     instance : Instance
     starts : list of ndarray, shape (G, dof)
@@ -138,7 +140,7 @@ def cheapest_plan(
 
 
 class TrajectoryOptimisation(Method):
-    """Base class of the methods that return the plan with the lowest value of one cost."""
+    """Base class of the methods that plan trajectories of minimal cost."""
 
     version = 2
     cost: ClassVar[Cost]
@@ -150,10 +152,13 @@ class TrajectoryOptimisation(Method):
     def solve(self, session: Session) -> Result:
         """Plan for each hand sequence, and return the movements of the cheapest plan.
 
-        For the cost path length, the cheapest plan is solved again in whole ticks. If that fails,
-        the plan is solved again with targets well inside the discs.
+        For the cost path length, the cheapest plan is rounded to whole control ticks
+        (:meth:`.Rounding.nearest`). If that fails, the plan is solved again with targets well
+        inside the discs of the goals.
 
-        Raises MethodError if the solver finds no plan.
+        The details have the cost of the cheapest plan and its path length. They also have two dicts
+        keyed by hand sequence: the costs of all plans, and the reasons why IPOPT failed. Raises
+        MethodError if IPOPT converges for no hand sequence, or if a goal has no posture in a graph.
         """
         task = session.reveal(*self.information - {Information.SECONDARY_OBJECTIVES})
         with session.building():
@@ -226,7 +231,8 @@ class TrajectoryOptimisation(Method):
         Returns
         -------
         dict
-            Maps each hand sequence to a list of starts, each of shape ``(G, dof)``.
+            Dict that maps each hand sequence to its list of starts, each of shape ``(G, dof)``, in
+            length units and rad.
 
         Raises
         ------
@@ -319,7 +325,7 @@ class Jerk(Acceleration):
 
 
 class HandJerk(Jerk):
-    """Minimum jerk of the hand (Flash & Hogan 1985), with a small weight on joint jerk."""
+    """Minimum jerk of the hand (Flash & Hogan 1985), plus a little joint jerk."""
 
     name = "trajectory-optimisation/hand-jerk"
     title = "minimum-hand-jerk plan"
@@ -345,9 +351,10 @@ def path_movements(
 ) -> tuple[Movement, ...]:
     """Divide a path into movements of kind ``path``, one for each goal.
 
-    A movement ends where the hand enters its goal. The next movement begins with the rest of the
-    piece of the path that belongs to this goal; the joints that ``instance`` holds do not move in
-    this rest. A movement that misses its goal is returned like the others.
+    A movement ends where the hand enters its goal, usually before the end of the piece of the path
+    that leads to this goal. The next movement therefore begins with the rest of that piece. Joints
+    that ``instance`` holds on the way to the next goal do not move in the rest. A movement that
+    misses its goal is returned like the others.
 
     Parameters
     ----------
@@ -357,12 +364,13 @@ def path_movements(
     instance : Instance
         Hands and held joints.
     path : list of ndarray, shape (k, dof)
-        A piece for each goal: its configurations, without the last configuration of the piece
-        before.
+        A piece of the path for each goal, in length units and rad. A piece does not include the
+        last configuration of the piece before it.
 
     Returns
     -------
     tuple of Movement
+        A movement for each goal.
     """
     paths: list[Movement] = []
     q, rest = np.array(task.q0), np.empty((0, task.robot.dof))

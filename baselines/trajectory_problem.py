@@ -16,21 +16,23 @@ the centre of goal g, and r is the radius of the goals. The cost f is one of::
     jerk                 ∫ |d³q/dt³|² dt
     hand jerk            ∫ |d³p/dt³|² + w |d³q/dt³|² dt
 
-The l_g are variables, upper bounds of the lengths of the segments. W multiplies the base's
-coordinates by their weight in the motion model, and w is ``JOINT_WEIGHT``. The last three costs are
-integrals over a movement from rest to rest. The durations between goals are free, and their sum is
-constant.
+The variables l_g are upper bounds of the lengths of the segments, which replace the norm of Δ_g in
+the cost by a smooth constraint. W multiplies the base coordinates by their weight in the motion
+model, and w is ``JOINT_WEIGHT``. The last three costs are integrals over a movement from rest to
+rest. The durations of the segments are variables whose sum is constant.
 
-The integrals over joints are formulas in the rates (velocities and accelerations) at the goals
-(:func:`segment_cost`). The rates are variables, too. The integral of the hand's jerk, for the hand
-that moves to the goal, is a sum over Gauss-Legendre nodes. The hand's jerk does not determine
-motion in the null space of the hand; the joint jerk, with its small weight w, determines it.
+The integrals over the joints have closed formulas in the rates (velocities and accelerations of the
+joints) at the goals (:func:`segment_cost`). These rates are variables, too. The integral of the
+jerk of the hand that moves to the goal is computed by Gauss-Legendre quadrature. The jerk of the
+hand does not determine the motion in the null space of its Jacobian; the joint jerk, with its small
+weight w, determines this motion.
 
-A programme is compiled for each robot, set of hands, number of goals and cost. The start, the goals
-and the hand sequence are its parameters. Locked base coordinates and held arms are expressed by
-bounds of the variables. So the same compiled solver solves for all hand sequences of a task. The
-solver is IPOPT (Wächter & Biegler 2006) with exact derivatives from CasADi (Andersson et al. 2019).
-IPOPT's linear solver is not thread-safe: parallelise over processes.
+A nonlinear programme is compiled for each combination of a robot, a set of hands, a number of goals
+and a cost. The start, the goals and the hand sequence are parameters of the programme. Locked base
+coordinates and held arms are expressed by bounds of the variables. So one compiled programme serves
+all hand sequences of a task. The solver is IPOPT (Wächter & Biegler 2006) with exact derivatives
+from CasADi (Andersson et al. 2019). IPOPT's linear solver is not thread-safe: to solve in parallel,
+use processes.
 """
 
 from __future__ import annotations
@@ -54,16 +56,17 @@ from coartic.robot import BASE_DOF, HANDS, Array, Hand, Robot
 from coartic.tasks.task import Task
 
 MODEL_BASED = KINEMATICS | {Information.KINEMATIC_MODEL}
-"""Information that planners with a model of the kinematics use, in addition to their cost."""
+"""Information that a planner with a model of the kinematics uses, besides that on its cost."""
 
 Cost = Literal["path-length", "squared-displacement", "acceleration", "jerk", "hand-jerk"]
 JOINT_WEIGHT = 0.1
 """Weight of joint jerk relative to jerk of the hand, in (length unit / rad)²."""
 
 _ONE_AT_A_TIME = RLock()
-"""Lock while CasADi builds a programme or IPOPT solves it: threads must not do so at once."""
+"""Lock that a thread holds while CasADi builds a programme or IPOPT solves it, because two threads
+must not do so at the same time."""
 IPOPT = "wachter2006", "andersson2019"
-"""Works on the solver: their keys in ``references.bib``."""
+"""Keys in ``references.bib`` of the works on the solver."""
 _RIM = 1e-7  # solutions stay this far inside the disc (in length units): IPOPT's tolerance
 # Least duration of a segment; the mean is 1. It binds where a smooth plan would hit two goals at
 # once. With a smaller value, jerk does not converge for many hand sequences of two-armed-2.
@@ -94,7 +97,7 @@ _OPTIONS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Instance:
-    """Data of one problem: start, goals, hand of each goal, and joints that cannot move."""
+    """Data of one problem: start, goals, hand of each goal, and joints that are held."""
 
     q0: Array
     """Starting configuration, shape ``(dof,)``, in length units and rad."""
@@ -105,7 +108,7 @@ class Instance:
     held: NDArray[np.bool_]
     """True for joints that cannot move on the way to a goal, shape ``(G, dof)``."""
     radius: float
-    """Largest distance of a hand from its goal's centre (in length units)."""
+    """Largest distance of a hand from the centre of its goal (in length units)."""
 
     @classmethod
     def of(cls, task: Task, hands: tuple[Hand, ...], *, still: bool, radius: float) -> Instance:
@@ -120,7 +123,11 @@ class Instance:
             True if the idle arm (the arm whose hand is not chosen for a goal) cannot move on the
             way to that goal.
         radius : float
-            Largest distance of a hand from its goal's centre (in length units).
+            Largest distance of a hand from the centre of its goal (in length units).
+
+        Returns
+        -------
+        Instance
         """
         held = held_joints(task, hands, still=still)
         return cls(np.array(task.q0), np.array(task.goal_array), hands, held, radius)
@@ -142,6 +149,7 @@ def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np
     Returns
     -------
     ndarray of bool, shape (G, dof)
+        True for joints that cannot move.
     """
     held = np.zeros((len(hands), task.robot.dof), dtype=np.bool_)
     held[:, ["xy".index(axis) for axis in task.locked_base]] = True
@@ -154,25 +162,27 @@ def held_joints(task: Task, hands: Sequence[Hand], *, still: bool) -> NDArray[np
 
 @dataclass(frozen=True)
 class PathPlan:
-    """Plan that the solver returned, converged or not."""
+    """Plan that the solver returned, whether it has converged or not."""
 
     instance: Instance
     """The instance that was solved."""
     converged: bool
     reason: str
-    """IPOPT's return status."""
+    """Return status of IPOPT, such as ``Solve_Succeeded``."""
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
     cost: float
-    """Cost of the plan. If the solver maximised the depth of the hands in the discs, the cost is
-    minus that depth."""
+    """Cost of the plan. If the solver maximised the depth of the hands in the discs (argument
+    ``deep`` of :meth:`TrajectoryProblem.solve`), the cost is minus the smallest depth (in length
+    units)."""
     durations: Array
     """Durations of the segments, shape ``(G,)``, with mean 1; all 1 for costs without rates."""
     rates: Array
-    """Velocities, and for jerk also accelerations, at start and goals, shape
-    ``(derivatives, G + 1, dof)``. Without rates ``derivatives`` is 0."""
+    """Velocities of the joints and, for both kinds of jerk, their accelerations, at the start and
+    at the goals, shape ``(derivatives, G + 1, dof)``. For costs without rates ``derivatives``
+    is 0."""
     spent: dict[str, int] = field(default_factory=dict)
-    """Counts of the solver's effort: keyword arguments of ``Session.spend``."""
+    """Counts of the solver's effort, as keyword arguments of :meth:`.Session.spend`."""
     base_weight: float = 1.0
     """Weight of the base in the length of a movement (:class:`.MotionModel`)."""
 
@@ -184,8 +194,8 @@ class PathPlan:
         Returns
         -------
         ndarray, shape (G,)
-            Distances with the weight of the base, in a mix of length units and rad. Also for a
-            curved plan these are the straight distances.
+            Euclidean distances with the weight of the base, in a mix of length units and rad. Also
+            for a plan whose path is curved, they are the straight distances.
         """
         model = MotionModel(base_weight=self.base_weight)
         return segment_lengths(np.vstack([self.instance.q0, self.configurations]), model)
@@ -278,7 +288,7 @@ class TrajectoryProblem:
         stops: bool = False,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """Find a plan for an instance with locally minimal cost.
+        """Find a plan with locally minimal cost for an instance.
 
         Parameters
         ----------
@@ -287,14 +297,15 @@ class TrajectoryProblem:
         start : ndarray, shape (G, dof)
             Configuration at each goal from which the solver starts.
         lengths : ndarray, shape (G,), optional
-            Largest joint-space lengths of the segments; NaN for a free length. Only for path
-            length. By default all are free.
+            Largest joint-space length of each segment; NaN for a segment of any length. By default
+            segments may have any length. Only for cost ``path-length``.
         stops : bool
-            True to make the rates at all goals 0. Only for costs with rates.
+            True to make all rates at all goals 0. Only for costs with rates.
         deep : sequence of int
             Numbers of goals, from 0. If there are any, the solver does not minimise the path
-            length. Instead the solver maximises the smallest depth of the hands in the discs of
-            these goals, subject to ``lengths``. Only for path length.
+            length. Instead it maximises the smallest depth of the hands in the discs of these goals
+            (the distance of the hand from the rim), subject to ``lengths``. Only for cost
+            ``path-length``.
 
         Returns
         -------
@@ -369,12 +380,13 @@ class TrajectoryProblem:
 
 
 def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]]) -> Any:
-    """Return the least cost of a segment between two states of the joints.
+    """Return the smallest cost of a segment between two given states of the joints.
 
-    A cubic minimises ∫|q̈|² and a quintic minimises ∫|q⃛|² (Flash & Hogan 1985). Both integrals are
-    exact formulas in the end states. For the cost ``hand-jerk``, this function returns only the
-    integral of the joint jerk, without the weight ``JOINT_WEIGHT``. The cost ``path-length`` is not
-    allowed.
+    Among all movements between two states of the joints (position, velocity and, for jerk,
+    acceleration), a cubic minimises ∫|q̈|² and a quintic minimises ∫|q⃛|² (Flash & Hogan 1985).
+    Both minima have exact formulas in the two states. For the cost ``hand-jerk``, this function
+    returns only the integral of the joint jerk, without the weight ``JOINT_WEIGHT``. The cost
+    ``path-length`` is not allowed.
 
     Parameters
     ----------
@@ -385,12 +397,13 @@ def segment_cost(cost: Cost, step: Any, time: Any, rates: list[tuple[Any, Any]])
     time : casadi.SX
         Duration, above 0.
     rates : list of tuple
-        Velocities at both ends, and for both kinds of jerk also accelerations at both ends, each of
-        shape ``(dof,)``.
+        Tuple of the velocities at both ends and, for both kinds of jerk, tuple of the accelerations
+        at both ends; each has shape ``(dof,)``.
 
     Returns
     -------
     casadi.SX
+        The cost, a scalar.
     """
     import casadi
 
@@ -415,10 +428,25 @@ def _hand_jerks(
 ) -> Any:
     """Return the integral of a hand's squared jerk over each of G segments.
 
-    The result is a CasADi column. The joints move along quintics from the start ``q0`` by the
-    changes ``steps``, ``(dof, G)``, in the ``durations``, ``(G,)``. ``rates`` are velocities and
-    accelerations at start and goals, ``(dof, G + 1)`` each. The integral is by Gauss-Legendre
+    In each segment, the joints move along a quintic. The integral is computed by Gauss-Legendre
     quadrature with 6 nodes.
+
+    Parameters
+    ----------
+    robot : Robot
+    hand : {"left", "right"}
+    q0 : casadi.SX, shape (dof,)
+        Starting configuration.
+    steps : casadi.SX, shape (dof, G)
+        Change of the joints in each segment.
+    durations : casadi.SX, shape (G,)
+        Duration of each segment.
+    rates : list of casadi.SX, shapes (dof, G + 1)
+        Velocities and accelerations at the start and at the goals.
+
+    Returns
+    -------
+    casadi.SX, shape (G,)
     """
     import casadi
 
@@ -451,19 +479,20 @@ def _hand_jerks(
 def trajectory_problem(
     robot: Robot, hands: tuple[Hand, ...], goals: int, cost: Cost, base_weight: float = 1.0
 ) -> TrajectoryProblem:
-    """Return the compiled problem, from an LRU cache of 32 problems.
+    """Return a compiled trajectory problem.
 
-    ``base_weight`` is the weight of the base in path length (:class:`.MotionModel`).
+    The last 32 problems are cached (LRU). The arguments are those of :class:`TrajectoryProblem`;
+    ``base_weight`` is the weight of the base in the path length (:class:`.MotionModel`).
     """
     with _ONE_AT_A_TIME:
         return TrajectoryProblem(robot, hands, goals, cost, base_weight)
 
 
 def spline(plan: PathPlan, samples: int) -> list[Array]:
-    """Sample the path of a plan that has rates, at equal time steps between goals.
+    """Sample the path of a plan with rates, at equal time steps between goals.
 
-    The path consists of Hermite cubics for plans with velocities only, and of quintics for plans
-    with accelerations.
+    The path is a Hermite spline: it consists of cubics if the plan has only velocities, and of
+    quintics if the plan has accelerations, too.
 
     Parameters
     ----------

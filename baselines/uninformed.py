@@ -1,8 +1,8 @@
-"""Trials like the learner's, for methods that see only rewards and the postures at the goals.
+"""Trials for methods of uninformed search, which see what the paper's learner sees.
 
-As in the learner, a trial moves towards a target configuration for each goal. The corrective
-process **A** corrects the movements that miss. After the trial the method knows the total reward of
-the trial and the configurations in which the trial hit the goals.
+As in the learner, a trial moves towards a target configuration for each goal, and the corrective
+process **A** corrects the movements that miss their goals. After the trial, the method knows the
+total reward of the trial and the configurations in which the trial hit the goals.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ class UninformedParameters(Parameters):
     trials: Annotated[int, Field(gt=0)] = TRIALS
     """Number of trials of a run."""
     sigma: Annotated[float, Field(gt=0, le=10)] = 0.05
-    """Standard deviation of the perturbations (in CMA-ES and policy gradient, of the first
-    generation), in length units (base) and rad (joints)."""
+    """Standard deviation of the noise on the targets, in length units (base) and rad (joints). It
+    is only the first value where the method adapts the standard deviation: in CMA-ES, and with
+    ``spread="learned"`` in policy gradient and hill climbing."""
 
 
 class SequenceParameters(UninformedParameters):
@@ -39,7 +40,11 @@ class SequenceParameters(UninformedParameters):
     (:meth:`.Session.find_initial_hands`). By default the method finds the hands itself."""
 
     def told_hands(self, session: Session) -> str | None:
-        """Return the hand sequence of parameter ``sequence``, such as ``"RRLR"``, or None."""
+        """Return the hand sequence that parameter ``sequence`` stands for, or None.
+
+        For ``"given"`` the session finds the task's initial hands, whose errors are raised
+        (:meth:`.Session.find_initial_hands`).
+        """
         return session.find_initial_hands() if self.sequence == "given" else self.sequence
 
 
@@ -72,13 +77,15 @@ class Attempts:
         self.best_trial = -1
         """Number of the best trial, from 0; -1 before the first success."""
         self.targets: Array = np.empty(0)
-        """Targets of the best trial, shape ``(G, dof)``. In noise joints that do not move have NaN,
-        with which they stay in the next trial, too."""
+        """Targets of the best trial, shape ``(G, dof)``, in length units and rad. With motor noise,
+        the target of a joint that does not move is NaN, so that the joint does not move when the
+        targets are used again."""
         self.reached: Array = np.empty(0)
-        """Configurations in which the best trial hit the goals, shape ``(G, dof)``."""
+        """Configurations in which the best trial hit the goals, shape ``(G, dof)``, in length units
+        and rad."""
 
     def run_corrective(self, *hand_sequences: str) -> Trials:
-        """For each hand sequence, make a trial in which only the corrective process acts.
+        """Make a trial with each hand sequence in which only the corrective process acts.
 
         Parameters
         ----------
@@ -176,10 +183,25 @@ class Attempts:
     def result(
         self, recommended: Callable[[], tuple[Movement, ...]] | None = None, **details: Any
     ) -> Result:
-        """Return the movements of the best trial, with its number (from 0) and other details.
+        """Return the result of a method: the movements of the best trial, and details.
 
-        With motor noise, the result has the movements that ``recommended`` returns instead. Raises
-        MethodError if no trial has hit every goal; ``recommended`` is then not called.
+        Parameters
+        ----------
+        recommended : callable, optional
+            Function that returns the movements that the method recommends. With motor noise it is
+            called, and its movements take the place of those of the best trial.
+        **details
+            Details of the result, in addition to ``best_trial``, the number of the best trial from
+            0.
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MethodError
+            No trial has hit every goal. ``recommended`` is then not called.
         """
         if not self.trials_made:
             raise MethodError("infeasible", "the trial budget leaves no trial to make", details)

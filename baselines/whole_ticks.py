@@ -1,9 +1,10 @@
-"""Rounding of shortest paths to movements of whole control ticks.
+"""Round shortest paths to movements of whole control ticks.
 
-A movement takes a whole number of steps of length m. So a plan loses up to a step at each segment
-whose length is not a multiple of m. This module rounds the lengths of the segments to multiples of
-m, and solves for the path again with the rounded lengths. The target of each movement lies beyond
-the goal on the same joint-space line, so that the movement ends when the hand enters the goal.
+A movement takes a whole number of control steps of length m (:attr:`.MotionModel.step`). So a plan
+loses up to a step at each segment whose length is not a multiple of m. This module rounds the
+lengths of the segments to multiples of m, up or down, and solves for the shortest path again with
+these lengths. The target of each movement lies beyond the configuration at the goal on the same
+straight line in joint space, so that the movement ends when the hand enters the goal.
 """
 
 from __future__ import annotations
@@ -32,22 +33,23 @@ class TickPlan:
     """A plan whose segments have a whole number of steps."""
 
     steps: tuple[int, ...]
-    """Number of steps to each goal; 0 if the hand is in the goal when the goal becomes current."""
+    """Number of control steps to each goal; 0 if there is no movement to the goal, because the hand
+    is inside the goal when the goal becomes current."""
     configurations: Array
     """Configuration at each goal, shape ``(G, dof)``."""
 
     @property
     def ticks(self) -> int:
-        """Number of ticks of all movements (k + 1 for k > 0 steps)."""
+        """Number of ticks of all movements: k + 1 for a movement of k steps."""
         return sum(steps + 1 for steps in self.steps if steps)
 
 
 class Rounding:
     """Round plans of one problem and instance to whole steps.
 
-    In all methods, parameter ``merged`` has the numbers (from 0) of goals that take no movement,
-    because the hand is already inside the goal when the goal becomes current. The session counts
-    the solver's effort.
+    In all functions, parameter ``merged`` has the numbers (from 0) of the goals to which there is
+    no movement, because the hand is already inside the goal when the goal becomes current. The
+    session counts the effort of the solver.
     """
 
     def __init__(self, session: Session, problem: TrajectoryProblem, instance: Instance) -> None:
@@ -70,11 +72,13 @@ class Rounding:
         return self.divide(plan, [round(length) for length in exact], ())
 
     def iter_roundings(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> Iterator[TickPlan]:
-        """Yield the 64 nearest roundings of a plan to whole steps, in the order of distance.
+        """Yield the 64 nearest roundings of a plan to whole steps.
 
-        Each segment but the last is rounded up or down; the last segment is rounded up. A plan for
-        up to seven goals has at most 64 roundings, so that all are tried. Roundings for which the
-        solver fails are left out.
+        The nearest rounding comes first. Each segment except the last is rounded up or down; the
+        last segment is rounded up. The distance of a rounding from the plan is the sum of the
+        differences between the numbers of steps before and after rounding. A plan for up to seven
+        goals has at most 64 roundings, all of which are tried. Roundings for which the solver fails
+        are left out.
         """
         exact = plan.lengths()[:-1] / self._step
         choices = [sorted({math.floor(length), math.ceil(length)}) for length in exact]
@@ -90,8 +94,8 @@ class Rounding:
     def estimated_ticks(self, plan: PathPlan, merged: tuple[int, ...] = ()) -> int:
         """Return an approximate lower bound of the ticks of a plan's roundings.
 
-        It is the total length of the plan, rounded up. Roundings of a shortest plan rarely take
-        fewer ticks.
+        The bound is the total length of the plan in control steps, rounded up, plus one tick for
+        each movement. Roundings of a shortest plan rarely take fewer ticks.
         """
         length = float(plan.lengths().sum())
         movements = len(self._instance.hands) - len(merged)
@@ -100,9 +104,9 @@ class Rounding:
     def iter_plans(
         self, plan: PathPlan, task: Task, worth: Callable[[int], bool]
     ) -> Iterator[tuple[tuple[int, ...], PathPlan]]:
-        """Yield the shortest plan for each set of goals that take no movement.
+        """Yield the shortest plan for each set of goals to which there is no movement.
 
-        A breadth-first search over sets of goals. A goal can be in a set if the hand may already be
+        Breadth-first search over sets of goals. A goal can be in a set if its hand may already be
         inside the goal when the goal becomes current. Sets for which no plan is found are left out.
 
         Parameters
@@ -152,6 +156,7 @@ class Rounding:
         Parameters
         ----------
         plan : PathPlan
+            Plan from whose configurations the solver starts.
         steps : list of int
             Number of steps to each goal except the last goal. The number of steps to the last goal
             is the smallest that the solver finds.
@@ -187,19 +192,24 @@ class Rounding:
         *,
         deep: Sequence[int] = (),
     ) -> PathPlan:
-        """Solve for a locally shortest plan around a start; the plan may not have converged.
+        """Solve for a locally shortest plan from a start.
 
         Parameters
         ----------
         start : ndarray, shape (G, dof)
             Configuration at each goal from which the solver starts.
         lengths : ndarray, shape (G,)
-            Largest joint-space lengths of the movements; NaN for a free length.
+            Largest joint-space length of each movement; NaN for a movement of any length.
         merged : tuple of int
             Goals, from 0, that take no movement.
         deep : sequence of int
             Numbers of goals, from 0. If there are any, the solver does not minimise the path
             length; it moves the hands as deep into the discs of these goals as ``lengths`` allow.
+
+        Returns
+        -------
+        PathPlan
+            The plan, which may not have converged.
         """
         instance = self._instance
         if merged:
@@ -219,28 +229,31 @@ def movements(
     configurations: Array,
     steps: tuple[int, ...] | None = None,
 ) -> tuple[Movement, ...]:
-    """Return a movement to each goal of an instance.
+    """Return the movements of a plan, one for each goal.
 
-    Joints that ``instance`` holds on the way to a goal keep their values from the end of the
-    movement before, even if that movement ended before its target.
+    Joints that ``instance`` holds on the way to a goal keep the values that they have at the end of
+    the movement before, even if that movement ended before its target.
 
     Parameters
     ----------
     session : Session
-        Session that counts the effort.
+        Session that counts the evaluations of the forward kinematics.
     task : Task
     instance : Instance
+        Hands of the goals, and joints that are held.
     configurations : ndarray, shape (G, dof)
-        Configuration at each goal.
+        Configuration at each goal, in length units and rad.
     steps : tuple of int, optional
-        Largest number of steps to each goal. If it is given, the target of a movement lies beyond
-        the configuration on the same line, so that the movement hits the goal within these steps.
-        If no such target is found, the target is the configuration itself. For 0 steps the movement
-        is corrective, and takes no ticks if the hand is already in the goal.
+        Largest number of steps of the movement to each goal. If it is given, the target of a
+        movement lies beyond the configuration on the same straight line in joint space, so that the
+        movement hits the goal within this number of steps. If no such target is found, the target
+        is the configuration itself. For 0 steps the movement is corrective; it takes no ticks if
+        the hand is already in the goal.
 
     Returns
     -------
     tuple of Movement
+        A movement for each goal.
     """
     planned: list[Movement] = []
     q, model = np.array(task.q0), session.model.without_noise()

@@ -1,6 +1,7 @@
 """Plan, perform and store the runs of suites.
 
-``coartic.benchmarks.run_suite(suite, folder)`` runs a suite (:mod:`coartic.benchmarks.runner`).
+``coartic.benchmarks.run_suite(suite, folder)`` plans the runs of a suite, and performs the runs
+that a results folder lacks (:mod:`coartic.benchmarks.runner`).
 """
 
 from typing import TYPE_CHECKING

@@ -29,14 +29,15 @@ _GOES_ON = "Finished runs are stored; repeat the command to resume."
 class Dask:
     """Executor that performs jobs on the workers of a Dask scheduler.
 
-    The workers should have the same version of coartic as this process.
+    The machines of the workers should have the same version of coartic as this process.
 
     Parameters
     ----------
     address : str
         Address that the scheduler prints, such as ``tcp://127.0.0.1:8786``.
     say : callable
-        Function that is called with a sentence before a long wait for workers.
+        Function that is called with a sentence, such as ``print``, when the scheduler has no worker
+        and the executor begins to wait for one.
 
     Examples
     --------
@@ -50,8 +51,8 @@ class Dask:
     def perform(self, jobs: Sequence[Job]) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with the outcomes of its runs, as jobs finish.
 
-        If a worker dies, another worker performs its jobs. If several workers die while they
-        perform the same job, its outcomes have status ``crashed``.
+        If a worker dies, another worker performs the jobs of the dead worker. If several workers
+        die while they perform the same job, the outcomes of this job have status ``crashed``.
 
         Parameters
         ----------
@@ -60,16 +61,19 @@ class Dask:
         Yields
         ------
         Job
+            One of ``jobs``.
         list of Outcome
+            Outcome of each run of the job, in the order of ``job.numbers``.
 
         Raises
         ------
         CoarticError
             One of these is the case:
 
-            - the scheduler is missing or lost, or has no worker for 10 minutes;
-            - a job fails three times because the workers have another version or code of its
-              method, or cannot perform it;
+            - the scheduler does not answer, or the connection to it is lost;
+            - the scheduler has no worker for 10 minutes;
+            - a job fails in three attempts, because the workers have another version or other code
+              of the job's method, or cannot perform the job;
             - the extra ``cluster`` is not installed on this machine.
         """
         client = self._client()
@@ -136,8 +140,9 @@ class Dask:
 def _remote(job: Job) -> list[Outcome]:
     """Perform a job on the machine of a Dask worker, in a separate process.
 
-    The outcomes have the environment of the worker's machine. Raises CoarticError if the method has
-    another version or code on that machine, or if processes cannot start.
+    Return the outcome of each run, with the environment of the worker's machine. Raises
+    CoarticError if the method has another version or other code on that machine, or if processes
+    cannot start there.
     """
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     method, used = job.cell.method, current_environment()

@@ -1,7 +1,7 @@
 """Check whether a new method or task follows the rules of the benchmark.
 
-A worker process makes the runs of a method, each with a limit of CPU time. Another process repeats
-one of them.
+One worker process performs all runs that check a method, each with a limit of CPU time. A second
+process repeats one of these runs, to check that its result does not depend on the process.
 """
 
 from __future__ import annotations
@@ -57,23 +57,25 @@ class CheckResult(NamedTuple):
 def check_method(
     info: MethodInfo, tasks: Sequence[Task] | None = None, *, verbose: bool = False
 ) -> list[CheckResult]:
-    """Check a method, and return the result of each of :data:`CHECKS`, in order.
+    """Check a method, and return the result of each check in :data:`CHECKS`.
 
-    If ``solution`` fails, the checks after it are not made.
+    If the check ``solution`` finds a problem, the checks after it are not made.
 
     Parameters
     ----------
     info : MethodInfo
+        Declaration of the method.
     tasks : sequence of Task, optional
         Tasks to run the method on, by default the shipped tasks. Tasks to which the method does not
         apply are left out.
     verbose : bool
-        True to show what the method prints and logs, and the tracebacks of its errors. One
-        run is repeated in another process; its output is not shown.
+        True to show what the method prints and logs, and the tracebacks of its errors. The output
+        of the run that is repeated in a second process is not shown.
 
     Returns
     -------
     list of CheckResult
+        A result for each check, in the order of :data:`CHECKS`.
     """
     trials = {"trials": CHECK_TRIALS} if "trials" in info.defaults else {}
     parameters = trials | info.rules()["quick"]
@@ -145,7 +147,11 @@ def _solution(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 
 
 def _changes(runs: _Runs, kind: str, how: str) -> Iterator[str]:
-    """Yield the differences between the first run on each task and the run of another kind."""
+    """Yield the differences between the runs of one kind and the first runs.
+
+    The run of kind ``kind`` on a task is compared with the run of kind ``first`` on the same task.
+    ``how`` is the beginning of each sentence; the name of the task replaces its ``{}``.
+    """
     for task, run in runs.get(kind, {}).items():
         yield from (f"{how.format(task)}: {c}" for c in compare_runs(runs["first"][task], run))
 
@@ -193,10 +199,12 @@ def _noise(info: MethodInfo, runs: _Runs) -> Iterator[str]:
 
 
 def _is_best_trial(run: Row) -> bool:
-    """Return whether the answer of a noisy run seems to be its best trial.
+    """Return whether the solution of a noisy run seems to be its best trial.
 
-    The answer is executed with the noise draw of the best trial. If the answer is the best trial,
-    the execution takes the same ticks; any other answer takes the same ticks only by chance.
+    The solution is executed with the noise draw of the best trial. If the solution has the
+    movements of the best trial, this execution takes as many ticks as the best trial; another
+    solution takes as many ticks only by chance. If all trials have the same reward, the result is
+    False.
     """
     rewards = [-inf if reward is None else reward for reward in run.rewards]
     if len({*rewards}) < 2:
@@ -209,7 +217,7 @@ def _is_best_trial(run: Row) -> bool:
 
 
 def _luck(info: MethodInfo, runs: _Runs) -> str:
-    """Return a sentence on what the method answers in noise."""
+    """Return a sentence on the solutions that the method returns with motor noise."""
     made = f"the method solves its tasks with motor noise {_WORLD.motor_noise:g}"
     if not all(map(_is_best_trial, runs[_NOISE].values())):
         return made
@@ -220,7 +228,7 @@ def _luck(info: MethodInfo, runs: _Runs) -> str:
 
 
 def _rewards(info: MethodInfo, runs: _Runs) -> str:
-    """Return a sentence on the rewards of the solutions, and on goals that have no target."""
+    """Return a sentence on the rewards of the solutions, and on goals without a target."""
     runs_by_task = runs["first"]
     text = ", ".join(f"{task} {run['reward']}" for task, run in runs_by_task.items())
     for task, run in runs_by_task.items():
@@ -238,7 +246,7 @@ def _seeds(info: MethodInfo, runs: _Runs) -> str:
 
 
 def _hopeless(info: MethodInfo, runs: _Runs) -> str:
-    """Return a sentence on the run on a task out of reach."""
+    """Return a sentence on the run on a task that is out of reach."""
     for run in runs.get("hopeless", {}).values():
         return f"a task out of reach gives {run['status']}: {run['reason']}"
     return "the method does not apply to a task out of reach"
@@ -264,12 +272,13 @@ CHECKS: dict[
     "failure": (_failure, _hopeless),
     _NOISE: (_noise, _luck),
 }
-"""Dict that maps names of checks to two functions. The first yields problems of a method, the
-second returns a sentence on what was checked."""
+"""Dict that maps the name of each check to two functions. Both are called with the declaration of
+the method and its runs. The first function yields a sentence for each problem of the method. The
+second function returns a sentence on what was checked; it is called if there is no problem."""
 
 
 def _hopeless_task(like: Task) -> Task:
-    """Return a copy of a task with a locked base and one goal far out of reach."""
+    """Return a copy of a task with one goal, which is out of reach."""
     return like.model_copy(
         update={
             "name": "hopeless",
@@ -282,20 +291,24 @@ def _hopeless_task(like: Task) -> Task:
 
 
 def check_task_file(path: Path, registered: Registry) -> list[CheckResult]:
-    """Check a task file.
+    """Check that a task file is valid, and that its task can be completed.
 
     Parameters
     ----------
     path : Path
         The file.
     registered : mapping
-        Known methods by id. The result of ``valid`` says how many of them can run on the task.
+        Dict that maps ids to the declarations of all known methods. The result of check ``valid``
+        says how many of these methods can run on the task.
 
     Returns
     -------
     list of CheckResult
-        Results of the checks ``valid``, ``distinct goals`` and ``solvable``. If the file is
-        invalid, only the result of ``valid``.
+        Results of three checks; if the file is not valid, only the result of the first:
+
+        - ``valid``: the file is a task whose goals can be reached;
+        - ``distinct goals``: the centres of successive goals are more than one radius apart;
+        - ``solvable``: the corrective process with the task's initial hands hits every goal.
     """
     try:
         task = check_task(load_task(path))

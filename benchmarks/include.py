@@ -1,14 +1,15 @@
 """Include the runs of other folders: shipped results, or results of another machine or person.
 
-Folders can be joined if they have
+Results folders can be joined if all of them agree in
 
-- the same suite, seed and trial budget;
-- for each name of a task, the same task;
-- for each method, the same version or code (runs of a method file that has changed since are not
-  used, and a message names them);
-- for each setting of a method, the same parameters.
+- the suite, its seed and the trial budget;
+- the task that each task name stands for;
+- the version or code of each method. (Runs of a method from a file whose code has changed since are
+  an exception: they are left out, and a warning names the method);
+- the parameters of each method and setting on each task.
 
-Versions of coartic and of libraries, and machines, may differ. A folder may lack runs.
+The folders may come from different machines, and from different versions of coartic and of
+libraries. A folder may lack runs of its own plan.
 """
 
 from __future__ import annotations
@@ -40,26 +41,27 @@ def include_folders(
     tasks: Collection[str] | None = None,
     methods: Mapping[str, MethodInfo] | None = None,
 ) -> list[Job]:
-    """Copy the runs of other folders into a results folder, and join the plans.
+    """Copy the runs of other folders into a results folder, and join their plans.
 
-    The joined plan has the cells of ``plan``, and the cells of the folders for which run 0 is
-    stored. The joined plan replaces the plan of ``out``. This function performs no missing runs;
-    :func:`.perform` does.
+    A cell is a method with its parameters on a task. The joined plan has the cells of ``plan``, and
+    each cell of the other folders whose run 0 is stored there. The joined plan replaces the plan of
+    ``out``. This function performs no missing runs; :func:`.perform` does.
 
     Parameters
     ----------
     plan : sequence of Job
-        Jobs of this command, at least one. The numbers of their runs begin at 0.
+        Jobs of this command, at least one. The numbers of the runs of each job begin at 0.
     folders : sequence of str or Path
-        Folders to include. ``"shipped"`` stands for the shipped results.
+        Results folders to include. ``"shipped"`` stands for the shipped results.
     out : Path
-        Results folder to copy into.
+        Results folder into which the runs are copied. A missing folder is made.
     tasks : collection of str, optional
-        Names of tasks. Cells of the folders on other tasks are left out. By default, the cells on
-        all tasks are joined.
+        Names of tasks. Cells of the other folders on tasks that are not named here are left out. By
+        default, no cell is left out.
     methods : mapping of str to MethodInfo, optional
-        Maps ids to the methods that the command knows; by default the methods of ``plan``. Runs of
-        a method from a file are only used if they were made by the code of the method here.
+        Dict that maps ids to the methods that the command knows; by default the methods of
+        ``plan``. Runs of a method from a file are used only if the code that made them is the code
+        of the method in this dict.
 
     Returns
     -------
@@ -71,10 +73,10 @@ def include_folders(
     CoarticError
         Nothing is copied, because
 
-        - a folder cannot be read, or is ``out``;
-        - the numbers of the runs of ``plan`` do not begin at 0;
-        - the folders cannot be joined (:mod:`.include` lists what must be equal);
-        - two folders, one of which may be ``out``, have different results of the same run.
+        - a folder does not exist or cannot be read, or is ``out`` itself;
+        - the numbers of the runs of a job of ``plan`` do not begin at 0;
+        - the folders do not agree (:mod:`.include` lists what must be equal);
+        - two folders have different results of the same run. One of them may be ``out``.
 
     Warns
     -----
@@ -82,9 +84,9 @@ def include_folders(
         One of these is the case:
 
         - a folder lacks runs of its own plan;
-        - a folder has a stochastic cell that ``plan`` lacks, with fewer runs than the largest
-          number that ``plan`` asks for;
-        - a folder has runs of a method file that has changed.
+        - a folder has a cell that ``plan`` lacks, of a stochastic method, with fewer runs than the
+          largest number of runs that ``plan`` asks for;
+        - a folder has runs of a method from a file, made by other code than that in ``methods``.
     """
     if any(job.numbers[0] for job in plan):
         raise CoarticError(
@@ -123,14 +125,37 @@ def _join(
     tasks: Collection[str] | None,
     known: Mapping[str, MethodInfo],
 ) -> list[Job]:
-    """Join a plan with the plans of ``sources``, a dict that maps names to stores.
+    """Join the plan of a command with the plans of other results folders.
 
-    - Cells of the sources on tasks that are not in ``tasks`` are left out, unless it is None.
-    - Cells of method files with other code than in ``known`` are left out, with a warning.
-    - A cell has the runs that the plan asks for, and the following runs that the sources have, up
-      to the first missing one. A cell without runs is left out.
+    A cell is left out if
 
-    Raises CoarticError if the sources cannot be joined.
+    - its task is not in ``tasks`` (None stands for all tasks);
+    - its method is from a file, and has other code than in ``known`` (a warning says so);
+    - it is not in ``plan``, and no folder has its run 0.
+
+    A cell of the joined plan has runs 0, 1, 2, ...: at first all runs that ``plan`` asks for, then
+    each next run that a folder has, up to the first run that no folder has.
+
+    Parameters
+    ----------
+    plan : sequence of Job
+        Jobs of the command.
+    sources : mapping of str to Store
+        Dict that maps the name of each other folder to its opened store.
+    tasks : collection of str or None
+        Names of the tasks whose cells are joined; None for all tasks.
+    known : mapping of str to MethodInfo
+        Dict that maps ids to the methods of the command.
+
+    Returns
+    -------
+    list of Job
+        The jobs of the joined plan: the cells of ``plan``, then the other cells.
+
+    Raises
+    ------
+    CoarticError
+        The folders do not agree (:mod:`.include`).
     """
 
     def is_current(job: Job) -> bool:
@@ -184,13 +209,19 @@ def _join(
 def _warn_of_gaps(
     asked: Mapping[str, int], plans: Mapping[str, Sequence[Job]], jobs: Mapping[str, Job]
 ) -> None:
-    """Warn of each source that lacks runs of its plan, or has few runs of an additional cell.
+    """Warn of each folder that lacks runs, or has too few runs of a cell.
 
-    An additional cell is a stochastic cell that ``asked`` lacks. It has few runs if it has fewer
-    than the largest number in ``asked``.
+    A cell has too few runs if its method is stochastic, the command does not ask for the cell, and
+    the joined plan has fewer runs of the cell than the largest number in ``asked``.
 
-    ``asked`` maps digests of cells to numbers of runs, ``plans`` maps names of sources to plans,
-    and ``jobs`` maps digests of cells to the jobs of the joined plan.
+    Parameters
+    ----------
+    asked : mapping of str to int
+        Dict that maps the digest of each cell of the command to its number of runs.
+    plans : mapping of str to sequence of Job
+        Dict that maps the name of each other folder to its plan.
+    jobs : mapping of str to Job
+        Dict that maps the digest of each cell to its job in the joined plan.
     """
     most_runs = max(asked.values())
     for name, part in plans.items():
@@ -217,18 +248,18 @@ def _warn_of_gaps(
 
 
 def _named(jobs: Sequence[Job]) -> str:
-    """Return method and task of at most three jobs, and the number of further jobs."""
+    """Describe the first three jobs, and say how many others there are."""
     names = [f"{job.cell.label} on {job.cell.task.name}" for job in jobs[:3]]
     more = f" and {len(jobs) - 3} more" if len(jobs) > 3 else ""
     return f"{', '.join(names)}{more}"
 
 
 def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
-    """Raise CoarticError if the parts of a plan contradict each other.
+    """Raise CoarticError if two parts of the joined plan do not agree.
 
-    ``parts`` maps an origin, such as a folder, to its jobs. Suite, seed and trial budget of a part
-    are taken from its first job, or from ``default`` if the part has no jobs. The docstring of this
-    module lists what must be equal.
+    ``parts`` is a dict that maps the name of each part, such as a folder, to its jobs. The suite,
+    the seed and the trial budget of a part are those of its first job, or of ``default`` if the
+    part has no jobs. The docstring of this module lists what must be equal.
     """
     first_values: dict[str, tuple[str, object]] = {}
 
@@ -259,10 +290,10 @@ def _check_joinable(default: Job, parts: Mapping[str, Sequence[Job]]) -> None:
 
 
 def _check_same_results(stores: Mapping[str, Store]) -> None:
-    """Raise CoarticError if two stores have different results of the same run.
+    """Raise CoarticError if two results folders have different results of the same run.
 
-    ``stores`` maps names of folders to stores. Rewards of trials that are missing in one of two
-    stores are not compared.
+    ``stores`` is a dict that maps the name of each folder to its store. If a folder stores only
+    some of the rewards of a run, only these rewards are compared.
     """
     first_results = dict[str, tuple[str, str]]()
     for name, store in stores.items():

@@ -1,8 +1,9 @@
-"""Read method files, each in a process of its own, and identify their code.
+"""Read method files, each in a separate process, and compute hashes of their code.
 
-Changes that a file makes to its process on import, such as another working folder, a patch or an
-exit, do not affect the process that runs suites. Modules of the same name from two folders are not
-mixed up.
+When a method file is imported, it can change its process: for example, it can change the current
+folder, replace functions of a library or exit. In a separate process such changes do not affect the
+process that runs suites, nor the other method files. Two files can also import different modules
+that have the same name.
 """
 
 from __future__ import annotations
@@ -46,8 +47,24 @@ _ANSWER_S = 300.0  # longest wait for an answer: libraries can take long to impo
 def read_file(path: Path) -> list[MethodInfo]:
     """Return the declarations of the methods of a file.
 
-    A new process imports the file. The same process later answers questions about the methods
-    (:data:`READERS`). Raises CoarticError for a file that cannot be used.
+    A new process imports the file. That process stays alive, and later answers questions about the
+    methods (:data:`READERS`).
+
+    Parameters
+    ----------
+    path : Path
+        The method file, whose name ends in ``.py``.
+
+    Returns
+    -------
+    list of MethodInfo
+        Declarations of the methods that the file defines, in the order of their definitions.
+
+    Raises
+    ------
+    CoarticError
+        The file cannot be read or imported, defines no method, or has a wrong declaration; or the
+        process cannot start, ends, or does not answer within 300 s.
     """
     shown = plain(str(path), MAX_LINE_LENGTH)
     read_bytes(path)
@@ -60,10 +77,23 @@ def read_file(path: Path) -> list[MethodInfo]:
 
 
 def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
-    """Call a function in the process that reads a file, and return the result.
+    """Call a function in the process of a method file, and return the result.
 
-    ``shown`` is the name of the file in messages. Raises CoarticError if the process gives no
-    result.
+    Parameters
+    ----------
+    reader : pebble.ProcessPool
+        Pool with the one process that has imported the file, or will import it.
+    shown : str
+        Name of the file in messages.
+    function : callable
+        Function of this module to call.
+    *arguments
+        Arguments of the function.
+
+    Raises
+    ------
+    CoarticError
+        The function raised a CoarticError, or the process gave no result.
     """
     try:
         return reader.schedule(function, args=arguments, timeout=_ANSWER_S).result()
@@ -86,7 +116,10 @@ def _ask(reader: Any, shown: str, function: Any, *arguments: Any) -> Any:
 
 
 def _answer(path: Path, method: str, question: str, *arguments: Any) -> Any:
-    """Return the answer of a method of a file to a question (:func:`.answer`)."""
+    """Answer a question about a method of a file (:func:`.answer`).
+
+    ``method`` is the id of the method. Raises CoarticError if the method cannot answer.
+    """
     try:
         return answer(load_method(str(path), method), question, *arguments)
     except CoarticError:
@@ -98,7 +131,8 @@ def _answer(path: Path, method: str, question: str, *arguments: Any) -> Any:
 def check_code(info: MethodInfo) -> None:
     """Import the file of a method, and check that its code has not changed.
 
-    Raises CoarticError if the file, or a file that it loads, was changed after ``info`` was made.
+    Raises CoarticError if the hash of the code (:func:`_code_of`) differs from ``info.code``. Then
+    the file, or a file that it reads or imports, was changed after ``info`` was made.
     """
     path = Path(info.where)
     module, loaded = load_file(path, info.code)
@@ -114,9 +148,25 @@ def check_code(info: MethodInfo) -> None:
 def _declarations(path: Path, shown: str) -> list[MethodInfo]:
     """Import a method file, and return the declarations of its methods.
 
-    A declaration has the code of its method (:func:`_code_of`), and the packages that the file
-    imports. ``shown`` is the name of the file in messages. Raises CoarticError if the file has no
-    methods, or if an attribute of a method is wrong.
+    Each declaration has the hash of the method's code (:func:`_code_of`), and the installed
+    packages that the file, or another file of the user that it loads, imports.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    shown : str
+        Name of the file in messages.
+
+    Returns
+    -------
+    list of MethodInfo
+
+    Raises
+    ------
+    CoarticError
+        The file cannot be imported, defines no complete method, or a method has an attribute of the
+        wrong type or a function with the wrong arguments.
     """
     try:
         module, loaded = load_file(path)
@@ -178,12 +228,13 @@ def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
 
     The hash covers
 
-    - the versions of the model and the method;
-    - the file at ``path``;
-    - the data files that the method declares;
-    - ``files``, the user's files that are loaded when the file is imported.
+    - the version of the model and the version of the method;
+    - the method file at ``path``;
+    - the data files that the method declares (:attr:`.Method.files`);
+    - ``files``, the other files of the user that are loaded when the method file is imported.
 
-    Raises CoarticError for a file that cannot be read.
+    The hash depends on the contents of the files, not on their names and folders. Raises
+    CoarticError for a file that cannot be read.
     """
     declared = [path.parent / name for name in method.files]
     parts = [f"{MODEL_VERSION}.{method.version}".encode()]
@@ -197,9 +248,9 @@ def _code_of(method: type[Method], path: Path, files: Iterable[Path]) -> str:
 
 
 def _user_files(names: Iterable[str]) -> set[Path]:
-    """Return the files of the loaded modules ``names``, if they are the user's.
+    """Return the files of those loaded modules that belong to the user.
 
-    :func:`.is_users` says which files are the user's.
+    ``names`` are the names of the modules; :func:`.is_users` says which modules are the user's.
     """
     files = {
         name: Path(path).resolve()
@@ -210,7 +261,10 @@ def _user_files(names: Iterable[str]) -> set[Path]:
 
 
 def _packages_of(files: Iterable[Path]) -> dict[str, str]:
-    """Return the versions of the installed packages that Python files import, by name."""
+    """Return a dict that maps each installed package that Python files import to its version.
+
+    Modules of the standard library and of coartic are left out.
+    """
     names = set[str]()
     for file in files:
         if file.suffix == ".py":

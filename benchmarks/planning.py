@@ -1,4 +1,4 @@
-"""Plan the jobs of a suite, with the parameters of each run."""
+"""Plan a suite: make a job for each method with parameters on each task."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ from coartic.tasks.task import address_of, check_task
 
 
 def _task_or_name(value: Any) -> Task | str:
-    """Validate a task: a Task, or a name or path, which is returned as a string."""
+    """Validate a task: return a Task unchanged, and a name or path as a string."""
     if isinstance(value, str | Path | Task):
         return value if isinstance(value, Task) else str(value)
     raise described_error(f"task {value!r} must be a name, a path or a Task")
 
 
 def _runs_asked(value: Any) -> int | range | None:
-    """Validate a number of runs, a range of runs with step 1, or None."""
+    """Validate a number of runs, a range with step 1, or None."""
     is_range = isinstance(value, range) and len(value) > 0 and value.step == 1
     first, last = (value.start, value.stop) if is_range else (0, value)
     try:
@@ -72,44 +72,48 @@ def _runs_asked(value: Any) -> int | range | None:
 
 
 class Request(FileData):
-    """Options of a command that runs a suite, or a part of it."""
+    """What a command asks for: tasks, methods and runs of a suite, and limits."""
 
     tasks: tuple[Annotated[Any, PlainValidator(_task_or_name)], ...] = ()
-    """Names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, task files, and tasks
-    (Task); by default all tasks of the suite. If the suite lacks an instance or a task of your own,
-    all ``methods`` (by default the methods of the suite) that apply to the task are run on it."""
+    """Tasks to run: names of tasks, ranges of instances such as ``"long/v1/i000..i009"``, paths of
+    task files, or objects (Task). By default all tasks of the suite are run. The suite need not
+    have an instance of a family or a task of your own that is named here: on such a task, all
+    ``methods`` that apply to it are run (by default all methods of the suite)."""
     methods: tuple[str, ...] = ()
-    """Ids of methods, with wildcards such as ``"optimum/*"``; by default all methods of the suite,
-    which ``"*"`` names, too. Methods that the suite lacks are run on all tasks of the suite to
-    which they apply."""
+    """Methods to run: ids, or wildcards such as ``"optimum/*"``. By default all methods of the
+    suite are run; ``"*"`` stands for them, too. A method that the suite does not have is run on all
+    tasks of the suite to which it applies."""
     method_files: tuple[Path, ...] = ()
-    """Files with your own methods. If neither ``methods`` nor the suite names a method of a file,
-    all methods of the file run in addition to the other methods. A wildcard names all methods that
-    match it."""
+    """Python files that define your own methods. If ``methods`` or the suite names a method of a
+    file, by its id or by a wildcard, only the named methods of this file are run. Otherwise all
+    methods of the file are run, in addition to the other methods."""
     family_files: tuple[Path, ...] = ()
-    """Files with your own families."""
+    """TOML files with your own families. ``tasks`` names their instances."""
     runs: Annotated[Any, PlainValidator(_runs_asked)] = None
-    """Number of runs of each cell; by default the number of the suite. A range such as
-    ``range(50, 100)`` stands for the runs with these numbers, for one job of a cluster's array of
-    jobs."""
+    """Number of runs of each cell (a method with its parameters on a task); by default the number
+    that the suite sets. A range such as ``range(50, 100)`` asks only for the runs with these
+    numbers, so that the jobs of a cluster can divide the runs of a suite among them."""
     trials: TrialCount | None = None
-    """Trials of each run, for methods that have this parameter; by default the number of the
-    suite, or else of the method."""
+    """Number of trials of each run, for methods that have this parameter. By default it is the
+    number that the suite sets, or else the default of the method."""
     seed: Annotated[int, Field(ge=0, le=MAX_SEED, strict=True)] = 0
-    """Seed of the suite."""
+    """Seed of the suite, from which the seeds of all runs are computed."""
     time_limit_s: Seconds | None = None
-    """Limit of the CPU time of a job, in s; by default the limit of the suite."""
+    """Limit of the CPU time of a job (in s); by default the limit that the suite sets."""
     trial_budget: TrialCount | None = None
     """Largest number of physical trials of a run, for all methods; by default there is no limit."""
     model: Worlds | None = None
-    """World, such as ``{"motor_noise": 0.01}``, of all blocks of the suite that have no table
-    ``model``. Blocks with one are left out, with a warning."""
+    """World in which methods practise and are scored, as a dict with one value for each constant
+    that differs from the paper's, such as ``{"motor_noise": 0.01}``. Blocks of the suite that have
+    a world of their own (table ``model`` of the block or of the suite) are left out, with a
+    warning."""
 
 
 def request_for(**options: Any) -> Request:
-    """Make a request from fields of :class:`Request`, all of which are optional.
+    """Make a request from options, which are the fields of :class:`Request`.
 
-    Raises CoarticError for an unknown field or a wrong value.
+    Options that are not passed have the defaults of the fields. Raises CoarticError for an unknown
+    option or a wrong value.
     """
     try:
         return Request.model_validate(plain_values(options))
@@ -118,7 +122,7 @@ def request_for(**options: Any) -> Request:
 
 
 def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
-    """Plan the runs of a suite, or of a part of it.
+    """Plan the runs of a suite, or those that the options select.
 
     Parameters
     ----------
@@ -130,20 +134,27 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
     Returns
     -------
     list of Job
-        A job for each cell (a method with parameters on a task) that has runs.
+        A job for each cell (a method with its parameters on a task) that has runs.
 
     Raises
     ------
     CoarticError
         One of these is the case:
 
-        - a name is unknown, or belongs to something else already;
-        - a number or a parameter is wrong;
+        - a task, a method or a family is unknown, or has the name of another one;
+        - an option or a parameter of a method has a wrong value;
         - ``trials``, ``runs`` (except 1) or a family file has no effect;
-        - two cells differ only in their trials, so that ``trials`` would make them equal;
-        - a named task or method has no runs;
+        - two cells of the suite differ only in their numbers of trials, so that ``trials`` would
+          make them equal;
+        - a task or method that the options name has no runs;
         - two blocks of the suite ask for different numbers of runs of the same cell;
-        - a block without wildcards names a method that does not apply to all of its tasks.
+        - a block without wildcards names a method that does not apply to all tasks of the block.
+
+    Examples
+    --------
+    >>> jobs = plan_suite("paper", tasks=["ascending"], methods=["EC1"], runs=3)
+    >>> [(job.cell.label, job.cell.task.name, [*job.numbers]) for job in jobs]
+    [('dual-process/EC1', 'ascending', [0, 1, 2])]
     """
     request = request_for(**options)
     if not isinstance(suite, Suite):
@@ -152,7 +163,11 @@ def plan_suite(suite: str | Path | Suite, **options: Any) -> list[Job]:
 
 
 def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
-    """Return the jobs of :func:`plan_suite` for a checked request and all known methods."""
+    """Plan the runs of a suite for a checked request, as :func:`plan_suite` does.
+
+    ``registered`` is a dict that maps ids to all known methods. Raises the errors of
+    :func:`plan_suite`.
+    """
     names, own, task_named = _asked_tasks(suite, request)
     job = partial(_job_of, suite, request)
     jobs = [*_suite_jobs(suite, request, registered, own, task_named, job)]
@@ -209,10 +224,10 @@ def plan(suite: Suite, request: Request, registered: Registry) -> list[Job]:
 
 
 def _unnamed_methods(suite: Suite, request: Request, registered: Registry) -> list[str]:
-    """Return the ids of all methods in the user's files that nothing refers to.
+    """Return the ids of the methods in the user's files that nothing names.
 
-    A file is such a file if neither the request (``methods``) nor the suite names any of its
-    methods.
+    These are all methods of each file of which neither the request (``methods``) nor a block of the
+    suite names a method. The wildcard ``"*"`` of the request does not count as naming a method.
     """
     files = {
         registered[method].where
@@ -254,9 +269,10 @@ def _check_effects(request: Request, jobs: Sequence[Job]) -> None:
 
 
 def _check_trials(trials: int, jobs: Iterable[Job]) -> None:
-    """Raise CoarticError if two cells differ only in their trials, which are to be ``trials``.
+    """Raise CoarticError if two cells differ only in their numbers of trials.
 
-    ``jobs`` are the jobs of the suite with its own numbers of trials.
+    With ``trials`` as the number of trials of both, the two cells would be equal. ``jobs`` are the
+    jobs of the suite with the numbers of trials that the suite sets.
     """
     first_jobs = dict[str, Job]()
     for job in jobs:
@@ -273,21 +289,22 @@ def _check_trials(trials: int, jobs: Iterable[Job]) -> None:
 def _asked_tasks(
     suite: Suite, request: Request
 ) -> tuple[dict[str, None], dict[str, Task], TaskNamed]:
-    """Resolve the tasks that a request asks for.
+    """Look up the tasks that a request names.
 
     Returns
     -------
-    dict
-        Names of the tasks, as keys.
-    dict
-        Maps names to the tasks among them that the suite lacks (the user's tasks, and instances).
-    callable
-        Function that returns a task by its name.
+    names : dict
+        Names of the tasks as keys, in the order of the request; the values are None.
+    own : dict
+        Dict that maps names to the named tasks that the suite does not have: tasks of the user, and
+        instances of families.
+    task_named : callable
+        Function that returns the task with a given name or file.
 
     Raises
     ------
     CoarticError
-        A file is wrong, a name is unknown, or a task has the name of another task.
+        A file cannot be used, a name is unknown, or a task has the name of another task.
     """
     for path in request.family_files:
         check_kind(str(path), "family")
@@ -335,10 +352,12 @@ def _world_of(request: Request) -> MotionModel:
 
 
 def _worlds_beside(jobs: Sequence[Job], request: Request) -> list[MotionModel]:
-    """Return the motion models for methods and tasks that the request adds to the suite.
+    """Return the motion models for methods and tasks that a request adds.
 
-    If a block has the paper's model, this is the model of the request (by default the paper's).
-    Otherwise these are the models of all blocks.
+    - If the request has a model, only that model is returned.
+    - If the suite has no jobs, or has a job in the paper's world, only the paper's model is
+      returned.
+    - Otherwise the models of all jobs of the suite are returned, each once.
     """
     worlds = {made.cell.world: PAPER._replace(**differences(made.cell.model)) for made in jobs}
     is_usual = request.model or not worlds or "" in worlds
@@ -353,10 +372,30 @@ def _suite_jobs(
     task_named: TaskNamed,
     job: Callable[..., Job],
 ) -> Iterator[Job]:
-    """Yield the jobs of a suite, which ``job`` makes (:func:`_job_of`).
+    """Yield the jobs of all blocks of a suite.
 
-    Raises CoarticError for an unknown method or parameter, for a block whose ``goals`` leave no
-    task, and for a method that does not apply to a task of a block without wildcards.
+    Parameters
+    ----------
+    suite : Suite
+    request : Request
+    registered : mapping of str to MethodInfo
+        Dict that maps ids to all known methods.
+    own : collection of str
+        Names of the user's tasks, which belong to each block for all tasks (``*``).
+    task_named : callable
+        Function that returns the task with a given name.
+    job : callable
+        Function that makes a job: :func:`_job_of` without its first two arguments.
+
+    Yields
+    ------
+    Job
+
+    Raises
+    ------
+    CoarticError
+        A method or a parameter is unknown, the ``goals`` of a block leave no task, or a method does
+        not apply to a task of a block without wildcards.
     """
     for number, block in enumerate(suite.blocks, 1):
         with errors_of_block(suite, number):
@@ -399,13 +438,16 @@ def _job_of(
 ) -> Job:
     """Return the job of a method with parameters on a task.
 
-    - The number of runs is that of the request, or else of the block (``runs``), or else of the
-      suite.
-    - The number of trials is that of the request, or else of the block (``parameters``), or else of
-      the suite, or else the default of the method.
-    - A method that is not stochastic has only run 0. It has no run if the runs of the request do
-      not begin at 0.
-    - The world is ``world``, or else that of the request, or else the paper's.
+    Each of the following values is taken from the first source that sets it:
+
+    - the numbers of the runs: the request, the block (``runs``), the suite;
+    - the number of trials: the request, the block (``parameters``), the suite, the default of the
+      method;
+    - the world: the block or the suite (``world``), the request, the paper's world;
+    - the limit of CPU time: the request, the suite.
+
+    A method that is not stochastic has only run 0; it has no runs if the runs of the request do not
+    begin at 0.
     """
     trials, parameters = request.trials or suite.trials, {**(parameters or {})}
     if request.trials:
@@ -429,8 +471,17 @@ def _why_nothing_runs(
 ) -> str:
     """Return a sentence that explains why methods have no runs.
 
-    ``idle`` has the tasks that a request names and for which the methods have no job. The sentence
-    explains the first of these tasks; if ``idle`` is empty, it explains all tasks of ``jobs``.
+    Parameters
+    ----------
+    suite : Suite
+    request : Request
+    idle : sequence of Task
+        Tasks that the request names and on which none of the methods runs. The sentence explains
+        only the first of them. If there are none, it explains the tasks of ``jobs``.
+    methods : iterable of MethodInfo
+        The methods that the request asks for.
+    jobs : sequence of Job
+        All jobs of the plan before methods were selected.
     """
     tasks = idle[:1] or tasks_by_name(job.cell.task for job in jobs).values()
     reasons = dict.fromkeys(
@@ -445,7 +496,10 @@ def _why_nothing_runs(
 
 
 def _distinct_jobs(jobs: Iterable[Job]) -> list[Job]:
-    """Return the first job of each cell. Raises CoarticError for two numbers of runs of a cell."""
+    """Return the first job of each cell.
+
+    Raises CoarticError if two jobs of the same cell have different numbers of runs.
+    """
     distinct = dict[str, Job]()
     for job in jobs:
         first_job = distinct.setdefault(job.cell.digest, job)

@@ -1,11 +1,15 @@
-"""Perform jobs in worker processes on this machine, with a limit of CPU time for each job.
+"""Perform jobs in worker processes on this machine, with limits of CPU and wall time.
 
-Built-in methods share processes. Each method from a file has its own processes, so that it cannot
-break other methods. Package ``pebble`` starts and restarts processes, and ends jobs that exceed
-their limit of wall time.
-The system counts the CPU time of all threads of a process, and ends the process when a job has used
-up its limit. When a worker ends, the processes that it has started end, too, unless they have left
-its process group.
+Built-in methods share worker processes. Each method from a file has its own processes, so that it
+cannot break other methods. There are two limits:
+
+- *CPU time.* The operating system counts the CPU time of all threads of a process, and ends the
+  process when its job has used up the limit (timer ``ITIMER_PROF``, signal ``SIGPROF``).
+- *Wall time.* The package ``pebble``, which starts and restarts the processes, ends a job that
+  exceeds the limit.
+
+When a worker process ends, the processes that it has started end, too, unless they have left its
+process group.
 """
 
 from __future__ import annotations
@@ -59,20 +63,24 @@ _REPEATED = (-signal.SIGKILL, 255)  # exit codes of a process that was killed or
 def process_pool(processes: int, context: Any = PROGRAM_CONTEXT) -> Iterator[ProcessPoolExecutor]:
     """Open a pool of processes that round floating-point numbers like the workers of suites.
 
-    Use the pool in programs that run methods or proofs themselves. The processes have the
-    environment variables of workers, with which all x86-64 processors with AVX2 round alike. The
-    processes import the main program, so call this function behind ``if __name__ == "__main__":``.
+    Use this context manager in programs that run methods or proofs themselves. The processes have
+    the environment variables of workers, with which all x86-64 processors with AVX2 round alike. By
+    default each process imports the main program, as ``multiprocessing`` usually does. So call this
+    function behind ``if __name__ == "__main__":``.
 
     Parameters
     ----------
     processes : int
         Number of processes.
     context : multiprocessing context
-        Context of the processes: ``CONTEXT`` for processes that do not import the main program.
+        How processes are started. The default is ``PROGRAM_CONTEXT``. With ``CONTEXT`` the
+        processes do not import the main program
+        (both are in :mod:`coartic.benchmarks.processes`).
 
     Yields
     ------
     concurrent.futures.ProcessPoolExecutor
+        The pool, which is shut down at the end of the ``with`` block.
 
     Examples
     --------
@@ -86,16 +94,16 @@ def process_pool(processes: int, context: Any = PROGRAM_CONTEXT) -> Iterator[Pro
 class Local:
     """Executor that performs jobs in processes on this machine.
 
-    A job has a limit of CPU time, which is a day if the job does not set it. The limit of its wall
-    time is ``timeout_s`` plus three times the limit of CPU time. A job that reaches one of the
-    limits is ended.
+    The limit of the CPU time of a job is that of the job, or a day if the job has none. The limit
+    of its wall time is three times the limit of CPU time plus ``timeout_s``. A job that reaches one
+    of the limits is ended.
 
     Parameters
     ----------
     jobs : int
-        Largest number of jobs at once; -1 for the number of cores.
+        Largest number of jobs that are performed at once; -1 for the number of cores.
     timeout_s : float
-        Additional wall time of a job, in s.
+        Wall time that a job may wait in addition to three times its limit of CPU time (in s).
     verbose : bool
         True to show what methods print, their log messages from level INFO, and the tracebacks of
         their errors.
@@ -103,7 +111,8 @@ class Local:
     Raises
     ------
     ValueError
-        A number is out of range.
+        ``jobs`` is neither -1 nor from 1 to 10,000, ``timeout_s`` is not from 0 to 1,000,000, or an
+        argument has another type.
     """
 
     @checked_arguments
@@ -118,27 +127,32 @@ class Local:
     ) -> Generator[tuple[Job, list[Outcome]], None, None]:
         """Yield each job with the outcomes of its runs, as jobs finish.
 
-        A job whose process is killed, or that exceeds its limit of wall time, is performed once
-        more. If this happens again, or if the process of a job ends for another reason, such as its
-        limit of CPU time, the outcomes of the job have status ``crashed`` or ``timeout``. Processes
-        that end while they have no job are replaced.
+        - A job is performed once more if it exceeds its limit of wall time, or if its process is
+          killed or loses the fork server. If the second attempt fails, too, the outcomes of its
+          runs have status ``timeout`` or ``crashed``.
+        - If the process of a job exceeds the limit of CPU time, the outcomes have status
+          ``timeout``. If the process ends for another reason, they have status ``crashed``.
+        - A process that ends while it has no job is replaced.
 
         Parameters
         ----------
         jobs : sequence of Job
         in_order : bool
-            True to perform all jobs of a method in order in one process. If the process ends, a new
-            one performs the remaining jobs.
+            True to perform all jobs of a method in one process, in the order of ``jobs``. If the
+            process ends, a new process performs the remaining jobs.
 
         Yields
         ------
         Job
+            One of ``jobs``.
         list of Outcome
+            Outcome of each run of the job, in the order of ``job.numbers``.
 
         Raises
         ------
         CoarticError
-            Processes cannot start, or end again and again before they begin a job.
+            Processes cannot start, processes end five times in a row before they begin a job, or
+            the file of a method was changed after the plan was made.
         """
         groups = dict[Any, _Group]()
         for number, job in enumerate(jobs):
@@ -166,7 +180,10 @@ class Local:
             ) from None
 
     def _perform(self, groups: Sequence[_Group]) -> Iterator[tuple[Job, list[Outcome]]]:
-        """Yield the jobs of groups with their outcomes, and close each group after its last job."""
+        """Yield each job of the groups with its outcomes, as jobs finish.
+
+        A group is closed after its last job.
+        """
         running, repeated = dict[Future[Any], tuple[_Group, int, Job]](), set[int]()
         while running or any(group.waiting for group in groups):
             for group in groups:
@@ -216,10 +233,11 @@ class Local:
 
     @staticmethod
     def _replace_pool(group: _Group, running: dict[Future[Any], tuple[_Group, int, Job]]) -> None:
-        """Close the broken pool of a group, whose next job starts a new one.
+        """Close the broken process pool of a group; its next job starts a new one.
 
-        Jobs without an answer are given to the new pool. Raises BrokenExecutor if pools of the
-        group have broken too often before a job got an answer.
+        The jobs of the broken pool that have no answer yet wait for the new pool. ``running`` is a
+        dict that maps the future of each such job to its group, its number and the job. Raises
+        BrokenExecutor if five pools of the group have broken since a job got an answer.
         """
         error: BaseException | None = None
         for future, (of, number, job) in [*running.items()]:
@@ -235,13 +253,13 @@ class Local:
         group.close()
 
     def wall_limit_s(self, job: Job) -> float:
-        """Return the limit of wall time for a job, in s."""
+        """Return the limit of the wall time of a job (in s)."""
         return 3 * (job.time_limit_s or _MAX_CPU_S) + self.timeout_s
 
     def _failure(self, job: Job, error: BaseException, printed: str) -> list[Outcome]:
-        """Return the outcomes of a job that gave an error instead of an answer.
+        """Return the outcomes of a job that raised an error instead of returning an answer.
 
-        ``printed`` has the last lines that its process printed as errors.
+        ``printed`` has the last lines that the process of the job wrote to standard error.
         """
         if isinstance(error, TimeoutError):
             wall_s = self.wall_limit_s(job)
@@ -262,35 +280,42 @@ class Local:
 
 @dataclass(eq=False)
 class _Group:
-    """Jobs that share processes: the jobs of one method file, or of all built-in methods."""
+    """Jobs that share one pool of processes.
+
+    One group has the jobs of all built-in methods, and each method from a file has its own group.
+    If jobs are performed in order, each built-in method has its own group, too.
+    """
 
     local: Local
+    """Executor to which the group belongs."""
     waiting: deque[tuple[int, Job]] = field(default_factory=deque)
-    """Numbers and jobs that were not yet given to a process."""
+    """Queue of the jobs that were not given to the pool yet, each with its number."""
     processes: int = 1
-    """Largest number of processes of the group."""
+    """Largest number of processes of the pool."""
     running: int = 0
-    """Number of jobs that were given to processes and have no answer yet."""
+    """Number of jobs that were given to the pool and have no answer yet."""
     folder: Path = Path()
-    """Folder of temporary files. Each job has a file ``NUMBER-PID`` with the errors it prints."""
+    """Folder of temporary files. The file ``NUMBER-PID`` has what job NUMBER writes to standard
+    error in process PID."""
     broken_pools: int = 0
-    """Number of pools that broke since a job got an answer."""
+    """Number of pools of the group that broke since a job got an answer."""
     _pool: Any = None
 
     @property
     def is_broken(self) -> bool:
-        """True if the pool of the group has broken: it accepts no jobs, and answers none."""
+        """True if the pool has broken: it accepts no jobs and gives no answers."""
         return self._pool is not None and not self._pool.active
 
     @property
     def busy(self) -> int:
-        """Number of processes at work."""
+        """Number of processes of the group that perform a job."""
         return min(self.running, self.processes)
 
     def give(self, number: int, job: Job) -> Future[Any]:
-        """Give a job to the processes, and return the future of its answer.
+        """Give a job to the pool, and return the future of its answer.
 
-        The first job starts the processes. Raises RuntimeError if the pool is broken.
+        The first job starts the pool. Raises RuntimeError if the pool is broken, and BrokenExecutor
+        if a process cannot start.
         """
         if self._pool is None:
             begin = self.folder, self.local.workers, self.local.verbose
@@ -314,7 +339,8 @@ class _Group:
     def end_process(self, number: int) -> str:
         """Kill the process group of a job whose process has ended.
 
-        Return the last lines that the job printed as errors, as one line.
+        Return the last three lines that the job wrote to standard error, as one printable line.
+        ``number`` is the number of the job.
         """
         printed = ""
         for path in self.folder.glob(f"{number}-*"):
@@ -343,7 +369,7 @@ def _show_errors() -> None:
 
 
 def _begin_plainly() -> None:
-    """Set up a process of :func:`process_pool`."""
+    """Set up a process of :func:`process_pool`, which ends when its parent ends."""
     _show_errors()
     end_with_parent()
 
@@ -351,8 +377,10 @@ def _begin_plainly() -> None:
 def _begin(folder: Path, workers: int, verbose: bool) -> None:
     """Set up a process that performs jobs.
 
-    The process works in a new folder in ``folder``, and prints only if ``verbose``. Its limit of
-    memory is 80 % of the machine's memory divided by the number of ``workers``, but at least 1 GiB.
+    - The current folder of the process is a new folder in ``folder``.
+    - The process prints only if ``verbose`` is True.
+    - The limit of the memory for its data is 80 % of the machine's memory divided by the number of
+      ``workers``, but at least 1 GiB.
     """
     os.environ.pop("PYTHONSAFEPATH", None)  # see WorkerProcess
     # Other processes cannot import the module of a method file. Forked ones have it.
@@ -376,8 +404,23 @@ def _begin(folder: Path, workers: int, verbose: bool) -> None:
 def _answer_to(folder: Path, number: int, job: Job, verbose: bool) -> bytes:
     """Perform a job under its limit of CPU time, and return the outcomes as JSON.
 
-    If JSON cannot represent them, each run has an outcome ``crashed``. Unless ``verbose``, errors
-    that the job prints go into a file in ``folder``, which is removed when the job has an answer.
+    If JSON cannot represent the outcomes, the outcome of each run has status ``crashed``.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder for a file with what the job writes to standard error. The file is removed when the
+        job has an answer.
+    number : int
+        Number of the job, for the name of that file.
+    job : Job
+    verbose : bool
+        True to show what the job writes to standard error, instead of writing it into the file.
+
+    Raises
+    ------
+    CoarticError
+        The file of the job's method was changed after the plan was made.
     """
     printed = folder / f"{number}-{os.getpid()}"
     with contextlib.suppress(OSError), printed.open("wb") as file:  # the disk may be full

@@ -1,7 +1,8 @@
-"""Code that runs once, in the server from which worker processes are forked.
+"""Code that runs once, in the fork server from which worker processes are forked.
 
-It imports the compiler. It also disconnects the standard error stream, so that a worker that starts
-while its parent ends does not print a traceback. :func:`show_errors` connects the stream again.
+This module imports Numba, so that workers need not import it themselves. It also connects standard
+error to the null device, so that a worker that starts while its parent ends does not print a
+traceback. :func:`show_errors` undoes this in a worker.
 """
 
 import os
@@ -16,5 +17,5 @@ os.close(_nobody)
 
 
 def show_errors() -> None:
-    """Connect this process to the standard error stream of the server."""
+    """Connect standard error of this process to that with which the fork server started."""
     os.dup2(_ERRORS, 2)

@@ -1,4 +1,4 @@
-"""Worker processes, which round alike and import nothing from the working folder."""
+"""Worker processes, which round alike and import no modules from the current folder."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ _starting = threading.Lock()
 class WorkerProcess(_BASE.Process):  # type: ignore[misc]
     """Process that starts with the environment variables of a worker.
 
-    NumPy reads these variables when it is imported. The process does not import the main program
-    again, nor any module from the working folder.
+    NumPy reads these variables when it is imported (:func:`.worker_variables`). The process imports
+    neither the main program nor any module from the current folder.
     """
 
     @staticmethod
@@ -40,7 +40,7 @@ class WorkerProcess(_BASE.Process):  # type: ignore[misc]
 
 
 class ProgramProcess(_BASE.Process):  # type: ignore[misc]
-    """Worker process that imports the main program, whose functions it performs."""
+    """Worker process that imports the main program, so that it can call its functions."""
 
     @staticmethod
     def _Popen(process: Any) -> Any:  # noqa: N802
@@ -48,7 +48,7 @@ class ProgramProcess(_BASE.Process):  # type: ignore[misc]
 
 
 def _start(process: Any, main: ModuleType) -> Any:
-    """Start a process in which ``main`` stands for the main program."""
+    """Start a process that uses the module ``main`` as its main program."""
     path = {"PYTHONSAFEPATH": "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with _starting, environment(worker_variables() | path), blocked_signals():
         multiprocessing.set_forkserver_preload(list(_PRELOADED))
@@ -60,10 +60,10 @@ def _start(process: Any, main: ModuleType) -> Any:
 
 
 class _WorkerContext(type(_BASE)):  # type: ignore[misc]
-    """Context of worker processes.
+    """Context of ``multiprocessing`` for worker processes.
 
-    The first lock starts Python's resource tracker, a process that must not import modules from the
-    working folder either.
+    Before a lock is made, the context starts Python's resource tracker. This process must not
+    import modules from the current folder either.
     """
 
     Process = WorkerProcess
@@ -76,7 +76,10 @@ class _WorkerContext(type(_BASE)):  # type: ignore[misc]
 
 
 def _made(lock: Callable[[], Any]) -> Any:
-    """Make a lock. Raises CoarticError if the system has none, as on a full ``/dev/shm``."""
+    """Call ``lock`` to make a lock, and return the lock.
+
+    Raises CoarticError if the system cannot make one, for example because ``/dev/shm`` is full.
+    """
     _start_tracker()
     try:
         return lock()
@@ -103,7 +106,10 @@ PROGRAM_CONTEXT: Any = _ProgramContext()
 
 
 def signal_name(number: int) -> str:
-    """Return the name of a signal, such as ``SIGKILL``, or ``signal 40`` if it has no name."""
+    """Return the name of a signal, such as ``SIGKILL`` for 9.
+
+    A signal without a name is called by its number, such as ``signal 40``.
+    """
     try:
         return signal.Signals(number).name
     except ValueError:

@@ -1,4 +1,4 @@
-"""Describe the environment of a result: versions, machine, commit and command."""
+"""Describe how a result was made: versions, machine, commit and command."""
 
 from __future__ import annotations
 
@@ -31,25 +31,28 @@ MODEL_FILES = [
     *(PACKAGE / name for name in ("robot.py", "model.py", "tasks/task.py")),
     *python_files("motion", "learner", "method"),
 ]
-"""Files of the model, which may change results."""
+"""Files of the model: a change of one of these files may change results."""
 _MODEL_CODE = hash_of_files(MODEL_FILES)
 
 
 @cache
 def current_environment() -> dict[str, Any]:
-    """Return the environment on which results of this process can depend.
+    """Return the versions, settings and hardware on which results of this process can depend.
 
-    Each call returns the same dictionary: do not change it.
+    Each call returns the same dict: do not change it.
 
     Returns
     -------
     dict
-        - ``coartic``, ``python``, ``packages``: versions;
-        - ``model_code``: hash of the code of the model (:data:`MODEL_FILES`);
-        - ``commit``: commit of the checkout;
-        - ``platform``, ``processor``, ``cores``: the machine;
-        - ``arithmetic``: fingerprint of rounding (:func:`arithmetic`);
-        - ``threads``: environment variables of workers.
+        - ``coartic``, ``python``: versions of coartic and of Python;
+        - ``packages``: dict that maps libraries (numpy, scipy, ...) to their versions;
+        - ``model_code``: hash of the files of the model (:data:`MODEL_FILES`);
+        - ``commit``: id of the commit of the checkout, and whether files were changed since; None
+          for an installed package;
+        - ``platform``, ``processor``: names of the operating system and of the processor;
+        - ``cores``: number of cores that this process may use;
+        - ``arithmetic``: fingerprint of how libraries round (:func:`arithmetic`);
+        - ``threads``: dict that maps the environment variables of workers to their values.
     """
     processor = platform.processor()
     with contextlib.suppress(OSError):
@@ -76,13 +79,15 @@ def now() -> str:
 
 
 def made_with() -> dict[str, Any]:
-    """Return the environment of this process with its command and the date.
+    """Return the environment of this process, with the command and the present date.
 
     Returns
     -------
     dict
-        Entries of :func:`current_environment`; ``command``, a list of the program and its arguments
-        (``["a notebook"]`` in a notebook); and ``date``, UTC.
+        A new dict with the entries of :func:`current_environment` and two further entries:
+
+        - ``command``: list of the program and its arguments; ``["a notebook"]`` in a notebook;
+        - ``date``: date and time in UTC (:func:`now`).
     """
     words = [Path(sys.argv[0]).name, *sys.argv[1:]]
     command = ["a notebook"] if "ipykernel" in sys.argv[0] else [*map(plain, words)]
@@ -95,8 +100,8 @@ def _commit_of_checkout() -> dict[str, Any] | None:
     Returns
     -------
     dict or None
-        ``id`` is that of the commit; ``dirty`` is True if tracked files have changed since. None is
-        returned for an installed package, or if Git fails.
+        ``id`` is the hash of the commit; ``dirty`` is True if tracked files were changed since the
+        commit. None is returned if the code is not in a checkout of its own, or if Git fails.
     """
     # A GIT_DIR of the caller, such as a hook, must not replace this checkout.
     clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
@@ -116,18 +121,18 @@ def _commit_of_checkout() -> dict[str, Any] | None:
 
 
 def arithmetic() -> str:
-    """Return a fingerprint of how workers round, as ``NumPy HASH, libm HASH``.
+    """Return a fingerprint of how workers round, in the form ``NumPy HASH, libm HASH``.
 
-    The hashes are of the bits of some results of each library, computed in a process with the
-    environment variables of a worker. On machines with the same hash the library rounds these
-    results alike.
+    A new process with the environment variables of a worker computes some numbers by NumPy, and
+    some by the C library (libm). Each hash is computed from the bits of these numbers. If two
+    machines have the same hash for a library, the library rounds these numbers alike on both.
     """
     with process_pool(1, CONTEXT) as pool:
         return pool.submit(_arithmetic).result()
 
 
 def _arithmetic() -> str:
-    """Return the fingerprint of :func:`arithmetic` for this process."""
+    """Compute the fingerprint of :func:`arithmetic` in this process, and return it."""
     matrix = np.random.default_rng(0).standard_normal((16, 16))
     by_numpy = *np.linalg.eigh(matrix @ matrix.T), np.log(np.abs(matrix)), np.abs(matrix) ** 0.3
     numbers = np.abs(matrix).ravel().tolist()

@@ -1,4 +1,4 @@
-"""List methods by id: the built-in methods, and the methods of the user's files.
+"""Look up built-in methods, and methods of the user's files, by their ids.
 
 Method files are imported in separate processes (:mod:`coartic.benchmarks.method_files`).
 """
@@ -19,10 +19,11 @@ from coartic.model import MODEL_VERSION
 from coartic.runs.method_info import BUILT_IN, MethodInfo, method_info
 
 _RESERVED = (METHOD_PREFIX, "optimum/")
-"""Prefixes of ids that are reserved for built-in methods, because tables interpret them."""
+"""Prefixes that only ids of built-in methods may have, because tables interpret these prefixes."""
 METHOD_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+/-]{0,79}")
 NAMES = ("CMA-ES", "learner", "optimum")
-"""Names of built-in methods that the id of another method must not repeat."""
+"""Names that are used for built-in methods in figures and tables. No other method may have one of
+them as its id."""
 
 
 Registry = Mapping[str, MethodInfo]
@@ -31,9 +32,21 @@ Registry = Mapping[str, MethodInfo]
 def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
     """Return a dict that maps ids to the declarations of all known methods.
 
-    Built-in methods come first, then the methods of ``method_files``. Raises CoarticError for a
-    file that cannot be loaded or has no method, and for an id that is not allowed
-    (:func:`check_id`).
+    Parameters
+    ----------
+    method_files : iterable of Path
+        Python files that define methods of the user.
+
+    Returns
+    -------
+    dict of str to MethodInfo
+        The built-in methods, then the methods of ``method_files`` in the order of the files.
+
+    Raises
+    ------
+    CoarticError
+        A file cannot be loaded or has no method, or the id of a method is not allowed
+        (:func:`check_id`).
     """
     infos = dict(built_in())
     for path in dict.fromkeys(Path(path).resolve() for path in method_files):
@@ -47,9 +60,9 @@ def registry(method_files: Iterable[Path] = ()) -> dict[str, MethodInfo]:
 
 @cache
 def built_in() -> Mapping[str, MethodInfo]:
-    """Return a mapping from ids to the declarations of the built-in methods.
+    """Return a dict that maps ids to the declarations of the built-in methods.
 
-    Each call returns the same mapping: do not change it.
+    Each call returns the same dict: do not change it.
     """
     return {
         name: method_info(method, BUILT_IN, method.__module__, f"{MODEL_VERSION}.{method.version}")
@@ -58,25 +71,27 @@ def built_in() -> Mapping[str, MethodInfo]:
 
 
 def check_id(name: str, origin: str, registered: Registry) -> None:
-    """Check the id of a method that is not built in.
+    """Check that a method of the user may have a given id.
 
     Parameters
     ----------
     name : str
         The id.
     origin : str
-        File of the method, for the message.
-    registered : mapping
-        Known methods by id.
+        File of the method, with which the error message begins.
+    registered : mapping of str to MethodInfo
+        Dict that maps ids to all methods that are known already.
 
     Raises
     ------
     CoarticError
-        The id
+        One of these is the case:
 
-        - has other characters than letters, digits and ``._+/-``, or more than 80;
-        - begins with ``dual-process/`` or ``optimum/``;
-        - is, ignoring case, a known id, a condition of the learner or one of :data:`NAMES`.
+        - the id does not begin with a letter or digit, has a character other than a letter, a digit
+          or one of ``._+/-``, or has more than 80 characters;
+        - the id begins with ``dual-process/`` or ``optimum/``;
+        - the id is a known id, the id of an exploration condition or one of :data:`NAMES`, where
+          upper and lower case count as equal.
     """
     if not METHOD_NAME.fullmatch(name):
         raise CoarticError(
@@ -96,15 +111,15 @@ def check_id(name: str, origin: str, registered: Registry) -> None:
 
 
 def methods_named(name: str, registered: Registry) -> list[str]:
-    """Return the ids of the methods that a name stands for.
+    """Return the ids of the methods that a name or wildcard stands for.
 
     Parameters
     ----------
     name : str
-        An id, a condition of the learner such as ``EC1``, or a wildcard such as ``optimum/*``. Case
-        matters.
-    registered : mapping
-        Known methods by id.
+        An id, an exploration condition of the learner such as ``EC1``, or a wildcard such as
+        ``optimum/*``. Upper and lower case differ.
+    registered : mapping of str to MethodInfo
+        Dict that maps ids to all known methods.
 
     Returns
     -------
@@ -114,7 +129,14 @@ def methods_named(name: str, registered: Registry) -> list[str]:
     Raises
     ------
     CoarticError
-        No id matches.
+        No known method has this id, or matches the wildcard.
+
+    Examples
+    --------
+    >>> methods_named("EC1", built_in())
+    ['dual-process/EC1']
+    >>> methods_named("posture-qp/*", built_in())
+    ['posture-qp/current-goal', 'posture-qp/goals-ahead']
     """
     name = f"{METHOD_PREFIX}{name}" if name in EVERY_CONDITION else name
     named = [method for method in registered if fnmatchcase(method, name)]

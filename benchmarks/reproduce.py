@@ -1,4 +1,4 @@
-"""Perform stored runs again, and compare the results."""
+"""Perform stored runs again, and compare the new results with the stored ones."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from coartic.runs.store import open_store
 
 
 def find_run(prefix: str, folder: Path) -> Row:
-    """Return the run of a results folder whose id begins with ``prefix``.
+    """Return the one run of a results folder whose id begins with ``prefix``.
 
-    Raises CoarticError if the prefix is empty, if no run or more than one run matches, or if the
-    folder cannot be read.
+    Raises CoarticError if the prefix is empty or has characters that no id has, if the id of no run
+    or of more than one run begins with it, or if the folder cannot be read.
     """
     where = quote(str(folder))
     if not prefix or not set(prefix) <= set("0123456789abcdef-."):
@@ -49,10 +49,11 @@ def find_run(prefix: str, folder: Path) -> Row:
 
 
 def trajectory_of(run: Row) -> Trajectory:
-    """Execute the solution of a run, and return its movements sampled at each tick.
+    """Execute the solution of a run, and return the configuration at each control tick.
 
-    Raises CoarticError if the run has no solution, or if its solution cannot be executed or is too
-    long.
+    The solution is executed in the world of the run, but without motor noise. Raises CoarticError
+    if the run has no solution, or if the solution cannot be executed, misses a goal, or is too long
+    (:func:`.too_long`).
     """
     if "solution" not in run.movements:
         reason = f"{run['status']}, {run['reason']}"
@@ -70,10 +71,10 @@ def trajectory_of(run: Row) -> Trajectory:
 def perform_in_order(
     jobs: Sequence[Job], workers: int = 1, *, verbose: bool = False
 ) -> Iterator[tuple[Job, Row]]:
-    """Perform the jobs of each method in order in one process, and yield the scored runs.
+    """Perform jobs in one process for each method, and yield the scored runs.
 
-    Runs are yielded as they finish, each with its job, and are not stored. If a process ends, a new
-    one performs the remaining jobs of its method.
+    A process performs the jobs of its method in the order of ``jobs``. If the process ends, a new
+    process performs the remaining jobs. The runs are not stored.
 
     Parameters
     ----------
@@ -86,8 +87,14 @@ def perform_in_order(
     Yields
     ------
     Job
-        One of ``jobs`` (the same object).
+        One of ``jobs`` (the same object). Jobs come in the order in which they finish.
     Row
+        A scored run of this job.
+
+    Raises
+    ------
+    CoarticError
+        The processes cannot start or work (:meth:`.Local.perform`).
     """
     with closing(Local(workers, verbose=verbose).perform(jobs, in_order=True)) as answers:
         for job, outcomes in answers:
@@ -99,22 +106,22 @@ def perform_runs_again(runs: Sequence[Row], registered: Registry) -> Iterator[tu
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of Row
         Stored runs.
-    registered : mapping
-        Known methods by id; the methods of all runs must be among them.
+    registered : mapping of str to MethodInfo
+        Dict that maps ids to all known methods, among them the methods of all ``runs``.
 
     Yields
     ------
     Row
-        A stored run.
+        A stored run. Runs come in the order in which the new runs finish.
     Row
         The new run, which is not stored.
 
     Raises
     ------
     CoarticError
-        A method no longer accepts the parameters of a run.
+        A method does not accept the parameters of a stored run any more, or processes cannot start.
     """
     stored_runs = dict[int, Row]()
     jobs = list[Job]()
@@ -137,9 +144,11 @@ def perform_runs_again(runs: Sequence[Row], registered: Registry) -> Iterator[tu
 
 
 def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
-    """Select runs of a folder that can be performed here, spaced evenly over the plan.
+    """Select stored runs of a folder that can be performed here: every k-th run.
 
-    A run can be performed if its method has the same version or code in ``registered``.
+    A run of the plan can be performed here if its method has the same version or code in
+    ``registered``. If the folder has n such runs, k is n divided by ``count``, rounded down, but at
+    least 1; at most ``count`` runs are selected.
 
     Parameters
     ----------
@@ -147,17 +156,18 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
         Results folder.
     count : int
         Largest number of runs to select, at least 1.
-    registered : mapping
-        Known methods by id.
+    registered : mapping of str to MethodInfo
+        Dict that maps ids to all known methods.
 
     Returns
     -------
     list of Row
+        The selected runs.
 
     Raises
     ------
     CoarticError
-        No run can be performed here.
+        No run can be performed here, or the folder cannot be read.
     """
     with open_store(folder) as store:
         plan = store.plan()
@@ -179,21 +189,28 @@ def some_runs(folder: Path, count: int, registered: Registry) -> list[Row]:
 def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int, list[str]]:
     """Execute solutions of a folder with motor noise again, and compare the mean ticks.
 
-    The noise of a run has the same seed as in the scoring of the run (:func:`.with_noise`).
+    The noise of a run has the same seed as in the scoring of the run (:func:`.with_noise`). If the
+    stored ticks of a run follow another version of the rule of noise, they are not compared.
 
     Parameters
     ----------
     folder : Path
         Results folder.
     every : bool
-        True to execute all solutions; otherwise one random solution of each cell is executed.
+        True to execute the solutions of all runs; False to execute the solution of one run of each
+        cell, chosen at random.
 
     Returns
     -------
     int
-        Number of solutions.
+        Number of solutions that were passed to :func:`.with_noise`.
     list of str
-        A sentence for each run that differs.
+        A sentence for each number that differs from the stored one.
+
+    Raises
+    ------
+    CoarticError
+        The folder cannot be read.
     """
     executed, wrong = 0, list[str]()
     with open_store(folder) as store:
@@ -212,11 +229,21 @@ def execute_with_noise_again(folder: Path, *, every: bool = False) -> tuple[int,
 
 
 def compare_runs(a: Row, b: Row) -> list[str]:
-    """Compare the results of two runs.
+    """Compare the results of two runs, and describe the differences.
 
-    The function compares status, reason, details, counts, movements and rewards. If both runs have
-    the same id, it also compares the ticks with motor noise. If a run did not store all of its
-    rewards, only the stored rewards are compared.
+    The compared results are the status, the reason, the details, the counts, the movements of the
+    solution, of the first trial and of the replay, and the rewards of the trials. Times are not
+    compared.
+
+    - The ticks with motor noise are compared only if both runs have the same id and the same rule
+      of noise.
+    - If one of the runs stores only some of its rewards, only these rewards are compared
+      (:meth:`.Row.downsample`).
+
+    Parameters
+    ----------
+    a, b : Row
+        The runs.
 
     Returns
     -------

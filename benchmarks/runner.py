@@ -1,7 +1,7 @@
-"""Run a suite into a folder, as ``coartic run`` does.
+"""Run a suite, and store the runs in a results folder, as ``coartic run`` does.
 
-``run_suite("quick", "results/quick", runs=2, trials=200)`` plans a suite and performs the runs that
-the folder lacks. ``coartic.analysis.load("results/quick")`` reads the folder.
+``run_suite("quick", "results/quick", runs=2, trials=200)`` plans the runs of suite ``quick`` and
+performs those that the folder lacks. ``coartic.analysis.load("results/quick")`` reads the folder.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from coartic.runs.record import UNREPEATED, Row
 from coartic.runs.store import Store, open_store_for_writing
 
 _MIN_BATCH = 8
-"""Smallest number of runs of a job whose method performs runs side by side, if its cell has as
-many."""
+"""If a method makes many runs side by side, a job has at least this number of runs, unless its cell
+has fewer."""
 _MAX_TRIALS = 400_000
-"""Largest number of trials of a job with more than :data:`_MIN_BATCH` runs. They take some
-seconds, which is what an interruption can lose."""
+"""Largest number of trials of a job that has more than :data:`_MIN_BATCH` runs. These trials take
+some seconds; an interruption loses the runs of the jobs that are being performed."""
 _SURE = frozenset({"ok", "infeasible"})  # statuses that do not depend on other runs of the job
 
 
@@ -49,19 +49,20 @@ class Progress:
 
     folder: Path
     total: int
-    """Runs of the plan."""
+    """Number of runs of the plan."""
     present: int = 0
-    """Runs of the plan that the folder had before, except runs that are performed again."""
+    """Number of runs of the plan that the folder had before this call, without the stored runs that
+    are performed again."""
     outdated: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    """Numbers of runs in the folder that another version or code of their method made. The keys are
-    triples: method, version that made the runs, and present version. The runs stay in the folder,
-    but reports do not show them."""
+    """Numbers of the planned runs that another version or code of their method has made. The keys
+    are triples: id of the method, version (or code) that made the runs, and version in the plan.
+    These runs stay in the folder, but reports do not show them."""
     done: int = 0
-    """Runs performed by this call."""
+    """Number of runs that this call has performed so far."""
     failed: int = 0
-    """Runs of the plan that are not ok."""
+    """Number of runs of the plan whose status is not ``ok``."""
     crashed: int = 0
-    """Runs of the plan that crashed."""
+    """Number of runs of the plan with status ``crashed``."""
     marks: dict[str, list[str]] = field(default_factory=dict)
     """Dict that maps methods to warnings about their runs in the folder (:meth:`Store.marks`)."""
     others: int = 0
@@ -69,10 +70,10 @@ class Progress:
     wall_s: float = 0.0
     """Wall time of the call, in s; 0 until the call ends."""
     time_left: TimeLeft = field(default_factory=TimeLeft)
-    """Estimate of the time until all runs are performed."""
+    """Estimate of the wall time until all runs are performed."""
     repeats: int = 0
-    """Number of repeats that are still to be performed. A repeat checks whether a run of a method
-    from a file gives the same result again."""
+    """Number of runs that are still to be repeated. For each method from a file, one run is
+    performed a second time, to check that it gives the same result."""
 
     def count(self, status: str) -> None:
         """Count a run of the plan in :attr:`failed` and :attr:`crashed` by its status."""
@@ -117,7 +118,7 @@ class Progress:
 
 
 Watcher = Callable[[Progress, Cell | None], None]
-"""Function that is called with the progress and a cell:
+"""Function that is called with the progress and a cell, or None:
 
 - before the first run, with None;
 - after each run and each repeated run, with the cell of the run;
@@ -134,9 +135,9 @@ def run_suite(
     watch: Watcher | None = None,
     **options: Any,
 ) -> Progress:
-    """Plan a suite, and perform the runs that a folder lacks.
+    """Plan a suite, and perform the runs that a results folder lacks.
 
-    This function calls :func:`plan_suite` and :func:`perform`.
+    This function calls :func:`plan_suite` and then :func:`perform`.
 
     Parameters
     ----------
@@ -179,16 +180,19 @@ def perform(
 ) -> Progress:
     """Perform the runs of a plan that a results folder lacks.
 
-    - The plan replaces the plan of the folder. Runs that the new plan does not ask for stay in the
-      folder, but reports do not show them.
-    - Runs that fail are stored and counted. They do not raise an error. The next call performs
-      crashed runs again, and runs that timed out under a lower limit.
-    - Finished runs are stored even if the call is interrupted.
-    - If the ticks with noise of stored runs follow an older rule of noise, they are computed again.
-    - For each method from a file, one ok run of this call is repeated in another process. If the
-      result differs, this call warns, and reports mark the method. A method could keep state from
-      run to run; so the repeated run is the quickest run that was not the first run of its process,
-      or, if there is no such run, the quickest run.
+    - *Plan.* ``plan`` replaces the plan that the folder has stored. Runs that the new plan does not
+      ask for stay in the folder, but reports do not show them.
+    - *Failures.* Runs that fail are stored and counted; no error is raised. The next call performs
+      again the runs that crashed, and the runs that timed out under a limit of CPU time below that
+      of the new plan.
+    - *Interruption.* Runs that finished before an interruption are stored.
+    - *Motor noise.* If the stored mean ticks of a run follow another version of the rule of noise,
+      they are computed again.
+    - *Repetition.* A method from a file could keep state from one run to the next. So for each such
+      method, one run of this call is performed a second time, in another process. If the results
+      differ, this call warns, and reports mark the method. The repeated run is the quickest run
+      with status ``ok`` that was not the first run of its process; if there is none, it is the
+      quickest run with status ``ok``.
 
     Parameters
     ----------
@@ -272,10 +276,11 @@ def perform(
 
 
 def _note_quickest(run: Row, quickest: dict[str, Row]) -> None:
-    """Set ``quickest[method]`` to ``run`` if the run is quicker than the one stored there.
+    """Enter a run into ``quickest`` if it is the quickest of its method.
 
-    Runs that were the first of their method in a process count as slower than all others. Runs that
-    are not ok, and runs of built-in methods, are ignored.
+    ``quickest`` is a dict that maps the id of each method from a file to its quickest run. Runs
+    that were the first of their method in a process count as slower than all other runs. Runs whose
+    status is not ``ok``, and runs of built-in methods, are ignored.
     """
 
     def seconds(run: Row) -> tuple[bool, float]:
@@ -293,10 +298,23 @@ def _repeat_runs(
     workers: int,
     tell: Callable[[Cell | None], None],
 ) -> None:
-    """Perform each run in ``quickest`` again in another process, and mark runs that differ.
+    """Perform a run of each method from a file again, and mark differences.
 
-    If the result differs, the stored run is marked. ``quickest`` has a run of each method from a
-    file, by the id of the method.
+    Parameters
+    ----------
+    quickest : dict of str to Row
+        Dict that maps the id of each method from a file to the run that is performed again, in a
+        new process.
+    store : Store
+        Opened results folder. In the details of a run that differs, entry :data:`.UNREPEATED` is
+        set to the first difference.
+    progress : Progress
+        Progress, which is updated.
+    workers : int
+        Largest number of processes.
+    tell : callable
+        Function that is called with the cell of the first run before that run, and with the cell
+        of each run after it.
     """
     progress.time_left.expect([run.job for run in quickest.values()])
     progress.repeats = len(quickest)
@@ -312,12 +330,16 @@ def _repeat_runs(
 
 
 def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list[Job]:
-    """Return the runs of a plan that still have to be performed, as a job for each cell.
+    """Return a job for each cell of a plan that has runs to perform.
 
-    These are the runs that the store lacks. If the code of the method is available here, runs that
-    crashed, or timed out under a lower limit, are included. All other runs are counted in
-    ``progress``.
-    Raises CoarticError if the code of a method with missing runs is not available here.
+    A run has to be performed in two cases:
+
+    - The store does not have the run.
+    - The stored run crashed, or timed out under a lower limit of CPU time than that of the plan,
+      and the code of the method is available here.
+
+    All other runs of the plan are counted in ``progress``. Raises CoarticError if a run has to be
+    performed, and the code of its method is not available here.
     """
     present: set[tuple[int, int]] = set()
     for position, number, status, old_limit_s in store.present():
@@ -346,13 +368,15 @@ def _missing_jobs(plan: Sequence[Job], store: Store, progress: Progress) -> list
 
 
 def _divided(jobs: Sequence[Job], workers: int) -> list[Job]:
-    """Divide jobs into smaller jobs for workers, in the order in which they should start.
+    """Divide jobs into smaller jobs for workers, in the order of their start.
 
-    - Runs that a method makes side by side take less time than the same runs one by one. So jobs
-      are as large as methods allow, but they take only some seconds, and each worker gets a share.
-    - Jobs with more trials start earlier, so that no long job runs alone at the end. Jobs of
-      methods without a number of trials, such as planners, start first, because one run can take as
-      long as thousands of trials.
+    - *Size.* A method that makes many runs side by side takes less time than for the same runs one
+      by one. So a job has as many runs as the method allows (:meth:`.Method.max_batch`), but it
+      should take only some seconds, and each of the ``workers`` processes should get some of the
+      runs.
+    - *Order.* Jobs with more trials start earlier, so that no long job is left alone at the end.
+      Jobs of methods without a number of trials, such as planners, start first, because one of
+      their runs can take as long as thousands of trials.
     """
 
     def divide(job: Job, size: int) -> Iterator[Job]:

@@ -1,4 +1,4 @@
-"""Execution and scoring of solutions, in a process that imports no method file."""
+"""Execute and score the solutions of runs, in a process that imports no method file."""
 
 from __future__ import annotations
 
@@ -26,22 +26,28 @@ from coartic.runs.record import (
 
 
 def score(job: Job, outcomes: Sequence[Outcome]) -> list[Row]:
-    """Execute the movements of a job's outcomes, and return the rows of its runs.
+    """Execute the movements in the outcomes of a job, and return the scored runs.
 
-    Parts of an outcome (``solution``, ``initial``, ``replay``) that are too long or break the rules
-    of the task are not executed. Only runs with status ok have movements and a reward. With motor
-    noise only the part ``solution`` is scored, that is, the movements that the method recommends.
-    They are stored without ticks, and corrective movements without targets.
+    An outcome has up to three parts: ``solution``, ``initial`` (the first trial of a learner) and
+    ``replay`` (a greedy trial after learning).
+
+    - A part that is too long or breaks the rules of the task is not executed; the run then has
+      status ``solver-failed``.
+    - Only runs whose final status is ``ok`` have movements and a score.
+    - In a world with motor noise, only the solution is scored: the movements that the method
+      recommends to make next. They are stored without ticks, and corrective movements without
+      targets.
 
     Parameters
     ----------
     job : Job
     outcomes : sequence of Outcome
-        Outcome of each run of the job.
+        Outcome of each run of the job, in the order of ``job.numbers``.
 
     Returns
     -------
     list of Row
+        The scored runs, in the same order.
     """
     cell, method = job.cell, job.cell.method
     is_noisy = cell.model.motor_noise > 0.0
@@ -69,23 +75,36 @@ def score(job: Job, outcomes: Sequence[Outcome]) -> list[Row]:
 
 
 def _answer_of(outcome: Outcome) -> dict[str, list[Movement]]:
-    """Return the solution of an outcome as it is to be made again (:func:`next_action`)."""
+    """Return a dict with only the solution of an outcome, without ticks (:func:`next_action`).
+
+    The dict is empty if the outcome has no solution.
+    """
     solution = outcome.parts.get("solution")
     return {} if solution is None else {"solution": [*next_action(solution)]}
 
 
 def with_noise(runs: Sequence[Row]) -> list[Row]:
-    """Execute the solutions of runs with motor noise, and return the runs with their ticks.
+    """Execute each solution 100 times with motor noise, and add the mean ticks.
 
-    All runs must be of one cell. The ticks of a run do not depend on the other runs.
+    - In the paper's world, ``noisy_ticks`` is the mean number of ticks over the executions with
+      motor noise 0.01, or None if one of them fails. The seed of the noise is the hexadecimal
+      number before the hyphen in the id of the run.
+    - In a world with motor noise, ``mean_ticks`` is the mean number of ticks over the executions in
+      this world, and ``failed_executions`` is the number of failed executions. A failed execution
+      counts as twice the ticks of the corrective process with its best hands. The seed of the noise
+      is :func:`.judge_seed`, the same for all methods.
+    - In any other world nothing is executed.
 
-    - In the paper's world, ``noisy_ticks`` is the mean number of ticks over executions with noise
-      of 0.01, or None if an execution fails. The seed of the noise is made from the id of the run.
-    - In a world with motor noise, ``mean_ticks`` is the mean over executions in this world, and
-      ``failed_executions`` is the number of failed executions. A failed execution counts as twice
-      the ticks of the corrective process with its best hands. The seed of the noise is
-      :func:`.judge_seed`, the same for all methods.
-    - In another world without noise nothing is executed.
+    Parameters
+    ----------
+    runs : sequence of Row
+        Runs of one cell. The ticks of a run do not depend on the other runs. Runs without a
+        solution are returned unchanged.
+
+    Returns
+    -------
+    list of Row
+        Copies of the runs in which these columns are set.
     """
     solved = [run for run in runs if "solution" in run.movements]
     if not solved:
@@ -107,7 +126,10 @@ def with_noise(runs: Sequence[Row]) -> list[Row]:
 
 
 def _judge(runs: Sequence[Row], answers: Sequence[Sequence[Movement]]) -> list[dict[str, Any]]:
-    """Return ``mean_ticks`` and ``failed_executions`` of the answers of runs in a noisy world."""
+    """Return ``mean_ticks`` and ``failed_executions`` of each run in a world with motor noise.
+
+    ``answers`` has the recommended solution of each run. All runs must be of one cell.
+    """
     cell = runs[0].cell
     seeds = [run.job.judge_seed(run["run"]) for run in runs]
     means, failed = judge(cell.task, answers, cell.model, seeds)
@@ -118,16 +140,21 @@ def _judge(runs: Sequence[Row], answers: Sequence[Sequence[Movement]]) -> list[d
 
 
 def _number(value: float) -> float | None:
-    """Return a number, or None for NaN."""
+    """Return ``value``, or None if it is NaN."""
     return None if math.isnan(value) else value
 
 
 def _final_status(outcome: Outcome, parts: Mapping[str, Execution | Exception]) -> tuple[str, str]:
-    """Return status and reason of a run after the execution of its parts.
+    """Return the final status of a run, and why the run is not ok.
 
-    - ``solver-failed`` if a part cannot be executed, or if an outcome that is ok has no solution;
-    - ``infeasible`` if a part misses a goal;
+    The status is
+
+    - ``solver-failed`` if a part of the outcome cannot be executed, or if the outcome has status
+      ``ok`` but no solution;
+    - ``infeasible`` if the execution of a part misses a goal;
     - otherwise the status of the outcome.
+
+    ``parts`` is a dict that maps each part to its execution, or to the error of the execution.
     """
     for execution in parts.values():
         if isinstance(execution, Exception):

@@ -1,4 +1,4 @@
-"""Read suite files: tasks, methods, parameters and numbers of runs."""
+"""Read suite files, which list the tasks, methods, parameters and runs of a suite."""
 
 from __future__ import annotations
 
@@ -33,7 +33,11 @@ TaskNamed = Callable[[str], Task]
 
 
 def _plain_value(value: Any) -> _Plain:
-    """Validate the value of a parameter; return a list of numbers as a tuple of floats."""
+    """Validate the value of a parameter of a method, and return it.
+
+    The value is True, False, a finite number, a string or a list of finite numbers. A list is
+    returned as a tuple of floats. Raises a validation error for any other value.
+    """
     numbers = value if isinstance(value, list | tuple) else [value]
     largest = sys.float_info.max
     if numbers and all(isinstance(x, int | float) and abs(x) <= largest for x in numbers):
@@ -54,11 +58,11 @@ _Number = Annotated[int, Field(ge=1, strict=True)]
 
 
 def _worlds(value: Any) -> tuple[MotionModel, ...]:
-    """Validate a table ``model``; return the worlds of all combinations of its values.
+    """Validate a table ``model``, and return the worlds that it describes.
 
-    A tuple of worlds, which is validated already, is returned unchanged.
-
-    A list of values is a grid. The constants are those of :data:`.WORLD`.
+    The table maps constants (:data:`.WORLD`) to a value or to a list of values. The result has a
+    world for each combination of the values. A tuple of worlds is returned unchanged. Raises a
+    validation error for an unknown constant, a wrong value or an empty table.
     """
     if isinstance(value, tuple) and all(isinstance(world, MotionModel) for world in value):
         return value
@@ -88,7 +92,7 @@ Worlds = Annotated[tuple[MotionModel, ...], PlainValidator(_worlds)]
 
 
 class Move(FileData):
-    """Displacements of a goal; each displacement makes a new task."""
+    """Displacements of one goal of a task. Each displacement defines a new task."""
 
     goal: _Number
     """Number of the goal, from 1."""
@@ -97,53 +101,58 @@ class Move(FileData):
 
 
 class _Block(FileData):
-    """Methods on tasks, under all combinations of some parameters."""
+    """A block of a suite: methods on tasks, with a grid of parameters."""
 
     tasks: _Names
-    """Names or files of tasks, or ranges of instances such as ``long/v1/i000..i039``; ``["*"]`` for
-    all shipped tasks and all tasks of the user."""
+    """Names of tasks, paths of task files, or ranges of instances such as ``long/v1/i000..i039``.
+    The entry ``"*"`` stands for all shipped tasks and all tasks of the user."""
     methods: _Names
-    """Ids of methods; ``["*"]`` for all methods that apply to the tasks."""
+    """Ids of methods, exploration conditions, or wildcards. The entry ``"*"`` stands for all
+    methods. If an entry of ``tasks`` or ``methods`` has a ``*``, methods are left out on tasks to
+    which they do not apply; otherwise each method must apply to each task."""
     move: Move | None = None
-    """Table ``move``: displacements of a goal. The tasks with the moved goal replace the task."""
+    """Table ``move``: displacements of a goal. Each task is replaced by tasks in which this goal is
+    displaced."""
     free_base: Annotated[bool, Field(strict=True)] = False
-    """True to free the base in x and y on all tasks."""
+    """True to free the base in x and y on all tasks of the block, whose base must be locked."""
     goals: tuple[_Number, ...] | None = None
-    """Allowed numbers of goals: tasks with other numbers are left out. By default all are
-    allowed."""
+    """Allowed numbers of goals. Tasks with another number of goals are left out. By default all
+    numbers are allowed."""
     runs: RunCount | None = None
-    """Runs of each method on each task; by default the number of the suite."""
+    """Number of runs of each method on each task; by default the number of the suite."""
     parameters: dict[str, _Value] = Field(default_factory=dict)
-    """Parameters of the methods, by name."""
+    """Dict that maps parameters of the methods to their values."""
     grid: dict[str, Annotated[tuple[_Value, ...], _SOME]] = Field(default_factory=dict)
-    """Lists of values, by name of the parameter. All combinations of values are run. A value in
-    ``grid`` replaces that in ``parameters``."""
+    """Grid: a dict that maps parameters of the methods to lists of values. Each combination of the
+    values is run. The values in ``grid`` take the place of those in ``parameters``."""
     model: Worlds | None = None
-    """Table ``model``: the world in which methods practise and are judged, by constants that are
-    not the paper's (``motor_noise``, ``norm``, ``base_weight``); each value of a list is a world of
-    its own. By default the suite's."""
+    """Table ``model``: the worlds in which methods practise and are scored. The table maps the
+    constants that differ from the paper's (``motor_noise``, ``norm``, ``base_weight``) to a value,
+    or to a list of values; there is a world for each combination of the values. By default it is
+    the table of the suite."""
 
 
 class Suite(FileData):
-    """Content of a suite file."""
+    """A suite, with the keys of a suite file as its fields."""
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, max_length=MAX_NAME_LENGTH)]
     """Name of the suite; by default the name of its file without ``.toml``."""
     title: Line
-    """Title in lists and reports."""
+    """Title of the suite in lists and reports."""
     description: Line
-    """Sentence in lists and reports."""
+    """Sentence that describes the suite in lists and reports."""
     runs: RunCount
-    """Runs of each stochastic method on each task. Other methods are run once."""
+    """Number of runs of each stochastic method on each task. Other methods are run once."""
     trials: TrialCount | None = None
-    """Trials of a run, for methods that have this parameter."""
+    """Number of trials of a run, for methods that have parameter ``trials``. By default it is the
+    default of each method."""
     model: Worlds | None = None
-    """Table ``model`` of all blocks that have none; by default the paper's world."""
+    """Table ``model`` of all blocks that have no such table; by default the paper's world."""
     time_limit_s: Seconds | None = 600.0
-    """Limit of the CPU time of a job, in s. A job is one run, or several runs that are performed
-    side by side."""
+    """Limit of the CPU time of a job (in s). A job consists of one run, or of several runs of a
+    method that are performed side by side."""
     blocks: Annotated[tuple[_Block, ...], _SOME]
-    """Tables ``[[blocks]]``: tasks and methods."""
+    """Tables ``[[blocks]]``, each with its tasks and methods."""
 
 
 _TAKEN_BY = {
@@ -154,25 +163,32 @@ _TAKEN_BY = {
     "method file": "coartic check METHOD --method-file {}",
     "shipped family": "coartic list {}",
 }
-"""Dict that maps kinds of names to the command that accepts such a name."""
+"""Dict that maps each kind of name (:func:`kind_of`) to the command that accepts such a name. The
+``{}`` in a command stands for the name."""
 
 
 def kind_of(name: str) -> str:
-    """Return the kind of object that a user's name, file or folder stands for.
+    """Return what kind of thing the name of a user stands for.
 
     Parameters
     ----------
     name : str
-        Name, file or folder.
+        Name, or path of a file or folder.
 
     Returns
     -------
     str
-        - ``suite`` or ``shipped family`` for the name of a shipped one;
+        - ``suite`` for the name of a shipped suite;
+        - ``shipped family`` for the name of a shipped family, with or without ``/v1``;
         - ``method file`` for a name that ends in ``.py``;
-        - ``suite``, ``family`` or ``task`` for a TOML file, by its keys;
+        - ``suite``, ``family`` or ``task`` for a TOML file, which is recognised by its keys;
         - ``results folder`` for a folder with results, or a folder that cannot be opened;
         - an empty string for anything else, such as a TOML file that cannot be read.
+
+    Examples
+    --------
+    >>> kind_of("comparison"), kind_of("two-armed"), kind_of("mine.py"), kind_of("EC4")
+    ('suite', 'shipped family', 'method file', '')
     """
     if name in suites():
         return "suite"
@@ -192,9 +208,10 @@ def kind_of(name: str) -> str:
 
 
 def check_kind(name: str, *kinds: str) -> None:
-    """Raise CoarticError if a thing has a known kind (:func:`kind_of`) that is not in ``kinds``.
+    """Raise CoarticError if a name stands for a thing of another kind than ``kinds``.
 
-    The message has the command that takes the thing.
+    The kinds are those of :func:`kind_of`. The error message says which command accepts the name.
+    Nothing is raised for a name whose kind is not known.
     """
     kind = kind_of(name)
     if kind and kind not in kinds:
@@ -202,14 +219,27 @@ def check_kind(name: str, *kinds: str) -> None:
 
 
 def suites() -> dict[str, Suite]:
-    """Return a new dict that maps names to the shipped suites."""
+    """Read the shipped suites, and return a dict that maps names to suites."""
     return {path.stem: _read_suite(path) for path in sorted(SUITE_FOLDER.glob("*.toml"))}
 
 
 def load_suite(name: str) -> Suite:
-    """Return a shipped suite by name, or read a suite file (``.toml``).
+    """Return a shipped suite by its name, or the suite of a suite file.
 
-    Raises CoarticError for an unknown name, or a file that is not a valid suite.
+    Parameters
+    ----------
+    name : str
+        Name of a shipped suite, or path of a suite file, which ends in ``.toml``.
+
+    Returns
+    -------
+    Suite
+
+    Raises
+    ------
+    CoarticError
+        The name is unknown, or stands for something other than a suite; or the file cannot be read
+        or is not a valid suite.
     """
     shipped = suites()
     if name not in shipped:
@@ -222,7 +252,10 @@ def load_suite(name: str) -> Suite:
 
 
 def _read_suite(path: Path) -> Suite:
-    """Return the suite of a file. Raises CoarticError if the file is not a valid suite."""
+    """Read a suite from its file.
+
+    Raises CoarticError if the file cannot be read or is not a valid suite.
+    """
     content = read_toml(path)
     try:
         return Suite.model_validate({"name": path.stem, **content})
@@ -233,7 +266,10 @@ def _read_suite(path: Path) -> Suite:
 
 @contextmanager
 def errors_of_block(suite: Suite, number: int) -> Iterator[None]:
-    """Name a suite and the number of a block, from 1, in each CoarticError of a ``with`` block."""
+    """Add a suite's name and a block's number to errors of a ``with`` block.
+
+    The message of each CoarticError begins with them. ``number`` counts the blocks from 1.
+    """
     try:
         yield
     except CoarticError as error:
@@ -241,21 +277,23 @@ def errors_of_block(suite: Suite, number: int) -> Iterator[None]:
 
 
 def tasks_of(block: _Block, own: Collection[str], task_named: TaskNamed) -> Iterator[Task]:
-    """Yield the tasks of a block in order, with the changes that the block asks for.
+    """Yield the tasks of a block of a suite, changed as the block asks.
 
-    A block can ask for a free base, or for tasks with a moved goal.
+    A block can ask for tasks with a free base (``free_base``) and for tasks with a displaced goal
+    (``move``).
 
     Parameters
     ----------
     block : _Block
     own : collection of str
-        Names of the user's tasks, which belong to a block for all tasks (``*``).
+        Names of the user's tasks, which belong to a block with the entry ``*`` in ``tasks``.
     task_named : callable
-        Function that returns a task by its name.
+        Function that returns the task with a given name or file.
 
     Yields
     ------
     Task
+        The tasks, in the order of the block. A task that is named twice is yielded once.
 
     Raises
     ------
@@ -273,10 +311,14 @@ def tasks_of(block: _Block, own: Collection[str], task_named: TaskNamed) -> Iter
 
 
 def _changed_tasks(task: Task, block: _Block) -> list[Task]:
-    """Return the tasks that a block makes of a task: with a free base, or with a moved goal.
+    """Return the tasks that a block of a suite makes of a task.
 
-    Raises CoarticError if the base is free already, if the task does not have the goal, or if the
-    goal would be out of reach.
+    - With ``free_base`` the base is freed.
+    - With ``move`` there is a task for each displacement of the goal.
+    - Otherwise the list has only the task itself.
+
+    Raises CoarticError if the base is free already, if the task does not have the goal, or if a
+    displaced goal is out of reach.
     """
 
     def changed(name: str, difference: str, **changes: Any) -> Task:

@@ -1,4 +1,4 @@
-"""Estimate how long the missing runs of a plan will take, from the times of other runs."""
+"""Estimate how long the missing runs of a plan will take."""
 
 from __future__ import annotations
 
@@ -14,26 +14,39 @@ from coartic.runs.plan import Cell, Job, trials_in
 from coartic.runs.shipped import open_shipped
 
 _Kind = tuple[str, str, int]
-"""Method, task and number of trials (0 without trials). Runs of a kind take about equally long."""
+"""Kind of a run: id of the method, name of the task, and number of trials (0 for a method without
+trials). Runs of the same kind take about equally long."""
 _EARLY = 0.1
-"""Share of the work before which there is no estimate, because processes are starting."""
+"""Until this share of the work is done there is no estimate, because at first processes are
+starting."""
 _RECENT = 0.15
-"""Share of the finished work after which the weight of an earlier run is halved. The weight falls
-because the load of a machine changes."""
+"""Half-life of the weight of a finished run, as a share of the time of all finished runs. Earlier
+runs have less weight, because the load of a machine changes."""
 
 
 class TimeLeft:
-    """Estimate of the time until all expected runs are made.
+    """Estimate of the wall time until all expected runs are finished.
+
+    The estimate is the sum of the expected times of the missing runs, divided by the number of runs
+    that are made at once.
+
+    - *Method with shipped results.* The expected time of a run is the mean time of the shipped runs
+      of the method on this task (on all tasks, if none are shipped for this one), in proportion to
+      the number of trials, times a factor of this machine. The factor is the same for all such
+      methods: the time of the finished runs divided by the time of such runs in the shipped
+      results.
+    - *Any other method.* The expected time is the mean time of the method's own finished runs, in
+      proportion to the number of trials.
+    - *Weights.* Recent runs have more weight in these means than earlier ones.
+    - *Runs at once.* Their number is ``workers`` or, if that is larger, the total time of the
+      finished runs divided by the elapsed wall time.
 
     Several threads can use the same object.
 
-    The estimate assumes that
-
-    - a run of a shipped method takes as long as the shipped runs of the method on this task, or on
-      all tasks if this one is not shipped, times a factor of this machine;
-    - a run of another method takes as long as its runs here;
-    - recent runs have more weight than earlier ones;
-    - ``workers`` runs are made at once, or more if the times of finished runs add up to more.
+    Parameters
+    ----------
+    workers : int
+        Number of runs that are made at once.
     """
 
     def __init__(self, workers: int = 1) -> None:
@@ -46,14 +59,22 @@ class TimeLeft:
         self._lock = threading.Lock()
 
     def expect(self, jobs: Iterable[Job]) -> None:
-        """Set the runs to be made from now on."""
+        """Set the runs that are still to be made to those of ``jobs``."""
         with self._lock:
             self._waiting.clear()
             for job in jobs:
                 self._waiting[_kind_of(job.cell)] += len(job.numbers)
 
     def finish(self, cell: Cell, wall_s: float | None) -> None:
-        """Count an expected run of a cell that was made in ``wall_s`` s; None if unknown."""
+        """Count an expected run as finished, and learn from its time.
+
+        Parameters
+        ----------
+        cell : Cell
+            Cell of the run.
+        wall_s : float or None
+            Wall time of the run (in s); None if it is unknown.
+        """
         kind = _kind_of(cell)
         with self._lock:
             self._last = time.monotonic()
@@ -67,10 +88,15 @@ class TimeLeft:
 
     @property
     def seconds(self) -> float:
-        """Time left, in s.
+        """Estimated wall time that is left (in s); 0 if no run is missing.
 
-        The estimate is NaN until a tenth of the work is done, and while runs of a method are
-        missing whose time is unknown. If no run finishes for a long time, the estimate grows again.
+        The estimate is NaN in two cases:
+
+        - less than a tenth of the work is done;
+        - the time of a missing run is unknown, because no run of its method (or, for methods with
+          shipped results, of any such method) has finished.
+
+        If no run finishes for a long time, the estimate grows again.
         """
         with self._lock:
             left_s = sum(
@@ -87,16 +113,21 @@ class TimeLeft:
         return max(left_s / at_once - since_s, since_s / 4)
 
     def _factor(self, method: str) -> float:
-        """Return the time of a method's runs here as a multiple of :func:`_shipped_s`.
+        """Return the factor between the times of finished runs and their :func:`_shipped_s`.
 
-        It is NaN before the first run of the method's group.
+        The finished runs are those of the method's group (:func:`_group_of`). The factor is NaN
+        before the first of them.
         """
         usual_s = self._usual_s[_group_of(method)]
         return self._took_s[_group_of(method)] / usual_s if usual_s else math.nan
 
 
 def _group_of(method: str) -> str:
-    """Return the group of a method. Its runs have the same factor; shipped methods are a group."""
+    """Return the name of the group of methods to which a method belongs.
+
+    All methods with shipped results are one group, whose name is empty. Any other method is a group
+    of its own, whose name is the id of the method.
+    """
     return "" if method in _shipped_means() else method
 
 
@@ -106,9 +137,11 @@ def _kind_of(cell: Cell) -> _Kind:
 
 
 def _shipped_s(kind: _Kind) -> float:
-    """Return the mean time (in s) of a shipped run of this kind, scaled to its number of trials.
+    """Return the expected time of a run by the shipped results (in s).
 
-    If no runs of the method are shipped, 1 s stands for a run with the default number of trials.
+    The time is the mean wall time of the shipped runs of the method on the task (on all tasks, if
+    none are shipped for this one), in proportion to the number of trials. If no runs of the method
+    are shipped, the time is 1 s for a run with 10,000 trials or without trials.
     """
     method, task, trials = kind
     by_task = _shipped_means().get(method, {})
@@ -118,9 +151,9 @@ def _shipped_s(kind: _Kind) -> float:
 
 @cache
 def _shipped_means() -> Mapping[str, Mapping[str, float]]:
-    """Return the mean time (in s) of the shipped runs by method and task.
+    """Return the mean wall times of shipped runs (in s), keyed by method, then task.
 
-    These are runs in the paper's world with the default setting.
+    The means are over the shipped runs in the paper's world with the default parameters.
     """
     with open_shipped("comparison") as store:
         runs = store.runs()

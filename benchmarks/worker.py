@@ -1,7 +1,7 @@
-"""Let a method solve a task in a worker process, and return the outcome as plain data.
+"""Let methods solve tasks in worker processes, and return the outcomes as JSON.
 
-A method can run any code. The parent process does not import method files: it checks the form of
-the outcome, and executes and scores the solution.
+A method can run any code. Therefore the parent process does not import method files. It checks the
+form of the outcome that the worker sends, and executes and scores the solution itself.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _MALFORMED = ValueError, TypeError, ArithmeticError, AttributeError, LookupError
 
 
 def peak_rss_mib() -> float:
-    """Return the largest resident memory of this process so far, in MiB."""
+    """Return the peak resident set size of this process so far (in MiB)."""
     unit = 2**20 if sys.platform == "darwin" else 2**10
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
@@ -55,9 +55,23 @@ def fail(
     wall_s: float | None = None,
     cpu_s: float | None = None,
 ) -> list[Outcome]:
-    """Return an outcome for each run of a job whose worker did not give a usable answer.
+    """Return the outcomes of the runs of a job that has no usable answer.
 
-    ``wall_s`` and ``cpu_s`` are the times of the job, in s. Each run gets an equal share of them.
+    Parameters
+    ----------
+    job : Job
+    status : {"timeout", "crashed"}
+        Status of all runs of the job.
+    reason : str
+        Why the job has no usable answer.
+    wall_s, cpu_s : float, optional
+        Wall time and CPU time of the job (in s), which are divided equally among its runs. By
+        default they are unknown.
+
+    Returns
+    -------
+    list of Outcome
+        An outcome for each run of the job.
     """
     runs = len(job.numbers)
     times = Times(wall_s and wall_s / runs, cpu_s and cpu_s / runs, together=runs)
@@ -65,10 +79,10 @@ def fail(
 
 
 def answer_of(outcomes: Sequence[Outcome]) -> bytes:
-    """Return outcomes as JSON, a list of objects with the fields of :class:`Outcome`.
+    """Encode outcomes as JSON: a list of objects with the fields of :class:`Outcome`.
 
-    NaN and infinity are written as Python writes them. Raises TypeError, ValueError or
-    RecursionError for data that JSON cannot represent.
+    NaN and infinity are written as ``NaN`` and ``Infinity``, which Python's module ``json`` reads.
+    Raises TypeError, ValueError or RecursionError for data that JSON cannot represent.
     """
 
     def plain(outcome: Outcome) -> dict[str, Any]:
@@ -82,9 +96,10 @@ def answer_of(outcomes: Sequence[Outcome]) -> bytes:
 
 
 def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
-    """Return the outcomes of a job from its answer, the JSON of :func:`answer_of`.
+    """Decode the outcomes of a job from its answer (:func:`answer_of`).
 
-    If the answer is malformed, each run has an outcome ``crashed``.
+    If the answer is malformed, or does not have an outcome for each run of the job, all outcomes
+    have status ``crashed``.
     """
     try:
         content = json.loads(answer)
@@ -101,9 +116,19 @@ def outcomes_from(job: Job, answer: bytes) -> list[Outcome]:
 
 
 def perform_job(job: Job) -> list[Outcome]:
-    """Perform the runs of a job in this process, and return the outcome of each run, in order.
+    """Perform the runs of a job in this process, and return their outcomes.
 
-    An error of the method becomes an outcome, and is not raised.
+    An error that the method raises is not raised here: it becomes the outcome of the run. If the
+    job has several runs, the method makes them together (:meth:`.Method.solve_together`).
+
+    Parameters
+    ----------
+    job : Job
+
+    Returns
+    -------
+    list of Outcome
+        Outcome of each run, in the order of ``job.numbers``.
     """
     cell, name = job.cell, job.cell.method.name
     sessions = [
@@ -154,9 +179,18 @@ _seen: set[str] = set()
 
 
 def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times) -> Outcome:
-    """Return the outcome of a run from the result of its method, or from the error it raised.
+    """Return the outcome of a run.
 
-    ``session`` has counted the trials and rewards of the run.
+    Parameters
+    ----------
+    method : MethodInfo
+        Method of the run.
+    result : object
+        What the method returned, or the error that it raised.
+    session : Session
+        Session of the run, with its counts and the rewards of its trials.
+    times : Times
+        Times and memory of the run.
     """
     spent: dict[str, Any] = {
         "used": tuple(sorted(item.value for item in session.used)),
@@ -181,9 +215,10 @@ def _outcome_of(method: MethodInfo, result: Any, session: Session, times: Times)
 
 
 def _place_of(error: BaseException, method: MethodInfo) -> str:
-    """Return the last line of the method file in a traceback, as ``mine.py, line 12: ``.
+    """Return where a method file caused an error, such as ``mine.py, line 12: ``.
 
-    The result is empty if the traceback has no line of the file, and for built-in methods.
+    The line is the last line of the file in the traceback of the error. The result is an empty
+    string if the traceback has no line of the file, and for built-in methods.
     """
     if method.is_ours:
         return ""
@@ -196,6 +231,19 @@ def _place_of(error: BaseException, method: MethodInfo) -> str:
 
 def statement(result: Any, session: Session) -> dict[str, Any]:
     """Return the fields ``parts`` and ``details`` of an outcome from the result of a method.
+
+    Parameters
+    ----------
+    result : object
+        What the method returned.
+    session : Session
+        Session of the run, which checks that the solution uses only declared information.
+
+    Returns
+    -------
+    dict
+        ``parts`` is a dict that maps ``solution``, and ``initial`` and ``replay`` if they are not
+        empty, to lists of movements. ``details`` is a copy of the details as plain data.
 
     Raises
     ------
@@ -223,8 +271,8 @@ def statement(result: Any, session: Session) -> dict[str, Any]:
 def _plain_details(details: Any) -> dict[str, Any]:
     """Return a copy of the details of a result as plain data.
 
-    Raises TypeError, ValueError or RecursionError for details that JSON cannot represent, or with
-    more than 10,000,000 characters.
+    Raises TypeError, ValueError or RecursionError for details that JSON cannot represent, or whose
+    JSON has more than 10,000,000 characters.
     """
     text = json.dumps(details, allow_nan=False, ensure_ascii=False)
     if len(text) > _MAX_DETAILS_LENGTH:

@@ -18,10 +18,10 @@ class SolutionError(CoarticError):
 
 
 class NotApplicableError(CoarticError):
-    """A method, an exploration condition or a search for hands does not apply to a task.
+    """A method or condition does not apply to a task.
 
-    For example, the condition does not fit the task or the first solution, or the search finds no
-    hands.
+    For example, an exploration condition uses a hand that the task or the first solution does not
+    have, or a search for the initial hands finds no sequence that completes the task.
     """
 
 

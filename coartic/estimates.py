@@ -1,7 +1,8 @@
 """Means and differences of means, with confidence intervals.
 
-Samples are rewards or other scores of independent runs. Intervals come from the BCa bootstrap;
-:func:`mean_of_means` lists the exceptions. All resampling here uses the same seed, :data:`SEED`.
+A sample has the rewards or other scores of independent runs. The confidence intervals are those of
+the BCa bootstrap (bias-corrected and accelerated); :func:`mean_of_means` lists the exceptions. All
+resampling here uses the same seed, :data:`SEED`.
 
 Source: B. Efron & R. J. Tibshirani (1993), An Introduction to the Bootstrap, chapter 14.
 """
@@ -25,11 +26,11 @@ from coartic.robot import Array
 CONFIDENCE = 0.95
 """Nominal coverage of intervals."""
 TAILS = (1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2
-"""Quantiles at the two ends of an interval of coverage :data:`CONFIDENCE`."""
+"""Probabilities of the quantiles at the two ends of an interval of coverage :data:`CONFIDENCE`."""
 LEVEL = 0.05
-"""Level of a test."""
+"""Significance level of tests."""
 Resamples = Annotated[int, Field(ge=1, le=10_000_000)]
-"""Number of resamples."""
+"""Type of a parameter: number of bootstrap resamples."""
 RESAMPLES = 9_999
 """Default number of resamples: 0.05 and 0.01 of 9,999 + 1 are integers."""
 SEED = 0
@@ -47,9 +48,9 @@ interval of at most :data:`FEWER_RESAMPLES` resamples, which BCa would hardly ch
 HUGE = 50_000
 """Largest size of a sample that is resampled. A larger sample has a normal interval."""
 IN_CACHE = 1 << 18
-"""Number of values that are drawn at once: few enough for the processor's cache."""
+"""Number of values that are drawn at a time, so that they fit into the processor's cache."""
 NEGLIGIBLE = 1e-9
-"""Differences of at most this share of the largest value count as rounding."""
+"""Differences of at most this fraction of the largest value count as rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class Estimate:
 
 
 def vector(values: ArrayLike) -> Array:
-    """Return a sample of real numbers as a vector of floats, shape ``(n,)``.
+    """Convert a sample of real numbers to a vector of floats, shape ``(n,)``.
 
     Raises ValueError if ``values``
 
@@ -111,16 +112,17 @@ def slices(count: int, size: int) -> Iterator[slice]:
 def varies(values: Array) -> Array:
     """Return whether values differ along the first axis by more than rounding errors.
 
-    The result has a bool for each entry of the other axes. The bool is False if the values include
-    NaN or infinity. :data:`NEGLIGIBLE` is the bound of rounding errors.
+    The result is an array of bool with the shape of the other axes. An entry is False if the values
+    along the first axis include NaN or infinity. :data:`NEGLIGIBLE` bounds rounding errors.
     """
     return np.asarray(np.ptp(values, 0) > NEGLIGIBLE * np.abs(values).max(0))
 
 
 def centred(values: Array) -> Array:
-    """Subtract from values their mean over the first axis.
+    """Subtract the mean over the first axis from values.
 
-    The result is 0 where values do not vary (:func:`varies`), or include NaN or infinity.
+    The result has the shape of ``values``. It is 0 where values do not vary (:func:`varies`), or
+    include NaN or infinity.
     """
     return np.where(varies(values), values - np.mean(values, axis=0), 0.0)
 
@@ -142,6 +144,13 @@ def mean(values: ArrayLike) -> Estimate:
     ------
     ValueError
         The sample cannot be used (:func:`vector`).
+
+    Examples
+    --------
+    >>> rewards = [-319, -305, -311, -298, -307, -316]
+    >>> estimate = mean(rewards)
+    >>> estimate.value, estimate.low < estimate.value < estimate.high
+    (-309.3333333333333, True)
     """
     return _mean_of(tuple(vector(values).tolist()))
 
@@ -184,7 +193,7 @@ def mean_of_means(
     samples : sequence of array_like, shapes (n,)
         The samples; each is resampled separately.
     weights : sequence of float
-        A factor for the mean of each sample.
+        Factor by which the mean of each sample is multiplied.
     resamples : int
         Number of bootstrap resamples.
 
@@ -200,7 +209,7 @@ def mean_of_means(
           defined;
         - otherwise the BCa interval.
 
-            Raises
+    Raises
     ------
     ValueError
         There is no sample, the number of weights differs from the number of samples, or a sample
@@ -247,8 +256,20 @@ def mean_of_means(
 def resample_indices(sizes: Sequence[int], resamples: int) -> Iterator[list[NDArray[np.int64]]]:
     """Yield bootstrap indices in batches of at most 1,000 resamples.
 
-    A batch is a list with an index array for each sample, shape ``(batch, size)``. ``sizes`` has
-    the number of values in each sample. Equal arguments give equal indices.
+    Equal arguments give equal indices.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Number of values in each sample.
+    resamples : int
+        Number of resamples over all batches.
+
+    Yields
+    ------
+    list of ndarray of int
+        An array of indices for each sample, shape ``(b, size)``, where b is the number of resamples
+        in the batch.
     """
     rng, batch = np.random.default_rng(SEED), 1_000
     if max(sizes) > LARGE:
@@ -259,9 +280,9 @@ def resample_indices(sizes: Sequence[int], resamples: int) -> Iterator[list[NDAr
 
 @lru_cache(maxsize=8)  # samples often have equal sizes
 def _cached_indices(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray[np.uint16]]]:
-    """Return a cached list of all batches of :func:`resample_indices`; do not change it.
+    """Return a list of all batches of :func:`resample_indices`, from a cache.
 
-    The indices are stored in 16 bits, which takes a quarter of the memory.
+    Do not change the list. The indices are stored in 16 bits, a quarter of their usual memory.
     """
     return [
         [indices.astype(np.uint16) for indices in batch]
@@ -270,9 +291,9 @@ def _cached_indices(sizes: tuple[int, ...], resamples: int) -> list[list[NDArray
 
 
 def standard_deviation(values: Array) -> float:
-    """Compute the standard deviation of values, shape ``(n,)``, with n - 1 degrees of freedom.
+    """Compute the standard deviation of values, with n - 1 degrees of freedom.
 
-    The result is NaN for fewer than two values. For two or more values it is 0 if they do not vary
-    (:func:`varies`) or include NaN or infinity.
+    ``values`` has shape ``(n,)``. The result is NaN for fewer than two values. For two or more
+    values it is 0 if they do not vary (:func:`varies`), or include NaN or infinity.
     """
     return float(np.std(centred(values), ddof=1)) if len(values) > 1 else math.nan

@@ -1,10 +1,14 @@
-"""Tasks and families as environments of Gymnasium. A step reaches for a goal and costs ticks.
+"""Tasks and families of tasks as environments of Gymnasium.
 
-Importing this module registers the ids :data:`IDS`, such as ``coartic/Ascending-v2``.
-``coartic/Task-v2`` is for any other task or a family. ``gymnasium.make`` makes an environment,
-``gymnasium.make_vec`` makes a vector environment, and :func:`sb3` makes environments for
-Stable-Baselines3. :func:`score` compares policies with planners. The module needs the extra
-``coartic[gym]``.
+In each step of an environment the robot reaches for one goal; the reward is minus the control ticks
+that this takes. Importing this module registers the ids of :data:`IDS`: one for each shipped task,
+such as ``coartic/Ascending-v2``, and ``coartic/Task-v2`` for any other task or a family.
+
+- ``gymnasium.make`` makes an environment, ``gymnasium.make_vec`` a vector environment, and
+  :func:`sb3` environments for Stable-Baselines3.
+- :func:`score` compares policies with planners.
+
+The module needs the extra ``coartic[gym]``.
 """
 
 from __future__ import annotations
@@ -54,7 +58,8 @@ except ImportError:
     raise MissingExtraError("coartic.gym needs Gymnasium: pip install 'coartic[gym]'") from None
 
 REACH = 0.5
-"""Half width of the box of targets around a posture, in length units (base) and rad (angles)."""
+"""Half width of the box of targets around a posture, in length units (base) and rad (angles): an
+action entry of 1 moves the target of its joint by this amount."""
 JUDGED = 100
 """Number of noise draws over which :func:`score` averages if the model has motor noise."""
 IDS: dict[str, dict[str, Any]] = {
@@ -66,18 +71,20 @@ _NEUTRAL = (
     *("OrderEnforcing", "PassiveEnvChecker", "SyncVectorEnv"),
     *("Monitor", "DummyVecEnv", "VecMonitor", "SharesOfTicks"),
 )
-"""Classes that change neither observations nor actions nor the length of a trial."""
+"""Names of wrapper classes that change neither observations, nor actions, nor the length of a
+trial."""
 
 
 class TaskEnv(gymnasium.Env):
-    """Environment in which a robot makes trials, one after another.
+    """Environment in which a robot makes trials of a task or family.
 
-    An episode is a trial. A step reaches for the next goal, so a trial has at most as many steps as
-    there are goals. The reward of a step is minus the number of its ticks. If the corrective
-    process fails, the reward is -1,000,000 and the trial ends. Trials are never truncated. Only two
-    things are random: the instance, if the task is a family, and the motor noise, if the model has
-    any. ``reset(seed=n)`` begins a trial with draw 0 of the noise of seed n; ``reset()`` begins a
-    trial with the next draw.
+    - *Episode.* An episode is a trial. In each step the robot reaches for the next goal, so that a
+      trial has at most as many steps as the task has goals. Trials are never truncated.
+    - *Reward.* The reward of a step is minus its number of control ticks. If the corrective process
+      fails, the reward is -1,000,000, and the trial ends.
+    - *Random numbers.* Two things can be random: the instance, if the task is a family, and the
+      motor noise, if the model has any. ``reset(seed=n)`` begins a trial with noise draw 0 of seed
+      n; ``reset()`` begins a trial with the next noise draw.
 
     Parameters
     ----------
@@ -120,16 +127,16 @@ class TaskEnv(gymnasium.Env):
     - in a family whose robots have different numbers of links, for each joint 1 if the robot can
       move it, else 0.
 
-    An action of shape ``(A,)`` has an entry for the hand, if the task has two hands, and an entry
-    for each joint. Entries are clipped to the range from -1 to 1.
+    An action, shape ``(A,)``, has an entry for the hand, if the task has two hands, and an entry
+    for each joint. Entries for joints are clipped to the range from -1 to 1.
 
-    - The corrective process finds a posture at the goal for each hand. An entry for the hand up to
-      0.5 chooses the hand whose posture is nearer in joint space. An entry above 0.5 chooses the
-      other hand.
+    - For each hand, the corrective process finds a posture in which this hand is at the goal. If
+      the entry for the hand is at most 0.5, the hand whose posture is nearer in joint space is
+      chosen. If the entry is above 0.5, the other hand is chosen.
     - The target of the movement is the posture of the chosen hand, plus :data:`REACH` times the
-      entries of the joints. If the corrective process fails, the present posture takes the place of
-      the posture of the chosen hand.
-    - Entries of joints that a robot cannot move have no effect.
+      entries for the joints. If the corrective process fails for the chosen hand, the present
+      configuration takes the place of its posture.
+    - Entries for joints that a robot cannot move have no effect.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 4}
@@ -289,7 +296,7 @@ class TaskEnv(gymnasium.Env):
         return self._seen(), reward, not self.going, False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draw the robot and its goals. Goals that were hit are filled.
+        """Draw the robot and its goals; goals that were hit are filled.
 
         Returns
         -------
@@ -313,7 +320,7 @@ class TaskEnv(gymnasium.Env):
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def _load(self, number: int) -> None:
-        """Prepare trials of the task with index ``number``."""
+        """Load the task with index ``number``, from 0, and prepare its trials."""
         self.tasks[number] = task = as_task(self.tasks[number])
         self._compiled = compiled_task(task, self.model, checks=False)
         self._exact = compiled_task(task, self.model.without_noise(), checks=False)
@@ -337,11 +344,23 @@ class TaskEnv(gymnasium.Env):
     def _reach(self, compiled: CompiledTask, hand: int, targets: Array) -> NDArray[np.void]:
         """Reach for the next goal with a hand, and perhaps for the goal after it.
 
-        ``compiled`` is the task with or without noise, and ``hand`` the index of a hand in
-        ``task.hands``. ``targets`` has shape ``(1, goals, 1, dof)``, for one or two goals; without
-        a target (NaN) only the corrective process moves the arm. The first hand of the task reaches
-        for the second goal. Return a record for each goal. Both movements are made in one call,
-        because each call is slow.
+        Both movements are made in one call, because each call is slow.
+
+        Parameters
+        ----------
+        compiled : CompiledTask
+            The task with or without motor noise.
+        hand : int
+            Index in ``task.hands`` of the hand that reaches for the next goal. The first hand of
+            the task reaches for the goal after it.
+        targets : ndarray, shape (1, goals, 1, dof)
+            Targets for one or two goals, in length units and rad. If all entries of a goal are NaN,
+            only the corrective process moves the arm.
+
+        Returns
+        -------
+        ndarray, shape (goals,)
+            A per-goal record for each goal.
         """
         sides = self._sides[hand][:, : targets.shape[1]]
         noisy = compiled.model.motor_noise > 0.0
@@ -349,9 +368,10 @@ class TaskEnv(gymnasium.Env):
         return reach_next(compiled, self.q[None], sides, targets, self.goal, worlds).goals[0, :, 0]
 
     def _reached_by(self, hands: range) -> list[Any]:
-        """Return the record of each hand if only the corrective process reaches for the next goal.
+        """Let the corrective process reach for the next goal with each hand.
 
-        The process reaches without noise.
+        ``hands`` are indices in ``task.hands``. Return the per-goal record of each. The process
+        reaches without motor noise, and the robot itself does not move.
         """
         return [self._reach(self._exact, hand, self._no_targets[:, :1])[0] for hand in hands]
 
@@ -370,11 +390,11 @@ class TaskEnv(gymnasium.Env):
 
 
 class SharesOfTicks(gymnasium.RewardWrapper):
-    """Wrapper that divides rewards by the ticks of the corrective process.
+    """Wrapper that divides the rewards by the ticks of the corrective process.
 
     The divisor is the number of ticks that the corrective process on its own takes for the whole
-    task with the initial hands, but at least 1. If the process cannot complete the task, the
-    divisor is 1,000,000. A scaled reward below -2 becomes -2.
+    task with the initial hands, but at least 1. If the process does not complete the task, the
+    divisor is 1,000,000. A scaled reward below -2 is raised to -2.
     """
 
     def __init__(self, env: gymnasium.Env) -> None:
@@ -382,7 +402,7 @@ class SharesOfTicks(gymnasium.RewardWrapper):
         self._ticks: dict[int, float] = {}
 
     def reward(self, reward: Any) -> float:
-        """Divide a reward (in ticks) by the divisor; a result below -2 becomes -2."""
+        """Return a scaled reward, at least -2, from a reward (in ticks)."""
         env: Any = self.unwrapped
         if env.number not in self._ticks:
             corrective = initial_reward(env.task, env.model)
@@ -589,8 +609,8 @@ def _is_family(task: Any) -> bool:
 def _layers(env: Any) -> list[Any]:
     """List the layers of an environment, from the outermost wrapper to the environment inside.
 
-    For a vector environment these are the layers of its first environment. Raises TypeError if its
-    environments have different options.
+    Below a vector environment, the list goes on with the layers of its first environment. Raises
+    TypeError if the environments of a vector environment have different options.
     """
     layers = [env]
     while (name := next((n for n in ("venv", "env", "envs") if hasattr(env, n)), None)) is not None:
@@ -616,18 +636,24 @@ def _normalises(env: Any) -> bool:
 def _actions_of(
     policy: Any, env: Any, wrappers: list[Any], normal: Any
 ) -> Callable[[NDArray[np.float32]], ArrayLike]:
-    """Return a function from observations ``(N, O)`` to the actions ``(N, A)`` of a policy.
+    """Return a function that computes the actions of a policy.
 
     Parameters
     ----------
     policy : callable or agent
+        Function of observations, or object with the ``predict`` of Stable-Baselines3.
     env : object
         Environment in which the policy acts.
     wrappers : list
         Wrappers of ``env`` that change observations or actions.
     normal : VecNormalize or None
-        Normalisation of observations. If it is None and no wrapper normalises, the agent's own is
-        used.
+        Normalisation of observations. If it is None, and no wrapper normalises observations, the
+        normalisation of the agent's own environment is used.
+
+    Returns
+    -------
+    callable
+        Function that maps observations, shape ``(N, O)``, to actions, shape ``(N, A)``.
 
     Raises
     ------
@@ -668,9 +694,26 @@ def _actions_of(
 def _trials(act: Callable[[Any], ArrayLike], setting: TaskEnv, trials: int, seed: int) -> Array:
     """Make trials side by side on each task of an environment.
 
-    ``act`` returns actions ``(n, A)`` for observations ``(n, O)``. Trial k of a task meets draw k
-    of the judge's noise. The result, shape ``(tasks, trials)``, has the total rewards (in ticks),
-    and NaN for trials that failed.
+    Parameters
+    ----------
+    act : callable
+        Function that maps observations, shape ``(n, O)``, to actions, shape ``(n, A)``.
+    setting : TaskEnv
+        Environment, of which copies make the trials.
+    trials : int
+        Number of trials on each task.
+    seed : int
+        Seed from which the noise seed for scoring is derived. Trial k has noise draw k.
+
+    Returns
+    -------
+    ndarray, shape (tasks, trials)
+        Total rewards (in ticks); NaN for a trial that failed.
+
+    Raises
+    ------
+    ValueError
+        ``act`` does not return an action for each observation.
     """
     robots = [copy(setting) for _ in range(trials * len(setting.tasks))]
     seen = []
@@ -694,11 +737,26 @@ def _wrapped_trial(
 ) -> float:
     """Make one trial in a wrapped environment, and return its total reward (in ticks).
 
-    The trial meets draw ``draw`` of the judge's noise.
+    In a vector environment, the first environment makes the trial. The result is NaN if the trial
+    failed or was truncated.
 
-    ``act`` maps observations ``(N, O)`` to actions ``(N, A)``. In a vector environment the first
-    environment makes the trial. The result is NaN if the trial failed or was truncated. ``number``
-    is the index of the task. Raises TypeError if a wrapper drops the options of ``reset``.
+    Parameters
+    ----------
+    act : callable
+        Function that maps observations, shape ``(N, O)``, to actions, shape ``(N, A)``.
+    env : Env, VectorEnv or VecEnv
+        The environment with its wrappers.
+    number : int
+        Index of the task, from 0.
+    seed : int
+        Seed of the environment, from which the noise seed for scoring is derived, too.
+    draw : int
+        Number of the noise draw.
+
+    Raises
+    ------
+    TypeError
+        A wrapper does not pass on the options of ``reset``.
     """
     inner, is_one = _layers(env)[-1], isinstance(env, gymnasium.Env)
     options: dict[str, Any] = {"task": number}
@@ -724,7 +782,7 @@ def _wrapped_trial(
 
 @contextmanager
 def _not_learning(env: Any) -> Iterator[None]:
-    """Freeze the statistics of normalising wrappers in a ``with`` block."""
+    """Freeze the statistics of wrappers that normalise, in a ``with`` block."""
     learning = [
         (layer, name, getattr(layer, name))
         for layer in _layers(env)
@@ -741,10 +799,10 @@ def _not_learning(env: Any) -> Iterator[None]:
 
 
 def _rewards_of(method: Method, task: Task, seed: int, model: MotionModel) -> Any:
-    """Return the rewards of a method's solution, one for each draw of the noise.
+    """Return the rewards of a method's solution, one for each noise draw.
 
-    Without noise there is one reward. A reward is NaN if no valid solution is found, or if an
-    execution fails.
+    Without motor noise there is one reward. All rewards are NaN if the method finds no solution. A
+    reward is NaN if the execution with its noise draw fails.
     """
     with suppress(MethodError, NotApplicableError):
         result, _ = run_method(method, task, seed, model=model)
@@ -753,8 +811,11 @@ def _rewards_of(method: Method, task: Task, seed: int, model: MotionModel) -> An
 
 
 def _corrective_rewards(task: Task, seed: int, model: MotionModel) -> Any:
-    """Return the rewards of the corrective process with a task's initial hands, as
-    :func:`_rewards_of` does."""
+    """Return the rewards of the corrective process with a task's initial hands.
+
+    There is one reward for each noise draw, or one reward without motor noise. A reward is NaN if
+    the execution fails, or if no initial hands are found.
+    """
     with suppress(NotApplicableError):
         movements = corrective_movements(initial_hands(task, model=model))
         return _judged(task, movements, seed, model)
@@ -762,7 +823,7 @@ def _corrective_rewards(task: Task, seed: int, model: MotionModel) -> Any:
 
 
 def _judged(task: Task, solution: Sequence[Movement], seed: int, model: MotionModel) -> Any:
-    """Return the rewards of a solution, one for each draw of the noise; one without noise."""
+    """Return the rewards of a solution: 100 with motor noise, and one without it."""
     if model.motor_noise == 0.0:
         return [execute(task, solution, model=model).reward]
     noise, exact = model.motor_noise, model.without_noise()
@@ -772,8 +833,9 @@ def _judged(task: Task, solution: Sequence[Movement], seed: int, model: MotionMo
 def _table(rewards: Mapping[str, Array]) -> pd.DataFrame:
     """Return the table of :func:`score` from the rewards of its rows.
 
-    The rewards (in ticks) have shape ``(tasks, trials)``, with NaN for a failed trial or an unknown
-    reward. The last row has the best known rewards.
+    ``rewards`` is a dict that maps the name of each row to its rewards (in ticks), shape ``(tasks,
+    trials)``, with NaN for a failed trial or an unknown reward. The last row has the best known
+    rewards.
     """
     (*_, best), rows = rewards.values(), {}
     known = np.isfinite(best[:, 0])

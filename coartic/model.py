@@ -1,4 +1,4 @@
-"""The constants of movement and of the corrective process."""
+"""The motion model: constants of movements and of the corrective process."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any, Literal, NamedTuple, get_args
 from coartic.internal.limits import brief_value, check_limits
 
 MODEL_VERSION = 1
-"""Version of the code that computes results: robot, movement, session, objective, optimisers,
-scoring. Every change of the code that changes results raises this number."""
+"""Version of the code that computes results: robot, movements, session, objective, optimisers and
+scoring. It is increased with each change of this code that changes results."""
 PAPER_RADIUS = 0.1
-"""θ^g of the paper's tasks (in length units)."""
+"""θ^g: radius of the goals of the paper's tasks (in length units)."""
 Norm = Literal["euclidean", "maximum"]
 WORLD = ("motor_noise", "norm", "base_weight")
 """Names of the constants that define a *world*, that is, the cost of movements and their motor
@@ -26,8 +26,9 @@ class MotionModel(NamedTuple):
     """
 
     step: float = 0.01
-    """m: length of a step of a movement in joint space, where a length unit of the base counts as
-    much as a rad of a joint (published). The last step may be shorter."""
+    """m: length of a step of a movement in joint space (published). A length unit of the base
+    counts as much as a rad of a joint, unless ``base_weight`` changes that. The last step of a
+    movement may be shorter."""
 
     arrival_tolerance: float | None = None
     """θ^a: a hand has arrived if it is within this distance (in length units) of the position to
@@ -66,9 +67,14 @@ class MotionModel(NamedTuple):
     tolerances do not depend on it."""
 
     def for_radius(self, radius: float = PAPER_RADIUS) -> MotionModel:
-        """Return a copy in which tolerances have numbers instead of None.
+        """Return a copy in which tolerances that are None are replaced by numbers.
 
-        None is replaced by a tenth of the goals' ``radius``. ``radius`` is in length units.
+        The number is a tenth of ``radius``, the radius of the goals (in length units).
+
+        Examples
+        --------
+        >>> MotionModel().for_radius(0.2).arrival_tolerance
+        0.02
         """
         arrival, correction = self.tolerances(radius)
         return self._replace(arrival_tolerance=arrival, correction_tolerance=correction)
@@ -86,15 +92,15 @@ class MotionModel(NamedTuple):
         )
 
     def without_noise(self) -> MotionModel:
-        """Return a copy without motor noise."""
+        """Return a model without motor noise and with the same other constants."""
         return self if self.motor_noise == 0.0 else self._replace(motor_noise=0.0)
 
     def stored(self, radius: float) -> dict[str, Any]:
-        """Return a dict that maps names to constants, as stored in files.
+        """Return a dict that maps constants to values, as stored in files.
 
-        Tolerances are those for goals of ``radius`` (in length units). A constant of
-        :data:`WORLD` is left out if it has the paper's value, so that the ids of runs do not change
-        when a new constant is added.
+        Tolerances that are None are replaced by those for goals of ``radius`` (in length units).
+        Constants of :data:`WORLD` that have the paper's value are left out, so that the ids of runs
+        do not change when a new constant is added.
         """
         constants = self.for_radius(radius)._asdict()
         return {
@@ -117,14 +123,14 @@ _BOUNDS = {
 
 
 def check_model(model: MotionModel, *, radius: float | None = None) -> MotionModel:
-    """Check a model, and return it unchanged.
+    """Check the constants of a model, and return the model unchanged.
 
     Parameters
     ----------
     model : MotionModel
     radius : float, optional
-        Radius of the goals (in length units). If you pass it, ``correction_tolerance`` has to be
-        below it.
+        Radius of the goals (in length units). If it is passed, ``correction_tolerance`` must be
+        smaller.
 
     Raises
     ------
@@ -155,14 +161,17 @@ def check_model(model: MotionModel, *, radius: float | None = None) -> MotionMod
 def check_exact(model: MotionModel, *, radius: float | None = None) -> MotionModel:
     """Check a model for a function that draws no random numbers, and return it unchanged.
 
-    Raises the errors of :func:`check_model` and of :func:`refuse_noise`.
+    Raises the errors of :func:`check_model`, and ValueError if the model has motor noise.
     """
     refuse_noise(check_model(model, radius=radius))
     return model
 
 
 def refuse_noise(model: MotionModel) -> None:
-    """Raise ValueError if a model has motor noise, for functions that draw no random numbers."""
+    """Raise ValueError if a model has motor noise.
+
+    Functions that draw no random numbers call this function.
+    """
     if model.motor_noise > 0.0:
         raise ValueError(
             f"model.motor_noise is {model.motor_noise:g}; it must be 0 here, because this function "
@@ -172,11 +181,29 @@ def refuse_noise(model: MotionModel) -> None:
 
 
 def model_from(constants: MotionModel | Mapping[str, Any]) -> MotionModel:
-    """Return the paper's model with the constants of a mapping changed.
+    """Return the paper's model with some constants changed.
 
-    The keys of the mapping are names of constants. A MotionModel is checked and returned unchanged.
-    Raises TypeError for another value, and ValueError for an unknown constant or a value out of
-    bounds.
+    Parameters
+    ----------
+    constants : mapping of str to object, or MotionModel
+        Dict that maps the names of the changed constants to their values. A MotionModel is checked
+        and returned unchanged.
+
+    Returns
+    -------
+    MotionModel
+
+    Raises
+    ------
+    TypeError
+        ``constants`` is neither a mapping nor a MotionModel.
+    ValueError
+        A constant is unknown or out of bounds.
+
+    Examples
+    --------
+    >>> model_from({"motor_noise": 0.01}) == PAPER._replace(motor_noise=0.01)
+    True
     """
     if isinstance(constants, MotionModel) or not isinstance(constants, Mapping):
         return check_model(constants)
@@ -189,12 +216,21 @@ def model_from(constants: MotionModel | Mapping[str, Any]) -> MotionModel:
 
 
 def same_world(first: MotionModel, second: MotionModel, radius: float) -> bool:
-    """Return whether two models are equal for goals of a given radius (in length units)."""
+    """Return whether two models have equal constants for goals of a given radius.
+
+    Tolerances that are None are compared as a tenth of ``radius`` (in length units).
+    """
     return first.for_radius(radius) == second.for_radius(radius)
 
 
 def differences(model: MotionModel) -> dict[str, Any]:
-    """Return a dict of the constants in :data:`WORLD` that differ from the paper's values."""
+    """Return a dict of the constants in :data:`WORLD` that differ from the paper's values.
+
+    Examples
+    --------
+    >>> differences(MotionModel(motor_noise=0.01, gain=0.1))
+    {'motor_noise': 0.01}
+    """
     return {
         name: getattr(model, name) for name in WORLD if getattr(model, name) != getattr(PAPER, name)
     }

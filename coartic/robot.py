@@ -5,9 +5,9 @@ configuration is the vector ``q = (base_x, base_y, left_1 .. left_n, right_1 .. 
 are in the model's length unit, angles in rad. Angles are relative: each joint is measured from the
 previous link, the first joint from +x.
 
-:func:`chain` has the formulas of positions, :func:`lever` the formula of the Jacobian. Both are
-written so that one source serves NumPy arrays, CasADi symbols and the compiled kernels. The caller
-of :func:`chain` passes a cosine and a sine for the type of its numbers.
+:func:`chain` has the formulas of the positions, :func:`lever` the formula of the Jacobian. Both
+functions work on NumPy arrays and on CasADi symbols, and are compiled for the kernels. The caller
+of :func:`chain` passes the cosine and the sine for its type of numbers.
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ def chain(q: Any, arm: Arm, xs: Any, ys: Any, cos: Any, sin: Any) -> None:
 def lever(xs: Any, ys: Any, joint: int, tip: int) -> tuple[Any, Any]:
     """Compute the derivative of a point of an arm with respect to a joint angle.
 
-    A rotation about the joint moves the point at right angles to the line between joint and point.
-    The result is a column of the geometric Jacobian.
+    A rotation about the joint moves the point at right angles to the line from the joint to the
+    point. The result is a column of the geometric Jacobian.
 
     Parameters
     ----------
@@ -142,15 +142,18 @@ class Robot:
 
     @cached_property
     def scale(self) -> float:
-        """Scale of drawings: the length of the shorter arm divided by 4, the length of the paper's
-        arms."""
+        """Scale of drawings: length of the shorter arm as a multiple of the paper's.
+
+        The paper's arms have length 4.
+        """
         return min(math.fsum(self.left_links), math.fsum(self.right_links)) / 4.0
 
     @property
     def drawn_base(self) -> tuple[float, float]:
         """Width and height of the base in drawings (in length units).
 
-        This is :attr:`base_size`, unless that is the default, which is multiplied by :attr:`scale`.
+        If :attr:`base_size` has its default, the default is multiplied by :attr:`scale`. Otherwise
+        it is :attr:`base_size` itself.
         """
         width, height = self.base_size
         is_default = self.base_size == type(self).__dataclass_fields__["base_size"].default
@@ -206,8 +209,13 @@ class Robot:
     def reach(self, hand: Hand) -> tuple[float, float]:
         """Return the smallest and the largest distance of a hand from its shoulder.
 
-        Both distances are in length units. They assume that joints have no limits. Raises
-        ValueError for an unknown hand.
+        Both distances are in length units; joints have no limits. Raises ValueError for an unknown
+        hand.
+
+        Examples
+        --------
+        >>> Robot(left_links=(3.0, 1.0)).reach("left")
+        (2.0, 4.0)
         """
         links = self.arm(hand).links.tolist()
         return max(0.0, 2 * max(links) - sum(links)), math.fsum(links)
@@ -229,6 +237,11 @@ class Robot:
         ------
         ValueError
             ``q`` or ``hand`` does not fit the robot.
+
+        Examples
+        --------
+        >>> Robot().forward_kinematics(np.zeros(10), "right")
+        array([4.5, 0.1])
         """
         array = self._configuration(q)
         return self._hand(*self._numpy_chain(array, hand), array)
@@ -307,7 +320,7 @@ class Robot:
         return self._hand(xs, ys, array), result
 
     def base_outline(self, q: ArrayLike) -> Array:
-        """Return the four corners of the base as it is drawn, x and y.
+        """Return the positions of the four corners of the base, as it is drawn.
 
         Parameters
         ----------
@@ -316,7 +329,7 @@ class Robot:
         Returns
         -------
         ndarray, shape (..., 4, 2)
-            The corners, counter-clockwise from the lower left one (in length units).
+            x and y of the corners, counter-clockwise from the lower left one (in length units).
 
         Raises
         ------
@@ -409,14 +422,20 @@ class Robot:
 
     @staticmethod
     def _hand(xs: list[Any], ys: list[Any], q: Array) -> Array:
-        """Return the hand's positions, ``(..., 2)``, from the last entries of ``xs`` and ``ys``."""
+        """Return the positions of a hand: the last entries of ``xs`` and ``ys``.
+
+        The result has shape ``(..., 2)`` for configurations ``q`` of shape ``(..., dof)``.
+        """
         position = np.empty((*q.shape[:-1], 2))
         position[..., 0], position[..., 1] = xs[-1], ys[-1]
         return position
 
 
 def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[Any]]:
-    """Return lists of x and y of an arm's shoulder, joints and hand (:func:`chain`)."""
+    """Return lists of x and y of an arm's shoulder, joints and hand.
+
+    The parameters are those of :func:`chain`.
+    """
     xs: list[Any] = [None] * (len(arm.links) + 1)
     ys = [*xs]
     chain(q, arm, xs, ys, cos, sin)
@@ -424,9 +443,9 @@ def _points_of(q: Any, arm: Arm, cos: Any, sin: Any) -> tuple[list[Any], list[An
 
 
 def directions(angles: ArrayLike) -> Array:
-    """Return the unit vectors of angles that are measured from +x.
+    """Return the unit vectors (cos, sin) of angles that are measured from +x.
 
-    ``angles`` are in rad, shape ``(...)``; the vectors (cos, sin) have shape ``(..., 2)``.
+    ``angles`` has shape ``(...)``, in rad. The result has shape ``(..., 2)``.
     """
     absolute = np.asarray(angles, dtype=np.float64)
     return np.stack([np.cos(absolute), np.sin(absolute)], axis=-1)

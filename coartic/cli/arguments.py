@@ -1,4 +1,4 @@
-"""Arguments and options that commands share, and the names that users may write in them."""
+"""Arguments and options that several commands have, and functions that parse their values."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ if TYPE_CHECKING:
 
 
 def file_or_folder(metavar: str, what: str, *names: str) -> Any:
-    """Make a command-line option for a file or folder, which need not exist.
+    """Make a command-line option whose value is the path of a file or folder.
 
-    Its value is a Path. An empty name raises CoarticError. Parameters are those of :func:`option`.
+    The file or folder need not exist. When the command line is parsed, an empty name raises
+    CoarticError. The parameters are those of :func:`option`.
     """
     return typer.Option(*names, parser=folder_named, metavar=metavar, help=what)
 
@@ -37,13 +38,18 @@ def option(metavar: str, what: str, *names: str, words: Words | None = None) -> 
     Parameters
     ----------
     metavar : str
-        Name of the value in the help.
+        Name of the value in the help, such as ``N``.
     what : str
-        Help.
+        Sentence on the option in the help.
     *names : str
-        Flags; by default a flag with the name of the parameter.
+        Flags, such as ``"--out"``; by default a flag with the name of the function's parameter.
     words : callable, optional
-        Function that completes the value (:mod:`coartic.cli.completion`).
+        Function that returns completions of an incomplete value (:mod:`coartic.cli.completion`).
+
+    Returns
+    -------
+    object
+        The option, for the type hint of a parameter of the command.
     """
     return typer.Option(*names, readable=False, metavar=metavar, help=what, autocompletion=words)
 
@@ -59,15 +65,30 @@ MethodFiles = Annotated[
 
 
 def ranged_option(option: str, what: str, least: float, most: float) -> Any:
-    """Make a command-line option, with the flag ``option``, for a number in a range."""
+    """Make a command-line option for a number in a range.
+
+    Parameters
+    ----------
+    option : str
+        Flag, such as ``"--jobs"``.
+    what : str
+        Sentence on the option in the help.
+    least, most : float
+        Smallest and largest allowed value.
+    """
     return typer.Option(option, min=least, max=most, metavar="N", help=what)
 
 
 def parse_run_range(text: str) -> Any:
-    """Parse a number of runs, such as ``20``, or a range with both ends, such as ``50..99``.
+    """Parse a number of runs, ``20``, or a range of runs, ``50..99``.
 
-    Any other string is returned unchanged; the plan refuses it. Raises CoarticError for a range
-    that goes backwards.
+    A range includes both ends. Any other string is returned unchanged, and refused later by the
+    plan. Raises CoarticError for a range whose second number is lower than the first.
+
+    Examples
+    --------
+    >>> parse_run_range("20"), parse_run_range("50..99")
+    (20, range(50, 100))
     """
     first, is_range, last = text.partition("..")
     with suppress(ValueError):
@@ -80,16 +101,27 @@ def parse_run_range(text: str) -> Any:
 def split_names(texts: Sequence[str] | None) -> list[str]:
     """Split the values of an option at commas, and strip blanks.
 
-    None (the option was not given) gives an empty list.
+    ``texts`` has a string for each time that the option is given, or is None if it is not given.
+    For None the result is an empty list.
+
+    Examples
+    --------
+    >>> split_names(["EC1, EC4", "CMA-ES"])
+    ['EC1', 'EC4', 'CMA-ES']
     """
     return [name.strip() for text in texts or () for name in text.split(",")]
 
 
 def constants_in(texts: Sequence[str]) -> dict[str, Any] | None:
-    """Parse texts such as ``motor_noise=0.01``: a dict that maps constants to values.
+    """Parse texts such as ``motor_noise=0.01``, and return a dict that maps constants to values.
 
-    Return None if there are no texts. Raises CoarticError for a text without ``=``; the plan checks
-    names and values.
+    A value that is not a number is a string. The result is None if there are no texts. Raises
+    CoarticError for a text without ``=``. Names and values are checked later by the plan.
+
+    Examples
+    --------
+    >>> constants_in(["motor_noise=0.01", "norm=maximum"])
+    {'motor_noise': 0.01, 'norm': 'maximum'}
     """
     constants = dict[str, Any]()
     for text in texts:
@@ -106,7 +138,10 @@ def constants_in(texts: Sequence[str]) -> dict[str, Any] | None:
 
 
 def method_titles(registered: Registry) -> dict[str, str]:
-    """Return a dict that maps ids of methods to titles; a missing title is ``""``."""
+    """Return a dict that maps the ids of methods to their titles in tables.
+
+    The title of a method without a title of its own is an empty string.
+    """
     from coartic.analysis.methods import title_of
 
     titles = {name: title_of(name) for name in registered}
@@ -121,15 +156,17 @@ def resolve_methods(
     Parameters
     ----------
     names : sequence of str
-        Ids, titles, conditions of the learner (``EC4``) and wildcards (``optimum/*``).
-    registered : mapping
-        Known methods by id.
+        Ids, titles, exploration conditions of the learner (``EC4``) and wildcards (``optimum/*``).
+    registered : mapping of str to MethodInfo
+        Dict that maps ids to all known methods.
     expand : bool
-        False to return a wildcard for more than one method unchanged.
+        True to replace each wildcard by the ids that match it; False to return a wildcard that
+        matches more than one id unchanged.
 
     Returns
     -------
     list of str
+        Ids in the order of ``names``.
 
     Raises
     ------
@@ -161,7 +198,17 @@ def resolve_methods(
 def check_used(
     method_files: Sequence[Path] | None, registered: Registry, methods: Iterable[str]
 ) -> None:
-    """Raise CoarticError if a method file defines none of the methods that are used."""
+    """Raise CoarticError if the command uses no method of a method file.
+
+    Parameters
+    ----------
+    method_files : sequence of Path or None
+        Files of option ``--method-file``; None if it is not given.
+    registered : mapping of str to MethodInfo
+        Dict that maps ids to all known methods.
+    methods : iterable of str
+        Ids of the methods that the command uses.
+    """
     used = {registered[name].where for name in methods if name in registered}
     for path in method_files or ():
         if str(path.resolve()) not in used:
@@ -173,7 +220,13 @@ def check_used(
 def file_name(method: str) -> str:
     """Return the default file name of ``coartic new`` for the id of a method.
 
-    Python can import the file, and its name is not that of a standard module, coartic or NumPy.
+    The name without ``.py`` is a valid name of a Python module. It differs from the names of the
+    modules of the standard library, of coartic and of NumPy.
+
+    Examples
+    --------
+    >>> file_name("my-search"), file_name("random")
+    ('my_search.py', 'my_random.py')
     """
     stem = re.sub(r"\W", "_", method)
     reserved = {*keyword.kwlist, *sys.stdlib_module_names, "coartic", "numpy"}

@@ -1,8 +1,9 @@
 """Complete names on the command line: suites, tasks, methods, and ids of runs.
 
-A shell calls these functions when the user presses Tab. Each takes the incomplete word and returns
-words; typer offers those that begin with it. If there are none, the shell offers files. To be fast,
-they import neither pandas nor Numba.
+When the user presses Tab, the shell starts coartic, which calls one of these functions with the
+incomplete word. The function returns a list of words. Typer offers the words that begin with the
+incomplete one; if there are none, the shell offers files. To be fast, the functions import neither
+pandas nor Numba.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import typer
 import coartic
 
 Words = Callable[[str], list[str]]
-"""Function that returns words for an incomplete word."""
+"""Function that returns a list of completions for an incomplete word."""
 _PACKAGE = Path(coartic.__file__).parent
 
 
@@ -25,7 +26,10 @@ def suites(incomplete: str = "") -> list[str]:
 
 
 def tasks(incomplete: str = "") -> list[str]:
-    """Return the names of the shipped tasks, and of the first instance of each shipped family."""
+    """Return the names of the shipped tasks, and of an instance of each shipped family.
+
+    The instance is ``i000``, the first of the test split.
+    """
     files = sorted((_PACKAGE / "tasks" / "paper").glob("*.toml"))
     return [
         *(path.stem.partition("-")[2] for path in files),  # such as 1-ascending
@@ -40,7 +44,10 @@ def families(incomplete: str = "") -> list[str]:
 
 
 def methods(incomplete: str = "") -> list[str]:
-    """Return the ids of built-in methods, conditions of the learner, and names without blanks."""
+    """Return names of the built-in methods: ids, exploration conditions and titles.
+
+    Titles with a blank are left out.
+    """
     from coartic.method import built_in_methods
 
     known = built_in_methods()
@@ -55,7 +62,10 @@ def names(incomplete: str = "") -> list[str]:
 
 
 def after_commas(words: Words) -> Words:
-    """Return a function that completes the last word of a list with commas."""
+    """Return a function that completes the last word of a comma-separated list.
+
+    ``words`` is the function that returns the completions of a single word.
+    """
 
     def complete(incomplete: str) -> list[str]:
         before, comma, last = incomplete.rpartition(",")
@@ -65,7 +75,10 @@ def after_commas(words: Words) -> Words:
 
 
 def runs(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Return the ids of the runs of the results folder that the command line names."""
+    """Return the ids of stored runs that begin with the incomplete word.
+
+    The runs are those of the results folder that the command line names.
+    """
     from coartic.runs.store import open_store
 
     # The folder is not parsed yet, because the option before the incomplete word lacks its value.

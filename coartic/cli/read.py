@@ -91,9 +91,10 @@ def report(
 
 
 def say_ranking(study: Study, folder: Path) -> None:
-    """Print the ranking of each world of a study, and the command that writes its report.
+    """Print the ranking of each world, and the command for a report.
 
-    Worlds have headings, unless there is only the paper's.
+    Each ranking has the name of its world as a heading, unless the paper's world is the only one.
+    ``folder`` is the results folder of the study.
     """
     from coartic.analysis.words import capital
     from coartic.runs.plan import world_title
@@ -108,12 +109,17 @@ def say_ranking(study: Study, folder: Path) -> None:
 
 
 def _say_ranking_of_world(study: Study) -> None:
-    """Print the ranking of a study of one world, with these notes:
+    """Print the ranking of the methods in one world, and notes on the ranking.
 
-    - the answer in words, if the study varies parameters or no method is ranked;
+    The notes say
+
+    - what the study found, if it varies parameters or no method is ranked;
     - which methods are not ranked, and why;
-    - the reference of the gaps;
+    - to which rewards the gaps refer, and for which tasks no such reward is shipped;
+    - how many runs are needed for confidence intervals, if there are too few;
     - how many runs failed, and why.
+
+    ``study`` is a study of one world, an entry of :attr:`.Study.worlds`.
     """
     from coartic.analysis.report.sections import SECTIONS, finding, limits
     from coartic.analysis.standings import ranked_tasks, reference, standings
@@ -241,9 +247,18 @@ def verify(
 def _perform_again(
     folder: Path, count: int, run_ids: list[str] | None, method_file: list[Path] | None
 ) -> int:
-    """Perform runs of a folder again, print differences, and return the number of differing runs.
+    """Perform stored runs again, print the differences, and return how many runs differ.
 
-    These are the runs whose ids begin with ``run_ids``, or, without ids, at most ``count`` runs.
+    Parameters
+    ----------
+    folder : Path
+        Results folder.
+    count : int
+        Largest number of runs to select (:func:`.some_runs`) if ``run_ids`` is empty or None.
+    run_ids : list of str or None
+        Beginnings of the ids of the runs to perform again.
+    method_file : list of Path or None
+        Files with methods of the user.
     """
     from coartic.benchmarks.registry import registry
     from coartic.benchmarks.reproduce import compare_runs, find_run, perform_runs_again, some_runs
@@ -278,10 +293,10 @@ def _perform_again(
 
 
 def _describe_run(run: Row, code: str) -> None:
-    """Print id, seed, parameters and result of a run.
+    """Print the id, the seed, the parameters and the result of a run.
 
-    ``code`` is the version of the run's method as installed now, or the hash of a method from a
-    file. If another one made the run, a sentence says so.
+    ``code`` is the present version of the method, or the present hash of a method from a file. If
+    another version or code made the run, a sentence says so.
     """
     from coartic.analysis.methods import title_of
     from coartic.analysis.words import number
@@ -345,7 +360,7 @@ def cite(
 
 
 _PICTURED = 12
-"""Most tasks in a picture."""
+"""Largest number of tasks in one picture."""
 
 
 def draw(
@@ -441,11 +456,28 @@ def draw(
 def _film(
     folder: Path, run_ids: Sequence[str], out: Path, initial: bool, width: int, replace: bool
 ) -> None:
-    """Write a film of runs of a results folder side by side.
+    """Write a film of one or two stored runs, side by side.
 
-    At most two movements are filmed: runs, or with ``initial`` the corrective process and a run.
-    ``width`` is in pixels; for MP4 it is rounded down to an even number. Raises CoarticError for
-    more runs, unknown runs, or if the film cannot be written.
+    Parameters
+    ----------
+    folder : Path
+        Results folder.
+    run_ids : sequence of str
+        Beginnings of the ids of the runs.
+    out : Path
+        File to write.
+    initial : bool
+        True to show the corrective process alone beside a single run.
+    width : int
+        Width of the film in pixels; for MP4 it is rounded down to an even number.
+    replace : bool
+        True to replace an existing file.
+
+    Raises
+    ------
+    CoarticError
+        There are more than two movements to show, a run is unknown or has no solution, or the film
+        cannot be written.
     """
     from coartic import corrective_trial, initial_hands, trajectory
     from coartic.analysis.methods import title_of

@@ -228,9 +228,9 @@ def list_(
 
 
 def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
-    """Yield a description of a suite, as pairs for :func:`.say_pairs`.
+    """Yield a description of a suite, as pairs of a word and a sentence (:func:`.say_pairs`).
 
-    ``name`` is its name or file.
+    ``name`` is the name of the suite or the path of its file.
     """
     from coartic import builtin_tasks
     from coartic.analysis.words import number
@@ -248,9 +248,9 @@ def _describe_suite(name: str, suite: Suite) -> Iterator[tuple[str, str]]:
 
 
 def _describe_task(name: str, task: Task) -> Iterator[tuple[str, str]]:
-    """Yield a description of a task, as pairs for :func:`.say_pairs`.
+    """Yield a description of a task, as pairs of a word and a sentence (:func:`.say_pairs`).
 
-    ``name`` is its name or file, as the user wrote it.
+    ``name`` is the name of the task or the path of its file, as the user wrote it.
     """
     yield "Task", f"{name} ({task.label}): {task.description}"
     yield "Goals", ", ".join(f"({x:g}, {y:g})" for x, y in task.goals)
@@ -276,9 +276,9 @@ def _list_runs(folder: Path) -> None:
 
 
 def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
-    """Yield a description of a family, as pairs for :func:`.say_pairs`.
+    """Yield a description of a family, as pairs of a word and a sentence (:func:`.say_pairs`).
 
-    ``name`` is its name or file.
+    ``name`` is the name of the family or the path of its file.
     """
     yield "Family", f"{name}: {family.description}"
     yield "Instances", f"{name}/i000, ... (test); {name}/d000, ... (development)"
@@ -286,7 +286,7 @@ def _describe_family(family: Family, name: str) -> Iterator[tuple[str, str]]:
 
 
 def _describe_method(info: MethodInfo) -> Iterator[tuple[str, str]]:
-    """Yield a description of a method, as pairs for :func:`.say_pairs`."""
+    """Yield a description of a method, as pairs of a word and a sentence (:func:`.say_pairs`)."""
     from coartic import builtin_tasks, load_task
     from coartic.analysis.methods import title_of
     from coartic.runs.plan import describe_parameters
@@ -360,7 +360,11 @@ def check(
 
 
 def _show_results(name: str, results: Sequence[CheckResult]) -> int:
-    """Print the results of checks, and return the number of checks that did not pass."""
+    """Print the results of checks, and return the number of checks that did not pass.
+
+    ``name`` is the name of the method or file that was checked. Checks that were not made count as
+    checks that did not pass.
+    """
     words = {True: "pass", False: "FAIL", None: "skip"}
     for result in results:
         say(f"{words[result.passed]}  {result.name}: {result.finding}")

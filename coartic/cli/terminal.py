@@ -1,4 +1,4 @@
-"""Print the output of commands: sentences, pairs, tables and progress."""
+"""Print the output of commands: lines, pairs in two columns, tables and progress."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ _ASCII = {"−": "-", "–": "-", "…": ".", "×": "x", "\xa0": " "}
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:
-    """Replace characters that a terminal lacks by ASCII, as an error handler for ``codecs``.
+    """Replace characters that cannot be encoded for a terminal by ASCII characters.
 
-    A character without a counterpart becomes ``?``.
+    This is an error handler for module ``codecs``. A character without a counterpart in
+    :data:`_ASCII` becomes ``?``. Return the replacement, and the index at which encoding continues.
     """
     if not isinstance(error, UnicodeEncodeError):
         raise error
@@ -39,23 +40,26 @@ codecs.register_error("replaced", _replaced)
 
 
 def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
-    """Print lines; characters that are not printable, such as line breaks in names, are replaced.
+    """Print lines, after replacing characters that are not printable.
+
+    Such characters are, for example, line breaks in names (:func:`.one_line`).
 
     Parameters
     ----------
     *lines : str
+        The lines.
     stream : file, optional
-        Stream to print on, by default standard output. If another stream cannot be written, the
-        lines are lost.
+        Stream to print on, by default standard output. If a stream other than standard output
+        cannot be written, the lines are lost, and no error is raised.
     end : str
-        String to print at the end.
+        String to print after the last line.
 
     Raises
     ------
     CoarticError
         Standard output cannot be written.
     BrokenPipeError
-        The reader of the stream has ended.
+        The program that reads the stream has ended.
     """
     stream = stream or sys.stdout
     text = "\n".join(map(one_line, lines)).replace("\u202f", " ")
@@ -73,9 +77,16 @@ def say(*lines: str, stream: TextIO | None = None, end: str = "\n") -> None:
 
 
 def complain(kind: str, text: str) -> None:
-    """Print each line of ``text`` on stderr, after ``Error: `` or ``Warning: `` (``kind``).
+    """Print each line of an error message or a warning on standard error.
 
-    On a terminal long lines are wrapped.
+    Each line begins with ``kind`` and a colon. On a terminal, long lines are wrapped.
+
+    Parameters
+    ----------
+    kind : str
+        ``"Error"`` or ``"Warning"``.
+    text : str
+        The message.
     """
     width = shutil.get_terminal_size().columns if sys.stderr.isatty() else sys.maxsize
     for line in text.splitlines():
@@ -83,10 +94,11 @@ def complain(kind: str, text: str) -> None:
 
 
 def _wrap(text: str, width: int) -> list[str]:
-    """Return the lines of a text that is wrapped at spaces.
+    """Wrap a text at spaces, and return its lines of at most ``width`` characters.
 
-    Commands, which can be copied, stay on one line, however long they are: a text in backticks, and
-    a whole text that begins with ``coartic``. A number and its % stay on one line, too.
+    Commands are not wrapped, so that users can copy them. A command is a text in backticks, or a
+    whole text that begins with ``coartic``. A line with a command can therefore be longer than
+    ``width``. A number and its % sign stay on one line, too.
     """
     fixed = re.sub("`[^`]*`|^coartic .*", lambda found: found[0].replace(" ", "\xa0"), text)
     wrapped = textwrap.wrap(
@@ -96,9 +108,10 @@ def _wrap(text: str, width: int) -> list[str]:
 
 
 def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
-    """Print pairs of a word and a sentence as two columns, and wrap the second column.
+    """Print pairs of a word and a sentence in two columns.
 
-    Commands are not wrapped (:func:`_wrap`).
+    The second column is wrapped to the width of the terminal; commands in it are not
+    (:func:`_wrap`).
     """
     rows = list(pairs)
     indent = max((len(word) for word, _ in rows), default=0) + 2
@@ -109,10 +122,10 @@ def say_pairs(pairs: Iterable[tuple[str, str]]) -> None:
 
 
 def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table; without rows print nothing.
+    """Print a table with headings.
 
-    The first column is aligned to the left, and wrapped on a narrow terminal. Other columns are
-    aligned to the right.
+    The first column is aligned to the left, and wrapped on a narrow terminal. All other columns are
+    aligned to the right. If there are no rows, nothing is printed.
     """
     if not rows:
         return
@@ -126,9 +139,10 @@ def say_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 class Display:
-    """Show on standard error what a command is doing.
+    """Context manager that shows on standard error what a command is doing.
 
-    On a terminal it is a line that changes. Elsewhere it is a new line at most every ten seconds.
+    On a terminal, one line is shown and updated. Elsewhere, for example in a file, a new line is
+    printed at most every ten seconds.
     """
 
     EVERY_S = 10.0
@@ -151,12 +165,13 @@ class Display:
     def show(self, doing: str) -> None:
         """Show what the command is doing now.
 
-        Without a terminal a line is printed only if the last one is ten seconds old.
+        If standard error is not a terminal, the line is printed only if the last line was printed
+        at least ten seconds ago.
         """
         self._show(lambda: doing)
 
     def line(self, *texts: str) -> None:
-        """Print lines that do not change; on a terminal they are above the changing line."""
+        """Print lines that stay; on a terminal they stand above the line that changes."""
         for text in texts:
             say(text, stream=sys.stderr)
 
@@ -167,10 +182,10 @@ class Display:
             self.line(doing())
 
     def update(self, progress: Progress, cell: Cell | None) -> None:
-        """Show the progress of runs, as the ``watch`` of :func:`coartic.benchmarks.perform`.
+        """Show the progress of runs, as argument ``watch`` of :func:`coartic.benchmarks.perform`.
 
-        Before the first run (``cell`` is None) it prints which runs the folder has already. If no
-        run was missing, it shows no progress.
+        Before the first run, when ``cell`` is None, it prints which runs the folder has already. If
+        the folder has all runs of the plan, no progress is shown.
         """
         if cell is None:
             self._say_present(progress)
@@ -206,7 +221,10 @@ class Display:
 
 
 def _progress_bar(doing: Callable[[], str]) -> Any:
-    """Return a progress bar of rich that calls ``doing`` for its text twice a second."""
+    """Return a progress bar of the package ``rich``.
+
+    The bar calls ``doing`` twice a second for the text beside it.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task
     from rich.table import Column
@@ -235,7 +253,10 @@ def _progress_bar(doing: Callable[[], str]) -> Any:
 
 
 def _time_left(seconds: float) -> str:
-    """Return a time, s, as a phrase such as ``about 40 s left``; empty for NaN and 0."""
+    """Return a phrase for a time that is left, such as ``about 40 s left``.
+
+    The time is in s. For NaN and 0 the phrase is empty.
+    """
     if not seconds > 0:  # True for NaN
         return ""
     if seconds < 10:

@@ -17,21 +17,33 @@ from coartic.internal.validation import explain
 Asked = ParamSpec("Asked")
 Computed = TypeVar("Computed")
 Numbers = Annotated[ArrayLike, PlainValidator(real_numbers)]
-"""Type hint for real numbers of any shape, as an array or lists. A checked function gets an array
-of float64."""
+"""Type hint for an array of real numbers of any shape, or for lists of numbers. A checked function
+(:func:`checked_arguments`) gets an array of float64."""
 _STRICT = ConfigDict(strict=True, arbitrary_types_allowed=True)
 
 
 class ArgumentError(CoarticError, ValueError, TypeError):
-    """Error of a call with an argument that is missing, unknown or of the wrong type or value."""
+    """An argument is missing or unknown, or has a wrong type or value."""
 
 
 def checked_arguments(function: Callable[Asked, Computed]) -> Callable[Asked, Computed]:
-    """Decorate a function to check its arguments before each call.
+    """Decorate a function, so that its arguments are checked against its type hints.
 
     The decorated function raises ArgumentError if an argument does not match its type hint, is
-    missing or is unknown. NumPy scalars are accepted like Python numbers. Strings, True and False
-    are not accepted as numbers.
+    missing or is unknown. NumPy scalars are accepted where Python numbers are. Strings, True and
+    False are not accepted as numbers.
+
+    Examples
+    --------
+    >>> @checked_arguments
+    ... def double(number: float) -> float:
+    ...     return 2 * number
+    >>> double(1.5)
+    3.0
+    >>> double("1.5")
+    Traceback (most recent call last):
+    ...
+    coartic.internal.arguments.ArgumentError: double: number is '1.5'; it should be a valid number
     """
     names = [*inspect.signature(function).parameters]
 

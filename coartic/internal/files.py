@@ -1,4 +1,4 @@
-"""Write files completely or not at all."""
+"""Write files and folders of files, so that an interruption leaves no incomplete file."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from coartic.internal.text import plain, prints
 
 _PART = ".coartic-"  # beginning of the name of a file that is being written
 LISTING = ".coartic-files"
-"""Name of a file that lists the files that a command has written into its folder, one on a line. It
-also lists files that an interrupted command has begun to write."""
+"""Name of a file in a folder. It lists the files that coartic has written into this folder, one on
+each line, and the files that an interrupted command was about to write."""
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file, and replace an existing one.
+    """Write a file completely or not at all, and replace an existing file.
 
-    If writing fails, the existing file does not change, and OSError is raised.
+    The data are first written into a temporary file in the same folder, which is then renamed. If
+    this fails, an existing file does not change, and OSError is raised.
     """
     part = path.with_name(f"{_PART}{os.getpid()}-{path.name}")
     try:
@@ -33,20 +34,23 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def publish(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, in place of the files that an earlier call wrote there.
+    """Write files into a folder, and remove files that an earlier call wrote there.
+
+    Files of an earlier call that are not in ``files`` are removed. Files that coartic did not write
+    are never changed.
 
     Parameters
     ----------
     folder : Path
-        Folder, which is made if it is missing.
-    files : mapping
-        Content of each file, by its path in the folder.
+        Folder to write into. A missing folder is made.
+    files : mapping of str to bytes
+        Dict that maps the path of each file in the folder to its content.
 
     Raises
     ------
     CoarticError
-        Writing fails, or the folder cannot be used (:func:`make_folder`). In the second case
-        nothing is written.
+        Writing fails, or the folder cannot be used (:func:`make_folder`). In the second case no
+        file is written.
     """
     old_files = make_folder(folder, files)
 
@@ -69,27 +73,28 @@ def publish(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
-    """Make a folder if it is missing, and return the paths of the files listed in it.
+    """Make a folder if it is missing, and check that it can be written.
 
     Parameters
     ----------
     folder : Path
     names : collection of str
-        Paths in the folder, of files to be written.
+        Paths of the files to be written, relative to the folder.
 
     Returns
     -------
     set of str
-        Paths in the folder, from file :data:`LISTING`.
+        Paths of the files that coartic has written into the folder (:data:`LISTING`), relative to
+        the folder.
 
     Raises
     ------
     CoarticError
         One of these is the case:
 
-        - the folder cannot be written;
-        - a file exists that would be written, and is not listed;
-        - a path leads out of the folder.
+        - the folder cannot be made or written;
+        - one of the files to be written exists, and coartic has not listed it in :data:`LISTING`;
+        - a path leads out of the folder, or is a symbolic link.
     """
     listing = folder / LISTING
     with describe_os_errors(folder):
@@ -113,7 +118,7 @@ def make_folder(folder: Path, names: Collection[str] = ()) -> set[str]:
 def check_inside(folder: Path, path: Path) -> None:
     """Raise CoarticError if a path leads out of a folder, or is a symbolic link.
 
-    The path need not exist.
+    There need not be a file at ``path``.
     """
     home, real_paths = os.path.realpath(folder), map(os.path.realpath, (path, path.parent))
     if path.is_symlink() or not all(Path(real).is_relative_to(home) for real in real_paths):
@@ -121,9 +126,10 @@ def check_inside(folder: Path, path: Path) -> None:
 
 
 def write_output(path: Path, data: bytes, *, replace: bool) -> None:
-    """Write a file that a user asked for, after :func:`check_output`.
+    """Write a file whose name the user has chosen.
 
-    Raises CoarticError if the file exists and ``replace`` is False, or if writing fails.
+    Raises CoarticError if the folder of the file does not exist, if the file exists and ``replace``
+    is False, or if writing fails.
     """
     check_output(path, replace=replace)
     with describe_os_errors(path):
@@ -131,7 +137,10 @@ def write_output(path: Path, data: bytes, *, replace: bool) -> None:
 
 
 def check_ending(path: Path, endings: Collection[str]) -> None:
-    """Raise CoarticError if the suffix of a path, in lower case, is not one of ``endings``."""
+    """Raise CoarticError if the suffix of a path is not one of ``endings``.
+
+    Upper and lower case of the suffix count as equal; ``endings`` are in lower case.
+    """
     if path.suffix.lower() not in endings:
         *others, last = endings
         allowed = f"{', '.join(others)} or {last}" if others else last
@@ -139,9 +148,10 @@ def check_ending(path: Path, endings: Collection[str]) -> None:
 
 
 def check_output(path: Path, *, replace: bool) -> None:
-    """Raise CoarticError if a file cannot be written to a path.
+    """Raise CoarticError if a file must not be written to a path.
 
-    This is so if the file's folder is missing, or if the file exists and ``replace`` is False.
+    This is the case if the folder of the file does not exist, or if the file exists and ``replace``
+    is False.
     """
     with describe_os_errors(path):
         if not path.parent.is_dir():
@@ -154,9 +164,10 @@ def check_output(path: Path, *, replace: bool) -> None:
 
 
 def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
-    """Return the name of a file or folder, which need not exist, as a path.
+    """Convert the name of a file or folder, which need not exist, to a path.
 
-    Raises CoarticError for an empty name. The error message begins with ``what``.
+    Raises CoarticError if the name is empty or blank. The error message begins with ``what``, which
+    says whose name it is.
     """
     if not str(name).strip():
         raise CoarticError(f"{what} is empty; for the current folder write a dot")
@@ -165,8 +176,10 @@ def folder_named(name: str | Path, what: str = "the name of a folder") -> Path:
 
 @contextlib.contextmanager
 def describe_os_errors(path: Path) -> Iterator[None]:
-    """Turn an OSError of the block into a CoarticError which says that ``path`` cannot be
-    written."""
+    """Turn each OSError of a ``with`` block into a CoarticError.
+
+    The error message says that ``path`` cannot be written, and why.
+    """
     try:
         yield
     except OSError as error:

@@ -1,7 +1,7 @@
 """End an interrupted command with a short message, and exit code 130 or 143.
 
-Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt, so that ``with`` blocks can end their workers
-and remove their temporary folders.
+The signals of Ctrl-C (SIGINT), SIGTERM and SIGHUP raise KeyboardInterrupt, so that ``with`` blocks
+can end worker processes and remove temporary folders before the command ends.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 ENDING = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
-"""Signals that end a program: Ctrl-C, SIGTERM and SIGHUP."""
+"""Signals that end a program: SIGINT (Ctrl-C), SIGTERM and SIGHUP."""
 _CLEANING_S = 5.0  # time after a signal in which other signals are ignored
 _received: list[tuple[int, float]] = []  # signals that raised KeyboardInterrupt, and their times
 _message = ["Interrupted."]
@@ -50,9 +50,10 @@ def raise_if_interrupted() -> None:
 
 @contextmanager
 def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
-    """Add a sentence to the message of :func:`end_if_interrupted` if the block is interrupted.
+    """Add a sentence to the final message if a ``with`` block is interrupted.
 
-    The function ``sentence`` returns the sentence. The KeyboardInterrupt is raised again.
+    If the block raises KeyboardInterrupt, the function ``sentence`` is called for the sentence, and
+    the error is raised again. :func:`end_if_interrupted` prints the message.
     """
     try:
         yield
@@ -62,10 +63,11 @@ def interruptible(sentence: Callable[[], str]) -> Iterator[None]:
 
 
 def end_if_interrupted() -> None:
-    """Exit with a message on stderr if a signal has interrupted this process.
+    """Exit with a message on standard error if a signal has interrupted this process.
 
-    The exit code is 130 if the first signal was Ctrl-C, else 143. Whether or not there was a
-    signal, the process ignores the signals :data:`ENDING` from now on.
+    The exit code is 130 if the first signal was that of Ctrl-C, and otherwise 143. If there was no
+    signal, the function returns. In both cases the process ignores the signals :data:`ENDING` from
+    then on.
     """
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
@@ -77,7 +79,10 @@ def end_if_interrupted() -> None:
 
 @contextmanager
 def blocked_signals() -> Iterator[None]:
-    """Block Ctrl-C, SIGTERM and SIGHUP in this block, for this thread and processes it starts."""
+    """Block the signals :data:`ENDING` in a ``with`` block.
+
+    They are blocked in this thread, and in the processes that the thread starts in the block.
+    """
     old_mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     try:
         yield

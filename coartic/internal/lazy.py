@@ -1,6 +1,6 @@
-"""Import the names of a package on first use.
+"""Import the modules that define a package's names at first use.
 
-The compiler is slow to import, and most commands do not need it.
+Numba and some other libraries are slow to import, and most commands do not need them.
 """
 
 from __future__ import annotations
@@ -19,16 +19,17 @@ def import_lazily(
     Parameters
     ----------
     package : str
-        Name of the package.
-    homes : mapping
-        Maps each name to the module that defines it.
+        Name of the package, which is being imported.
+    homes : mapping of str to str
+        Dict that maps each public name of the package to the module that defines this name.
 
     Returns
     -------
     callable
-        ``__getattr__``; it raises AttributeError for names that are not in ``homes``.
+        Function ``__getattr__``. It imports the module of a name, and returns the object with this
+        name. It raises AttributeError for a name that is not in ``homes``.
     callable
-        ``__dir__``.
+        Function ``__dir__``, which lists the names.
     """
     module = sys.modules[package]
 

@@ -1,4 +1,4 @@
-"""Limits of plans, and checks of numbers from users."""
+"""Largest sizes of plans, and checks of numbers that users pass."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ MAX_RUNS = 1_000_000
 MAX_TRIALS = 10_000_000
 """Largest number of trials of a run. The rewards of all trials are stored."""
 MAX_SECONDS = 1_000_000
-"""Longest time limit (in s). Operating systems can wait for about twice this time."""
+"""Largest time limit (in s). Operating systems can wait for about twice this time."""
 MAX_SEED = 2**63 - 1
 """Largest seed of a suite."""
 MAX_RUN_SEED = 2**128 - 1
 """Largest seed of a run."""
 WIDTHS = (1e-9, 100.0)
-"""Least and greatest half width of a box of targets, in length units (base) and rad (joints)."""
+"""Smallest and largest half width of the box in which optimisers search for targets, in length
+units (base) and rad (joints)."""
 
 
 def check_limits(name: str, value: Any, least: float, most: float) -> None:
@@ -47,10 +48,16 @@ def check_limits(name: str, value: Any, least: float, most: float) -> None:
 
 
 def plain_values(value: Any) -> Any:
-    """Replace NumPy scalars by Python numbers, also in lists, tuples and dictionaries.
+    """Convert NumPy scalars to Python numbers, also inside lists, tuples and dicts.
 
-    Lists, tuples and dictionaries are copied, and keys are not replaced. Subclasses of these types
-    are returned unchanged.
+    Lists, tuples and dicts are copied, at any depth. Keys of dicts, and objects of subclasses of
+    these types, are not converted.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> plain_values({"seed": np.int64(3), "sizes": [np.float64(0.5)]})
+    {'seed': 3, 'sizes': [0.5]}
     """
     import numpy as np
 
@@ -64,9 +71,9 @@ def plain_values(value: Any) -> Any:
 
 
 def real_array(name: str, value: Any) -> NDArray[np.float64]:
-    """Return real numbers as an array of float64 (:func:`real_numbers`).
+    """Convert real numbers to an array of float64 (:func:`real_numbers`).
 
-    Raises ValueError for other values. The error message begins with ``name``.
+    Raises ValueError for any other value. The error message begins with ``name``.
     """
     try:
         return real_numbers(value)
@@ -75,11 +82,11 @@ def real_array(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def real_numbers(value: Any) -> NDArray[np.float64]:
-    """Return real numbers as an array of float64 of the same shape.
+    """Convert real numbers to an array of float64 of the same shape.
 
     An ``ndarray`` of float64 is returned without a copy. NaN and infinity are allowed. Raises
     ValueError for anything else, such as strings, complex numbers, True and False, rows of unequal
-    length, masked entries or integers that float64 cannot represent.
+    length, masked entries, or integers that are too large for float64.
     """
     import numpy as np  # slow to import, and the help of commands does not need it
 
@@ -101,7 +108,10 @@ def real_numbers(value: Any) -> NDArray[np.float64]:
 
 
 def _refuse_entries(value: Any) -> None:
-    """Raise ValueError for masked entries, and for bools in lists and tuples of any depth."""
+    """Raise ValueError if an array has masked entries, or a list contains True or False.
+
+    Lists and tuples are searched at any depth.
+    """
     import numpy as np
 
     if isinstance(value, list | tuple):

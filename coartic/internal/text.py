@@ -1,8 +1,9 @@
-"""Make strings from files and programs safe to show.
+"""Make strings from files and programs printable.
 
-Names, titles and reasons come from files and methods of users. They appear in terminals, pages,
-LaTeX and commands to paste. A string in a file must be printable, or the file is refused
-(:data:`Line`). A message of a program is converted to one printable line (:func:`plain`).
+Names, titles and reasons come from files and methods of users. They are shown in terminals, on
+pages, in LaTeX and in commands that users paste into a shell. If a string in a file is not
+printable, the file is refused (:data:`Line`). An error message of a program is converted to one
+printable line (:func:`plain`).
 """
 
 from __future__ import annotations
@@ -23,24 +24,36 @@ _MAX_NAMED = 12  # largest number of names in a sentence
 
 
 def plain(text: str, most: int = MAX_REASON_LENGTH) -> str:
-    """Return a string as one printable line (:func:`one_line`) of at most ``most`` characters.
+    """Convert a string to one printable line (:func:`one_line`) of limited length.
 
-    Blanks at both ends are removed. A longer line is cut and ends in ``…``.
+    Blanks at both ends are removed. A line with more than ``most`` characters is cut to this
+    length, and ends in ``…``.
+
+    Examples
+    --------
+    >>> plain("  first line\\nsecond line")
+    'first line | second line'
+    >>> plain("a long reason", 7)
+    'a long…'
     """
     line = one_line(text.strip()[: 4 * most])  # bounds the work for a very long string
     return line if len(line) <= most else line[: most - 1] + "…"
 
 
 def error_line(error: BaseException) -> str:
-    """Return an exception as one printable line, such as ``ValueError: message``."""
+    """Return the class and the message of an exception, such as ``ValueError: message``.
+
+    The result is one printable line.
+    """
     return plain(f"{type(error).__name__}: {error}".removesuffix(": "))
 
 
 def one_line(text: str) -> str:
-    """Return a string as one printable line.
+    """Convert a string to one printable line.
 
-    Lines are joined by `` | ``, without empty lines and without blanks at the ends of lines. Other
-    characters that are not printable become escapes, such as ``\\x1b``.
+    The lines of the string are joined by `` | ``. Empty lines, and blanks at the ends of lines, are
+    left out. All other characters that are not printable are replaced by their escape sequences,
+    such as ``\\x1b``. A string that is printable already is returned unchanged.
     """
     if text.isprintable() or all(map(prints, text)):
         return text
@@ -49,13 +62,15 @@ def one_line(text: str) -> str:
 
 
 def prints(c: str) -> bool:
-    """Return whether a character is printable or a space of any width, but not a tab or line
-    end."""
+    """Return whether a character is printable, or a space of any width.
+
+    Tabs and line breaks are neither.
+    """
     return c.isprintable() or unicodedata.category(c) == "Zs"
 
 
 def escape(c: str) -> str:
-    """Return a character; if it is not printable, return its escape, such as ``\\x1b``."""
+    """Return a character, or its escape sequence, such as ``\\x1b``, if it is not printable."""
     return c if prints(c) else c.encode("unicode_escape").decode()
 
 
@@ -65,10 +80,10 @@ def pluralize(count: int, thing: str) -> str:
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return a hint, such as ``; did you mean 'a'?``, with the most similar name.
+    """Return a hint with the known name that is most similar to a misspelt one.
 
-    The hint names the entry of ``names`` that is most similar to ``name``, ignoring case. Return an
-    empty string if no name is similar.
+    The hint, such as ``; did you mean 'a'?``, has the entry of ``names`` that is most similar to
+    ``name``, where upper and lower case count as equal. It is empty if no entry is similar.
     """
     by_lower_case = {known.lower(): known for known in names}
     nearest = difflib.get_close_matches(name.lower(), by_lower_case, 1)
@@ -85,10 +100,10 @@ FOREIGN = (
 
 
 def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto/task.md") -> str:
-    """Return a sentence if the suffix of a file is one of another program (:data:`FOREIGN`).
+    """Return an error message if a file has the format of another program.
 
-    The end of the sentence is ``wanted``, which says what coartic reads instead. Return an empty
-    string for any other file.
+    The format is recognised by the suffix of the name (:data:`FOREIGN`). The message ends with
+    ``wanted``, which says what coartic reads instead. For any other file it is empty.
     """
     if not path.lower().endswith(FOREIGN):
         return ""
@@ -99,10 +114,26 @@ def foreign_file(path: str, wanted: str = "a task is a TOML file, see docs/howto
 def unknown(kind: str, name: object, names: Iterable[str]) -> str:
     """Return an error message for an unknown name.
 
-    The message suggests the most similar of ``names``. If no name is similar, it lists the first 12
-    names. If ``name`` is the name of a file from another program, such as ``arm.urdf``, the message
-    is the sentence of :func:`foreign_file` instead. ``kind`` is what the name stands for, such as
-    ``task``.
+    Parameters
+    ----------
+    kind : str
+        What the name should stand for, such as ``task``.
+    name : object
+        The unknown name.
+    names : iterable of str
+        The known names.
+
+    Returns
+    -------
+    str
+        The message suggests the known name that is most similar. If no known name is similar, it
+        lists the first 12. If ``name`` is the name of a file of another program, such as
+        ``arm.urdf``, the message is that of :func:`foreign_file`.
+
+    Examples
+    --------
+    >>> unknown("task", "ascendin", ["ascending", "descending"])
+    "unknown task 'ascendin'; did you mean 'ascending'?"
     """
     if isinstance(name, str) and (sentence := foreign_file(name)):
         return f"{sentence}."
@@ -114,7 +145,7 @@ def unknown(kind: str, name: object, names: Iterable[str]) -> str:
 
 
 def _refuse_unprintable(text: str) -> str:
-    """Return a string; raise a validation error if a character is not printable."""
+    """Return a string unchanged, or raise a validation error if it is not printable."""
     if wrong := next((c for c in text if not prints(c)), ""):
         message = f"should be one printable line, without {escape(wrong)}"
         raise PydanticCustomError("not_plain", "{words}", {"words": message})
@@ -122,6 +153,6 @@ def _refuse_unprintable(text: str) -> str:
 
 
 printable = AfterValidator(_refuse_unprintable)
-"""Validator that refuses strings that are not one printable line."""
+"""Validator of pydantic that refuses a string unless it is one printable line."""
 Line = Annotated[str, Field(max_length=MAX_LINE_LENGTH), printable]
 """Printable line, such as a title, of at most :data:`MAX_LINE_LENGTH` characters."""

@@ -24,16 +24,17 @@ MAX_JOBS = 10_000
 _POOLS = "OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "NUMBA_NUM", "VECLIB_MAXIMUM"
 _environment_lock = threading.RLock()
 ONE_THREAD = dict.fromkeys([f"{name}_THREADS" for name in _POOLS], "1")
-"""Environment variables that give a worker one thread, because threads of workers would compete."""
+"""Environment variables that limit numerical libraries to one thread in each worker, because the
+threads of several workers would compete for the cores."""
 
 
 @cache
 def worker_variables() -> dict[str, str]:
-    """Return the environment variables of processes in which methods run.
+    """Return the environment variables of worker processes, in which methods run.
 
     The variables limit numerical libraries to one thread. On x86-64 they also select OpenBLAS's
     kernels for Nehalem and NumPy's loops without AVX-512, so that all processors with AVX2 (from
-    Haswell and Zen on) round alike.
+    Haswell and Zen on) round alike. Each call returns the same dict: do not change it.
     """
     if platform.machine() not in ("x86_64", "AMD64"):
         return ONE_THREAD
@@ -45,10 +46,10 @@ def worker_variables() -> dict[str, str]:
 
 
 def threads_for(jobs: int) -> int:
-    """Return the number of threads or processes for a parameter ``jobs``.
+    """Return the number of threads or processes that a parameter ``jobs`` asks for.
 
-    For an integer from 1 to 10,000 this is ``jobs`` itself. For -1 it is the number of cores that
-    the process may use. Raises ValueError for anything else.
+    An integer from 1 to 10,000 asks for this number, and -1 for the number of cores that the
+    process may use. Raises ValueError for any other value.
     """
     if not (isinstance(jobs, Integral) and jobs == -1):
         from coartic.internal.limits import check_limits  # imports NumPy
@@ -61,20 +62,20 @@ def threads_for(jobs: int) -> int:
 
 
 def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
-    """Call a function with consecutive slices of a range of indices, in parallel threads.
+    """Call a function with slices of a range of indices, in parallel threads.
 
-    Return when all calls have ended. Errors of the function are raised.
+    The slices cover ``range(count)``. Their number is at most the environment variable
+    ``OMP_NUM_THREADS`` or, if that is not set to a number, the number of cores that the process may
+    use. The function returns when all calls have ended. An error of a call is raised.
 
     Parameters
     ----------
     work : callable
         Function that is called with each slice.
     count : int
-        Number of indices, from 0.
+        Number of indices.
     least : int
-        Least number of indices of a slice, unless there is only one slice. The number of slices is
-        at most the environment variable ``OMP_NUM_THREADS`` or, if that is not set to a number, the
-        number of cores that the process may use.
+        Smallest number of indices in a slice, unless there is only one slice.
     """
     if count < 2 * least:
         work(slice(0, count))
@@ -89,9 +90,10 @@ def in_parts(work: Callable[[slice], object], count: int, least: int) -> None:
 
 @contextlib.contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables during a ``with`` block, for processes that start in it.
+    """Set environment variables for the processes that are started in a ``with`` block.
 
-    Afterwards the variables have their earlier values. Blocks of other threads wait.
+    At the end of the block the variables get their earlier values. If several threads call this
+    function, one block is executed after the other.
     """
     with _environment_lock:
         old_values = {name: os.environ[name] for name in variables if name in os.environ}
@@ -105,17 +107,18 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 
 def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
-    """Make this process a worker, the leader of a new process group.
+    """Make this process a worker: the leader of a new process group.
 
-    SIGTERM, or the end of the parent, kills the process and its group.
+    If the process gets SIGTERM, or its parent ends, the process and all processes of the group are
+    killed.
 
     Parameters
     ----------
     folder : Path, optional
-        Folder to remove when the parent ends.
+        Folder that is removed when the parent ends.
     streams : int
-        How many of the streams input, output and errors, in this order, are connected to the null
-        device.
+        Number of standard streams that are connected to the null device: 1 for input, 2 for input
+        and output, 3 for input, output and errors.
     """
     null_device = os.open(os.devnull, os.O_RDWR)
     for stream in range(streams):
@@ -131,9 +134,11 @@ def begin_worker(folder: Path | None = None, streams: int = 3) -> None:
 
 
 def _let_forks_end() -> None:
-    """Let SIGTERM end the processes that this process forks, such as those of a method's pool.
+    """Let SIGTERM end the processes that this process forks.
 
-    A signal that comes before they have begun would be lost to the inherited handler.
+    Such processes are those of a pool of a method, for example. They inherit the signal handler of
+    the worker. So SIGTERM is blocked until a forked process has set the default handler; otherwise
+    a signal that arrives before that would not end the process.
     """
 
     def mask(how: int) -> None:
@@ -153,10 +158,16 @@ def _let_forks_end() -> None:
 def end_with_parent(
     folder: Path | None = None, end: Callable[[], object] = lambda: os._exit(1)
 ) -> None:
-    """Start a thread that ends this process when its parent (by ``multiprocessing``) has ended.
+    """Start a thread that ends this process when its parent has ended.
 
-    Before that the thread removes ``folder``, if one is passed. To end the process it calls
-    ``end``.
+    The parent is the process that has started this one by ``multiprocessing``.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Folder that the thread removes before it ends the process.
+    end : callable
+        Function without arguments that ends the process.
     """
 
     def wait() -> None:
@@ -170,7 +181,10 @@ def end_with_parent(
 
 
 def end_group(pid: int) -> None:
-    """Kill a process and the process group that it leads, as far as they exist."""
+    """Kill the process with id ``pid``, and all processes of the group that it leads.
+
+    Nothing is raised if they do not exist.
+    """
     for kill in (os.killpg, os.kill):
         with contextlib.suppress(OSError):
             kill(pid, signal.SIGKILL)

@@ -11,9 +11,10 @@ from coartic.internal.text import MAX_LINE_LENGTH, plain
 
 
 def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> dict[str, Any]:
-    """Return the content of a TOML file.
+    """Read a TOML file, and return its content as a dict.
 
-    Raises an exception of class ``error`` if the file cannot be read, or is not TOML in UTF-8.
+    Raises an error of class ``error`` if the file cannot be read, or is not TOML in UTF-8. The
+    error message begins with the name of the file.
     """
     try:
         return tomllib.loads(read_bytes(path, error=error).decode("utf-8-sig"))
@@ -24,9 +25,10 @@ def read_toml(path: str | Path, *, error: type[CoarticError] = CoarticError) -> 
 
 
 def read_bytes(path: str | Path, *, error: type[CoarticError] = CoarticError) -> bytes:
-    """Return the content of a file.
+    """Read a file, and return its content.
 
-    Raises an exception of class ``error`` if the file cannot be read.
+    Raises an error of class ``error`` if the file cannot be read. The error message begins with the
+    name of the file.
     """
     try:
         return Path(path).read_bytes()

@@ -1,4 +1,4 @@
-"""Import the user's Python files from their source, whatever bytecode there is."""
+"""Import Python files of the user from their source, and ignore stored bytecode."""
 
 from __future__ import annotations
 
@@ -26,8 +26,15 @@ def _library_folders() -> tuple[Path, ...]:
 def is_users(module: str, path: Path) -> bool:
     """Return whether a module is the user's, and was loaded from a file.
 
-    That is a file which does not belong to this project, the standard library or an installed
-    package. ``path`` is the resolved path of the file of ``module``.
+    A module is the user's if it belongs neither to coartic, nor to the standard library, nor to an
+    installed package.
+
+    Parameters
+    ----------
+    module : str
+        Name of the module.
+    path : Path
+        Resolved path of the file of the module.
     """
     return (
         module.partition(".")[0] != "coartic"
@@ -38,14 +45,15 @@ def is_users(module: str, path: Path) -> bool:
 
 
 def import_from(folder: Path) -> None:
-    """Prepare this process for the modules of a folder with the user's files.
+    """Prepare this process to import modules from a folder with files of the user.
 
-    - The folder comes first in ``sys.path``, as that of a program does. If coartic runs in a
-      checkout, the root of the checkout comes last, because it has folders with common names, such
-      as ``analysis`` and ``tests``.
-    - Modules of the user are compiled from their source. Python takes bytecode of a file for
-      current if size and time stamp are the same, which is so of some files from archives and of
-      files that were copied with their time stamps. No bytecode of the user's files is written.
+    - *Search path.* The folder becomes the first entry of ``sys.path``, like the folder of a
+      program. If coartic runs in a checkout, the root of the checkout becomes the last entry,
+      because its subfolders have common names, such as ``analysis`` and ``tests``.
+    - *Bytecode.* Modules of the user are compiled from their source, and no bytecode of them is
+      stored. Python would use stored bytecode if the size and the time stamp of the source are
+      unchanged. But a changed file from an archive, or a copy that keeps the time stamp, can have
+      the same size and time stamp.
     """
     sys.path.insert(0, str(folder))
     root = Path(coartic.__file__).parents[1]

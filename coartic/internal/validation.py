@@ -1,4 +1,4 @@
-"""Validate data from files and calls, with error messages of one sentence."""
+"""Validate data from files and calls by pydantic, with error messages of one sentence."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ _UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 
 def describe_validation_errors(kind: type[T]) -> type[T]:
-    """Decorate a pydantic class to raise ValueError with one sentence for invalid data.
+    """Decorate a class of pydantic, so that a call with invalid data raises ValueError.
 
-    Calling the decorated class with invalid data raises a ValueError with the sentence of
-    :func:`explain`, not a ValidationError. ``model_validate`` is not changed.
+    The message of the ValueError is the sentence of :func:`explain`, after the name of the class.
+    Without the decorator, pydantic raises ValidationError, with a message of many lines. The method
+    ``model_validate`` is not changed.
     """
     init: Any = kind.__init__
 
@@ -39,10 +40,10 @@ def describe_validation_errors(kind: type[T]) -> type[T]:
 
 
 def equal_contents(a: Any, b: Any) -> Any:
-    """Compare two objects field by field: the ``__eq__`` of classes with arrays.
+    """Compare two objects field by field, as ``__eq__`` of classes with arrays.
 
-    Arrays are equal if their shapes and entries are. NaN is equal to NaN and to a masked entry.
-    Return NotImplemented for objects of different classes.
+    Two arrays are equal if their shapes and entries are equal. NaN counts as equal to NaN and to a
+    masked entry. The result is NotImplemented if the objects have different classes.
     """
     import numpy as np
 
@@ -64,31 +65,32 @@ def equal_contents(a: Any, b: Any) -> Any:
 
 @describe_validation_errors
 class FileData(BaseModel):
-    """Base of the contents of files: immutable, and without unknown keys."""
+    """Base class for the content of files: immutable, and without unknown keys."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     __eq__ = equal_contents
 
 
 def explain(error: ValidationError, keys: Iterable[str] = (), *, of_call: bool = False) -> str:
-    """Return a sentence on a problem of a validation error, with its key and value.
+    """Return a sentence on one problem of a validation error, with its key and value.
 
-    It is the first unknown key, or else the first problem.
+    The problem is the first unknown key. If there is no unknown key, it is the first problem.
 
     Parameters
     ----------
     error : ValidationError
-        Error of a model or of a checked function.
+        Error of a class of pydantic or of a checked function.
     keys : iterable of str
-        Known keys, or the arguments of the function in their order. For an unknown key, the
-        sentence suggests the most similar one.
+        Known keys or, for a function, the names of its arguments in their order. For an unknown
+        key, the sentence suggests the most similar known key.
     of_call : bool
-        True for the arguments of a function. Names inside of an argument are then types, not keys.
+        True if the error is that of a call of a function. Strings in the location of a problem
+        inside an argument are then names of types, not keys, and are left out.
 
     Returns
     -------
     str
-        The sentence.
+        The sentence, as one printable line.
     """
     problems = error.errors(include_url=False)
     # A misspelt key explains a missing one.

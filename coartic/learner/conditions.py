@@ -1,4 +1,4 @@
-"""The paper's exploration conditions and ablations of the learner, as data.
+"""The paper's exploration conditions, and ablations and extensions of the learner, as data.
 
 A condition defines
 
@@ -6,9 +6,10 @@ A condition defines
 - which joints it perturbs (AModChosen: base and chosen arm; AModOther: the other arm);
 - how it explores hands (DASel).
 
-Informed conditions combine informed and uninformed search, which the paper leaves to "future
-research" (section *Integrating Informed and Uninformed Search*). They change two things in the base
-and the chosen arm. The mean of exploration, which is t in the paper, becomes ::
+*Informed conditions* combine informed and uninformed search, which the paper leaves to "future
+research" (section *Integrating Informed and Uninformed Search*). They use null-space projection to
+move the base and the chosen arm towards a preferred posture, in two places. The mean of
+exploration, which is t in the paper, becomes ::
 
     t + κ N(t) (p - t)
 
@@ -19,15 +20,15 @@ and each iteration of the corrective process adds the term ::
 where
 
 - p is the preferred posture, which is chosen when a goal becomes current;
-- t is the stored target and x is the present configuration;
-- N = I − J⁺J projects onto the null space of the chosen hand's Jacobian; like the paper's distance,
-  it mixes lengths and angles.
+- t is the stored target, and x is the present configuration;
+- N = I − J⁺J is the projection onto the null space of the Jacobian J of the chosen hand. Like the
+  paper's distance in joint space, it mixes lengths and angles.
 
-There are two ablations, which are not in the paper:
+Two *ablations*, which are not in the paper, each change one part of the learner:
 
 - *uncorrected*: a movement to a stored target that misses its goal is not corrected;
-- *subtask*: the learner learns from the reward of each subtask. The paper calls it crucial that it
-  learns from the overall reward.
+- *subtask*: the learner learns from the reward of each subtask. The paper calls it crucial that the
+  learner learns from the overall reward.
 """
 
 from __future__ import annotations
@@ -63,9 +64,10 @@ Drift = Annotated[float, Field(ge=0, le=10)]
 
 
 def _one_or_many(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
-    """Validate a drift: a number, or a tuple of numbers.
+    """Validate field ``drift``: a number, or a tuple of numbers.
 
-    For any other value, raises a single validation error instead of two errors (number, tuple).
+    For any other value, a single validation error is raised. Without this function pydantic would
+    raise two: one that the value is not a number, and one that it is not a tuple.
     """
     try:
         return validate(value)
@@ -87,10 +89,16 @@ Drifts = Annotated[
 class ExplorationCondition:
     """Rules of the learner's exploration and learning (paper, section *Experiments*).
 
-    ``CONDITIONS`` has the paper's four conditions, ``ABLATIONS`` has conditions that change a part
-    of the learner, and ``INFORMED`` has conditions with more information. To change fields of a
-    condition, use ``dataclasses.replace``. Raises ValueError if a field is out of range, or if two
-    fields contradict each other.
+    ``CONDITIONS`` has the paper's four conditions, ``ABLATIONS`` has conditions that change one
+    part of the learner, and ``INFORMED`` has conditions that use more information. To change fields
+    of a condition, use ``dataclasses.replace``. Raises ValueError if a field is out of range, or if
+    two fields contradict each other.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> replace(CONDITIONS["EC4"], id="EC4, less noise", noise_sd=0.02).noise_sd
+    0.02
     """
 
     id: str
@@ -104,13 +112,14 @@ class ExplorationCondition:
     """True if noise moves the targets of the other arm (AModOther); False if the other arm does not
     move."""
     hand_exploration: Literal["none", "closest", "random", "nearest-posture"]
-    """Exploration of the hand for a goal:
+    """Which hand is tried for a goal when the hand is explored, which happens with probability
+    ``epsilon``:
 
-    - ``"none"``: none;
+    - ``"none"``: hands are not explored;
     - ``"closest"``: the hand closest to the goal;
     - ``"random"``: a random hand (DASel);
-    - ``"nearest-posture"``: the hand whose corrective posture for the goal is nearest in joint
-      space.
+    - ``"nearest-posture"``: the hand for which the posture that the corrective process finds at the
+      goal is nearest to the present posture in joint space.
     """
     epsilon: Share = 0.2
     """ε: probability with which the hand for a goal is explored (published)."""
@@ -118,30 +127,31 @@ class ExplorationCondition:
     """Standard deviation of the noise η (published), in length units (base) and rad (joints)."""
     corrects: bool = True
     """True if the corrective process **A** acts when a movement to a stored target misses its goal.
-    If False, such a trial fails, and **A** acts only in trial 0 and for states and hands without a
-    stored target."""
+    If False, a trial with such a movement fails, and **A** acts only in trial 0 and where no target
+    is stored for the state and the hand."""
     learned: Literal["best", "replay"] = "best"
-    """Solution of a run: its best trial (``"best"``), or a greedy trial without exploration after
-    the last trial (``"replay"``)."""
+    """Which trial is the solution of a run: the best trial (``"best"``), or a greedy trial without
+    exploration that is made after the last trial (``"replay"``)."""
     credit: Literal["overall", "subtask"] = "overall"
-    """Credit assignment, that is, the reward from which Q(s, a) is learned at a goal: the reward R
-    of the whole trial (``"overall"``), or the return of the goal (``"subtask"``, see
+    """Credit assignment: the reward from which the value Q(s, a) is learned at a goal. It is the
+    reward R of the whole trial (``"overall"``), or the return of the goal (``"subtask"``, see
     ``discount``)."""
     discount: Share = 0.0
-    """γ: the return of goal g is Σ γ^|h − g| r_h, where r_h is the reward of the movements to goal
-    h. With γ = 0 the return is the reward of the subtask itself. A value above 0 needs credit
-    ``"subtask"``.
+    """Discount factor γ. The return of goal g is Σ γ^|h − g| r_h, where r_h is the reward of the
+    movements to goal h. With γ = 0 the return is the reward of the subtask itself. A value above 0
+    needs credit ``"subtask"``.
     """
     counted: Literal["later", "all"] = "later"
-    """Goals h in the sum for the return of goal g: g and later goals (``"later"``), or all goals
-    (``"all"``, which needs credit ``"subtask"``). With ``"all"`` and γ = 1 every return is R."""
+    """Goals h over which the return of goal g is summed: g and all later goals (``"later"``), or
+    all goals of the trial (``"all"``, which needs credit ``"subtask"``). With ``"all"`` and γ = 1
+    each return is R."""
     drift: Drifts = 0.0
-    """κ, gain of informed exploration: the fraction of the null-space distance to the preferred
-    posture by which the mean of exploration moves. If κ is a tuple, each trial after trial 0 draws
-    one number of the tuple."""
+    """κ, gain of null-space exploration: the fraction of the null-space displacement to the
+    preferred posture by which the mean of exploration is moved. If κ is a tuple, each trial after
+    trial 0 draws one of its numbers."""
     pull: Share = 0.0
-    """β, gain of informed correction: the fraction of the null-space distance to the preferred
-    posture that each iteration of the corrective process adds, after trial 0."""
+    """β, gain of null-space correction: the fraction of the null-space displacement to the
+    preferred posture that is added in each iteration of the corrective process, after trial 0."""
     direction: Literal["next-goal", "stay", "start"] = "next-goal"
     """The preferred posture:
 
@@ -175,7 +185,7 @@ class ExplorationCondition:
 
     @property
     def drifts(self) -> tuple[float, ...]:
-        """The field ``drift`` (κ) as a tuple. A single number becomes a tuple of one number."""
+        """The values of field ``drift`` (κ) as a tuple, also for a single number."""
         return self.drift if isinstance(self.drift, tuple) else (self.drift,)
 
     @property
@@ -214,7 +224,8 @@ VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
     # A learner of subtasks must not choose its solution by the reward of the whole task.
     "subtask": ("subtask reward", {"credit": "subtask", "learned": "replay"}),
 }
-"""Maps the name of each variant of EC1 and EC4 to words for its title and its changed fields."""
+"""Dict that maps the name of each ablation to a phrase for its title, and to a dict that maps the
+changed fields of EC1 or EC4 to their values."""
 ABLATIONS = {
     f"{base}-{name}": replace(CONDITIONS[base], id=f"{base}-{name}", **fields)
     for base in ("EC1", "EC4")
@@ -225,20 +236,20 @@ INFORMED = {
     f"{base}-informed": replace(CONDITIONS[base], id=f"{base}-informed", drift=1.0)
     for base in ("EC1", "EC4")
 }
-"""Informed conditions: EC1 and EC4 with a drift. The preferred posture is halfway to the posture
-for the next goal because the shortest path is straight. The conditions therefore use the formula of
-the reward.
+"""Informed conditions: EC1 and EC4 with null-space exploration. The preferred posture is halfway to
+the posture at the next goal, because the shortest path is straight. So these conditions use the
+formula of the reward.
 
-The drift was chosen among 0.1, 0.3 and 1 by the mean gap after 10,000 trials on development
+Their ``drift`` was chosen among 0.1, 0.3 and 1 by the mean gap after 10,000 trials on development
 instances d000 to d009 of five families, three runs each (``studies/dial/development.toml``). The
 gaps were 6.8, 4.2 and 4.0 %.
 """
 EVERY_CONDITION = CONDITIONS | ABLATIONS | INFORMED
-"""All conditions by id."""
+"""Dict that maps the ids of all conditions to the conditions."""
 
 
 def load_condition(condition: str | ExplorationCondition) -> ExplorationCondition:
-    """Look up an exploration condition by its id, such as ``"EC4"`` or ``"dual-process/EC4"``.
+    """Return the exploration condition with an id, such as ``"EC4"`` or ``"dual-process/EC4"``.
 
     If the argument is a condition already, it is returned unchanged. Raises CoarticError for an
     unknown id, and TypeError for an object that is neither a string nor a condition.

@@ -1,16 +1,19 @@
 """The dual-process learner: trial and error on top of the corrective process.
 
-The module implements the paper's section *The Learning Process* and Figure 3. At each goal of a
-trial the learner chooses a hand, perturbs the stored target configuration and moves there. If the
-goal was missed, the corrective process **A** finishes (:mod:`coartic.motion.kernels.trial`). The
-learner's table has a value and a target for each state and hand. A trial is compared with all
-earlier trials that passed through the same state and hand, by the total reward or, in an ablation,
-by the return of the goal. If the trial is better than all of them, its value and its configuration
-at the goal replace those in the table.
+This module implements the paper's section *The Learning Process* and Figure 3. At each goal of a
+trial, the learner chooses a hand, perturbs the target configuration that is stored for this hand,
+and moves to it. If the hand misses the goal, the corrective process **A** moves it into the goal
+(:mod:`coartic.motion.kernels.trial`).
 
-One call of a compiled kernel, by :mod:`coartic.learner.learning`, makes many runs side by side,
-goal by goal and trial by trial. Each run draws from its own NumPy generator (``default_rng(seed)``,
-PCG64), in this order:
+The learner has a table keyed by state (the goal and the previous hand) and hand. An entry is the
+value Q and the target q*. A completed trial is compared, in each state that it passed through, with
+all earlier trials that chose the same hand in this state: by the total reward or, in an ablation,
+by the return of the goal. If it is better than all of them, its value and its configuration at the
+goal replace Q and q* in the table.
+
+One call of a compiled kernel by :mod:`coartic.learner.learning` makes many runs side by side: the
+outer loop is over trials, then over goals, then over runs. Each run draws random numbers from its
+own NumPy generator (``default_rng(seed)``, PCG64), in this order:
 
 1. if the condition has several values of ``drift``, at the beginning of each trial after trial 0: a
    uniform number that chooses one;
@@ -19,8 +22,8 @@ PCG64), in this order:
 3. if that number is below ε and a hand is chosen at random: a uniform number that chooses the hand;
 4. if a target is stored: a standard normal number per explored joint, in the order of ``q``.
 
-Runs share nothing, so that the result of a run depends neither on the other runs nor on their
-number. Motor noise is no part of this sequence (:mod:`coartic.motion.kernels.noise`).
+Runs share no data, so that the result of a run depends neither on the other runs nor on their
+number. Motor noise does not come from this generator (:mod:`coartic.motion.kernels.noise`).
 """
 
 from __future__ import annotations
@@ -157,7 +160,7 @@ class Results(NamedTuple):
 
 
 class _Workspace(NamedTuple):
-    """Work space of N runs, all at the same goal of the same trial."""
+    """Work space of N runs that are at the same goal of a trial."""
 
     batch: Batch
     counts: NDArray[np.int64]
@@ -174,10 +177,10 @@ class _Workspace(NamedTuple):
 def learner_parameters(
     compiled: CompiledTask, condition: ExplorationCondition, initial: Sequence[Movement]
 ) -> LearnerParameters:
-    """Return a task and a condition in the form that the learner's kernel reads.
+    """Convert a task and an exploration condition to the form that the learner's kernel reads.
 
-    ``initial`` has the movement of trial 0 for each goal; a movement without a target is
-    corrective.
+    ``initial`` has the movement for each goal in trial 0. If a movement has no target, only the
+    corrective process acts at this goal.
     """
     task, width = compiled.task, width_of(compiled.task.robot)
     first_targets = np.full((len(initial), width), np.nan)
@@ -257,12 +260,12 @@ def distance_to_goal(run: RunRecord, hand: int, robot: RobotRecord, workspace: _
 def _nearest_posture(
     n: int, robot: RobotRecord, learner: LearnerParameters, workspace: _Workspace
 ) -> int:
-    """Return the hand whose corrective posture for the goal is nearest to the present posture.
+    """Return the hand whose posture at the goal is nearest to the present posture.
 
-    The corrective posture of a hand is the posture that the corrective process **A** finds for the
-    goal of run ``n``. Distances are in joint space. At a tie, and if **A** fails with all hands,
-    the result is the first hand. Iterations and evaluations are counted. The run does not move, but
-    its ``hand``, ``converged`` and ``iterations`` change in place.
+    The posture of a hand at the goal of run ``n`` is the one that the corrective process **A**
+    finds. Distances are Euclidean in joint space. At a tie, and if **A** fails with all hands, the
+    result is the first hand. Iterations and evaluations are counted. The run does not move, but its
+    ``hand``, ``converged`` and ``iterations`` change in place.
     """
     nearest, batch, least = learner.hands[0], workspace.batch, math.inf
     run = batch.runs[n]
@@ -404,10 +407,10 @@ def aim(
 ) -> None:
     """Choose the hand for a goal and set its target: phase 2, *aim*.
 
-    The target is the stored target q*(s, a), except that an idle arm keeps its posture if the
-    condition does not modify it. If no target is stored, the corrective process acts. If
-    ``explore`` is True, the hand is explored (:func:`choose_hand`), and drift and noise η are added
-    to the target.
+    The target is the stored target q*(s, a), except that an idle arm keeps its present posture if
+    the condition does not modify it. If no target is stored, only the corrective process acts. If
+    ``explore`` is True, the hand is explored (:func:`choose_hand`), the target is moved towards the
+    preferred posture (:func:`explore_nullspace`), and noise η is added to it.
 
     ``n`` is the index of the run in ``workspace.batch.runs``, ``number`` the index of the goal,
     ``previous`` the previous hand (0 left, 1 right, 2 none), and ``table`` as in :func:`prefer`.
@@ -503,7 +506,7 @@ def _find_returns(trial: Any, learner: LearnerParameters, returns: Any) -> None:
 def _copy_accounts(source: Any, destination: Any) -> None:
     """Copy the per-goal records of a trial, shape ``(G,)``, in place.
 
-    The function copies word by word, because LLVM would copy records byte by byte, which takes long
+    The records are copied in words of 64 bits. LLVM would copy them byte by byte, which takes long
     to compile.
     """
     copies, words = destination.view(np.int64), source.view(np.int64)
@@ -515,11 +518,12 @@ def _copy_accounts(source: Any, destination: Any) -> None:
 def _learn_from(
     number: int, learner: LearnerParameters, tables: Any, results: Results, workspace: _Workspace
 ) -> None:
-    """Add trial ``number`` (from 0) of each run to ``results``, and learn from completed trials.
+    """Enter a trial of each run into the results, and learn from it.
 
-    In a run that completed the trial, the reward of the trial (or the return of the goal) is
-    compared with Q for each visited state and hand. If it is above Q, it replaces Q in ``tables``,
-    and the configuration at the hit replaces q*.
+    ``number`` is the number of the trial, from 0. For each state that a completed trial passed
+    through and the hand that it chose there, the reward of the trial (or the return of the goal) is
+    compared with Q. If it is higher, it replaces Q in ``tables``, and the configuration at the hit
+    replaces q*.
     """
     later_trials = max(1, results.rewards.shape[1] - 1)
     part = 0 if number == 0 else 1 + (number - 1) * TENTHS // later_trials

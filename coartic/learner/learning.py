@@ -1,4 +1,4 @@
-"""Run the dual-process learner, whose trials :mod:`coartic.learner.kernel` makes."""
+"""Run the dual-process learner. The kernels of its trials are in :mod:`coartic.learner.kernel`."""
 
 from __future__ import annotations
 
@@ -54,10 +54,15 @@ _MAX_BATCH_TRIALS = 4_000_000  # trials of runs whose rewards fit into one answe
 
 
 def runs_at_once(trials: int) -> int:
-    """Return the largest number of runs, of ``trials`` trials each, for one job of a worker.
+    """Return how many runs of ``trials`` trials a job of a worker has at most.
 
-    The number is chosen so that the runs together make at most 4,000,000 trials; it is at least 1
-    and at most 72.
+    The runs of a job together make at most 4,000,000 trials. The number is at least 1 and at most
+    72.
+
+    Examples
+    --------
+    >>> runs_at_once(10_000), runs_at_once(1_000_000), runs_at_once(10_000_000)
+    (72, 4, 1)
     """
     return max(1, min(SLOTS, _MAX_BATCH_TRIALS // trials))
 
@@ -71,7 +76,7 @@ def learn(
     model: MotionModel = PAPER,
     start: Sequence[Movement] = (),
 ) -> LearningRun:
-    """Run the learner on a task under an exploration condition.
+    """Run the dual-process learner on a task under an exploration condition.
 
     Equal arguments give equal runs.
 
@@ -87,10 +92,10 @@ def learn(
         Number of trials, including trial 0.
     model : MotionModel
     start : sequence of Movement
-        A first solution, such as a planner's or an earlier run's. In trial 0 the learner makes, for
-        each goal, the first movement of this solution: the robot moves straight to its target. If
-        the hand of the movement misses the goal, or if the movement has no target, the corrective
-        process acts. Without a first solution only the corrective process acts in trial 0.
+        A first solution, such as that of a planner or of an earlier run. In trial 0 the robot
+        moves, for each goal, straight to the target of the first movement of this solution. If the
+        hand misses the goal, or if the movement has no target, the corrective process acts. Without
+        a first solution, only the corrective process acts in trial 0.
 
     Returns
     -------
@@ -149,7 +154,8 @@ def learn_many(
 ) -> list[LearningRun]:
     """Run the learner once for each of many seeds, as :func:`learn` does.
 
-    Runs are made side by side, which changes only the time that they take.
+    The runs are made side by side and in threads, which takes less time, but does not change their
+    results.
 
     Parameters
     ----------
@@ -235,11 +241,11 @@ def _learn_together(
     seeds: Sequence[int],
     trials: int,
 ) -> list[LearningRun]:
-    """Run the learner side by side, once for each of at most 72 seeds, unchecked.
+    """Run the learner side by side for at most 72 seeds, without checks.
 
-    Return the runs in the order of seeds. ``initial`` has the movement of trial 0 for each goal; a
-    movement without a target stands for the corrective process. With 0 trials the kernels are
-    compiled, the rewards are empty, and the replay is trial 0.
+    Return the runs in the order of seeds. ``initial`` has the movement for each goal in trial 0; if
+    a movement has no target, only the corrective process acts at this goal. With ``trials`` 0 the
+    kernels are compiled, the rewards are empty, and the replay is trial 0.
     """
     runs, dof, compiled = len(seeds), task.robot.dof, compiled_task(task, model)
     tables = empty_tables(runs, task)
@@ -299,14 +305,19 @@ Kernels = Literal["learner", "motion", "trials"]
 
 
 def warm_up(task: Task, *parts: Kernels) -> None:
-    """Compile a task's kernels, or load their machine code, before the first run.
+    """Compile the kernels for a task, or load their machine code, before the first run.
 
-    The kernels are compiled for the number of links of the task's robot. ``parts`` names the
-    kernels, by default all three:
+    The kernels are compiled for the number of links of the task's robot.
 
-    - ``"learner"``: the learner;
-    - ``"motion"``: single movements and corrections;
-    - ``"trials"``: trials, and executions without paths.
+    Parameters
+    ----------
+    task : Task
+    *parts : str
+        Names of the kernels to compile, by default all three:
+
+        - ``"learner"``: kernels of the learner;
+        - ``"motion"``: kernels of single movements and corrections;
+        - ``"trials"``: kernels of trials, and of executions without paths.
     """
     hand, goal = task.hands[0], task.goals[0]
     if not parts or "learner" in parts:

@@ -23,7 +23,7 @@ from coartic.tasks.task import Task
 
 @dataclass(frozen=True, eq=False)
 class LearningRun:
-    """A run of the learner with everything that it learned (:func:`learn`)."""
+    """A run of the learner: its trials, its solution, and what it learned (:func:`learn`)."""
 
     task: Task
     """The task."""
@@ -50,16 +50,18 @@ class LearningRun:
     replay_reward: int | None
     """Total reward of the replay; None if it failed."""
     values: Array
-    """Q, shape ``(goals, 3, 2)``; the axes are goal, previous hand (left, right, none) and hand. Q
-    is the highest total reward, or the highest return of the goal if the condition has
-    ``credit="subtask"``. Q is -inf where nothing was learned."""
+    """Value table Q, shape ``(goals, 3, 2)``. The axes are goal, previous hand (left, right, none)
+    and hand. Q is the highest total reward of the completed trials with this hand in this state;
+    with ``credit="subtask"`` it is the highest return of the goal. Q is -inf where nothing was
+    learned."""
     targets: Array
     """q*, the stored targets, shape ``(goals, 3, 2, dof)``, in length units (base) and rad
     (joints); NaN where Q is -inf."""
     corrections: NDArray[np.int64]
-    """Corrective movements in trial 0 and in each tenth of the later trials, shape ``(11,)``."""
+    """Number of corrective movements in trial 0 and in each tenth of the later trials, shape
+    ``(11,)``."""
     counters: Meter
-    """Counts of the trials of the run; the replay is not counted."""
+    """Counts of the trials, ticks and evaluations of the run, without the replay."""
     wall_s: float = field(compare=False)
     """Wall time of the run (in s): the time of the runs that were made together, divided by their
     number."""
@@ -77,9 +79,10 @@ class LearningRun:
     def learned(self) -> tuple[Movement, ...]:
         """Movements of the learned solution; empty if its trial did not hit every goal.
 
-        The learned solution is the best trial, or the replay if the condition has
-        ``learned="replay"``. With motor noise it is :attr:`next_action`, because the best trial was
-        partly lucky.
+        - Without motor noise, the learned solution is the best trial, or the replay if the
+          condition has ``learned="replay"``.
+        - With motor noise the best trial was partly lucky. So the learned solution is
+          :attr:`next_action`.
         """
         if self.model.motor_noise > 0.0:
             return self.next_action
@@ -89,18 +92,17 @@ class LearningRun:
 
     @property
     def next_action(self) -> tuple[Movement, ...]:
-        """Movements that the learner would make next without exploration.
+        """Movements that the learner would make in a next trial without exploration.
 
-        The state at a goal is the number of the goal and the hand for the goal before.
+        The state at a goal is the pair of the goal and the hand for the goal before.
 
-        - The hand for a goal is the hand with the highest Q in this state; the target is the stored
-          posture q* of this hand.
-        - If no posture is stored, the movement is corrective and has no target.
-        - The target is NaN in the joints of an idle arm that the condition does not move; these
-          joints do not move.
-        - The movements have no ticks.
+        - *Hand.* The hand for a goal is the one with the highest Q in the state.
+        - *Target.* The target is the stored target q* of this hand. If none is stored, the movement
+          is corrective and has no target. If the condition does not move the idle arm, the entries
+          of this arm in the target are NaN.
+        - *Ticks.* The movements have no ticks, because they were not executed.
 
-        The result is empty if no trial was completed.
+        The tuple is empty if no trial was completed.
         """
         if self.best_trial is None:
             return ()
@@ -132,11 +134,11 @@ class LearningRun:
 
     @property
     def reward(self) -> int | None:
-        """Total reward of the learned solution; None without a solution.
+        """Total reward of the best trial or of the replay; None without a solution.
 
-        This is the highest reward of all trials, or the reward of the replay if the condition has
-        ``learned="replay"``. With motor noise this one trial was partly lucky: judge
-        :attr:`learned` by :func:`coartic.execute_noisy`.
+        It is the reward of the replay if the condition has ``learned="replay"``, and otherwise the
+        highest reward of all trials. With motor noise this single trial was partly lucky: to judge
+        :attr:`learned`, execute it by :func:`coartic.execute_noisy`.
         """
         if self.condition.learned == "replay":
             return self.replay_reward

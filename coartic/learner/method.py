@@ -1,7 +1,7 @@
 """The dual-process learner as methods: one for each exploration condition, and a general one.
 
-Variants that use more information than the paper's learner are separate methods. The information
-that a method declares is therefore right for all values of its parameters.
+Variants of the learner that use more information are separate methods. So the information that a
+method declares is right for all values of its parameters.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class DualProcess(Method):
         return _condition_of(self.condition, self.parameters)
 
     def inapplicable_reason(self, task: Outline) -> str | None:
-        """Return why the condition does not apply to a task's hands; None if it applies."""
+        """Return why the exploration condition does not apply to a task; None if it applies."""
         return self.rules().inapplicable_reason(task)
 
     def solve(self, session: Session) -> Result:
@@ -105,16 +105,24 @@ class DualProcess(Method):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        The number is chosen so that the sessions together make at most 4,000,000 trials; it is at
-        least 1 and at most 72.
+        The sessions of a call together make at most 4,000,000 trials. The number is at least 1 and
+        at most 72.
         """
         return runs_at_once(self.parameters.trials)
 
     def solve_together(self, sessions: Sequence[Session]) -> list[Result | MethodError]:
-        """Run the learner in sessions that differ only in their seeds.
+        """Run the learner side by side in sessions that differ only in their seeds.
 
-        Return a list with an entry for each session, in order: the result of :meth:`solve`, or the
-        MethodError that it would raise.
+        Parameters
+        ----------
+        sessions : sequence of Session
+            At most 72 sessions with the same task, model and budget.
+
+        Returns
+        -------
+        list of Result or MethodError
+            For each session, in order, the result of :meth:`solve`, or the MethodError that
+            :meth:`solve` would raise.
         """
         parameters, condition = self.parameters, self.rules()
         tasks = [session.reveal(*self.information) for session in sessions]
@@ -147,10 +155,11 @@ class DualProcess(Method):
 
 
 def _method_for(condition: ExplorationCondition) -> type[DualProcess]:
-    """Return a new subclass of :class:`DualProcess`, the learner under a condition.
+    """Make the class of the learner under an exploration condition.
 
-    Its parameters are trials, noise and ε. An informed condition also has drift, pull and
-    direction; a condition with credit for subtasks also has discount and counted.
+    The class is a subclass of :class:`DualProcess`. Its parameters are ``trials``, ``noise_sd`` and
+    ``epsilon``; for an informed condition ``drift``, ``pull`` and ``direction``, too; and for a
+    condition with credit for subtasks ``discount`` and ``counted``, too.
     """
     names = ["epsilon", "noise_sd"]
     base, _, change = condition.id.partition("-")
@@ -209,10 +218,11 @@ _optional: Any = {name: (kind | None, None) for name, kind in _FIELDS.items()}
 
 
 class CustomDualProcess(DualProcess):
-    """The learner under any exploration condition that the parameters define.
+    """The learner under an exploration condition that the parameters define.
 
-    The parameters are ``trials``, ``base``, and all fields of a condition except ``id`` and
-    ``hands``. The method declares all information that any condition uses.
+    The parameters are ``trials``, ``base`` (a condition of the paper), and all fields of a
+    condition except ``id`` and ``hands``, which change ``base``. The method declares all
+    information that any condition uses.
     """
 
     name = f"{METHOD_PREFIX}custom"
@@ -224,9 +234,10 @@ class CustomDualProcess(DualProcess):
     )
 
     def rules(self) -> ExplorationCondition:
-        """Return a copy of condition ``base`` with the fields that the parameters change.
+        """Return a copy of condition ``base`` in which the parameters change fields.
 
-        Fields whose parameter is None keep their values. The id is, for example, ``EC4, changed,``.
+        A field whose parameter is None keeps its value. The id of the copy is, for example,
+        ``EC4, changed,``.
         """
         base = replace(CONDITIONS[self.parameters.base], id=f"{self.parameters.base}, changed,")
         return _condition_of(base, self.parameters)

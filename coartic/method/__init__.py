@@ -1,9 +1,9 @@
-"""The base of methods, and the session through which a method works.
+"""The base class of methods, and the session through which a method works.
 
-A learner, planner or controller is a :class:`Method`. A method declares its facts, its parameters
-and the **information** that it uses. Its function ``solve`` gets a :class:`Session` (one task, one
-seed, one meter) and returns a solution. The session is the only access to the robot: the session
-counts trials and evaluations, and refuses a call that uses undeclared information. The harness
+Each learner, planner or controller is a :class:`Method`. A method declares its facts, its
+parameters and the **information** that it uses. Its function ``solve`` gets a :class:`Session` (one
+task, one seed and one meter) and returns a solution. The session is the only access to the robot.
+It counts trials and evaluations, and refuses a call that uses undeclared information. The benchmark
 itself executes, scores and verifies the solution.
 """
 

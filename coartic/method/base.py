@@ -1,4 +1,4 @@
-"""The base of methods: what a method declares, and how it is run."""
+"""The base class of methods: what a method declares, and how it is run."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ each tenth of the later trials."""
 
 @describe_validation_errors
 class Parameters(BaseModel):
-    """Base class of the parameters of methods: typed, validated, immutable, plain data."""
+    """Base class of the parameters of methods: immutable plain data, checked by pydantic."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -241,16 +241,24 @@ class Method(ABC):
     def max_batch(self) -> int:
         """Return the largest number of sessions for one call of :meth:`solve_together`.
 
-        For methods from outside this project, a suite ignores this number and passes one session at
-        a time.
+        For methods that do not belong to this project, a suite ignores this number: it always
+        passes one session at a time, to :meth:`solve`.
         """
         return 1
 
     def solve_together(self, sessions: Sequence[Session]) -> Sequence[Result | MethodError]:
-        """Solve in many sessions that differ only in their seeds.
+        """Solve the task in many sessions that differ only in their seeds.
 
-        Return a sequence with an entry for each session, in order: the result of :meth:`solve`, or
-        the MethodError that it raised.
+        Parameters
+        ----------
+        sessions : sequence of Session
+            At most :meth:`max_batch` sessions.
+
+        Returns
+        -------
+        sequence of Result or MethodError
+            For each session, in order, the result of :meth:`solve`, or the MethodError that
+            :meth:`solve` raised.
         """
         results: list[Result | MethodError] = []
         for session in sessions:
@@ -282,10 +290,10 @@ markers."""
 
 @cache
 def built_in_methods() -> Mapping[str, type[Method]]:
-    """Return a mapping from the ids of the built-in methods to their classes.
+    """Return a dict that maps the ids of the built-in methods to their classes.
 
-    The methods are in the order of :data:`MODULES`, whose modules are imported. Each call returns
-    the same mapping: do not change it.
+    The methods are in the order of :data:`MODULES`; these modules are imported. Each call returns
+    the same dict: do not change it.
     """
     return {method.name: method for name in MODULES for method in import_module(name).METHODS}
 
@@ -295,9 +303,9 @@ def run_method(
 ) -> tuple[Result, Session]:
     """Let a method solve a task in this process.
 
-    There is no budget of trials, and the solution is not executed. Methods of this project may see
-    the task, and report their own counts. In any other method, the use of undeclared information
-    raises UndeclaredError, if it is information whose use a session can detect (:data:`METERED`).
+    There is no trial budget, and the solution is not executed. Methods of this project may see the
+    task itself, and report their own counts. Any other method works only through its session, which
+    raises UndeclaredError if it detects the use of undeclared information (:data:`METERED`).
 
     Parameters
     ----------

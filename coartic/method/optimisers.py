@@ -1,4 +1,4 @@
-"""The benchmark for optimisers: the cost of a trial as a function to minimise.
+"""Black-box optimisation: the cost of a trial as a function to minimise.
 
 :func:`objective` makes the function of a task for scipy and similar libraries. An
 :class:`Optimiser` is a method of the benchmark that minimises such a function.
@@ -77,11 +77,11 @@ def explored_joints(session: Session) -> NDArray[np.bool_]:
 
 
 def sequences_of(session: Session) -> list[str]:
-    """List all hand sequences of the session's task, such as ``"RRLR"``, in alphabetical order.
+    """List all hand sequences of the session's task, such as ``"RRLR"``.
 
-    If the task names a sequence, that sequence comes first. If there are more than 4096 sequences,
-    the list has only the initial hand sequence, from :meth:`Session.find_initial_hands`, whose
-    errors are raised.
+    The order is alphabetical, except that a hand sequence that the task names comes first. If there
+    are more than 4096 sequences, the list has only the initial hand sequence. It comes from
+    :meth:`Session.find_initial_hands`, whose errors are raised.
     """
     if too_many_sequences(session.task_name, session.goals_count, len(session.hands)):
         return [session.find_initial_hands()]
@@ -90,10 +90,10 @@ def sequences_of(session: Session) -> list[str]:
 
 
 def _entries_of(name: str, points: ArrayLike) -> Array:
-    """Return points as an array (:func:`real_array`), ignoring the labels of a table.
+    """Convert points to an array of float64 (:func:`real_array`).
 
-    Objects with ``to_numpy`` are accepted. Raises ValueError for other values; the message calls
-    the points ``name``.
+    Objects with a method ``to_numpy``, such as data frames, are accepted; their labels are ignored.
+    Raises ValueError for values that are not real numbers. The error message begins with ``name``.
     """
     return real_array(name, points.to_numpy() if hasattr(points, "to_numpy") else points)
 
@@ -232,10 +232,10 @@ class Objective:
 
     @property
     def best_known(self) -> int | float | None:
-        """Lowest known cost of any solution of the task (in ticks; a mean with motor noise).
+        """Lowest known cost of a solution of the task (in ticks), or None.
 
-        The solution may have any hand sequence, and may hit goals without a movement. The cost is
-        None if no such cost is shipped with coartic, as for
+        The solution may have any hand sequence, and may hit goals without a movement. With motor
+        noise the cost is a mean. It is None if no such cost is shipped with coartic, as for
 
         - most tasks of your own;
         - instances of families, except the first 40 test instances of shipped families;

@@ -182,7 +182,7 @@ _OTHER_PROCESS = (
 
 
 def _pack_rewards(rewards: Iterable[int | None]) -> array[int]:
-    """Return rewards as an array of 8-byte integers; :data:`NO_REWARD` stands for None."""
+    """Convert rewards to an array of 8-byte integers; :data:`NO_REWARD` stands for None."""
     return array("q", [NO_REWARD if reward is None else reward for reward in rewards])
 
 
@@ -746,11 +746,11 @@ class Session:
     # Counts that the method adds itself.
 
     def spend(self, **counts: int) -> None:
-        """Add counts to the counters of the meter, which are passed as keyword arguments.
+        """Add counts, which are passed as keyword arguments, to counters of the meter.
 
-        A method may add to the counters :attr:`Meter.SOLVER`, a trusted method to all of
-        :attr:`Meter.COUNTS`. Raises ValueError for another counter, for a count that is not an
-        integer from 0, and for a sum above 2^63 - 1.
+        A method may add to the counters in :attr:`Meter.SOLVER`, and a method of this project to
+        all counters in :attr:`Meter.COUNTS`. Raises ValueError for any other counter, for a count
+        that is not an integer from 0 on, and for a sum above 2^63 - 1.
         """
         allowed = Meter.COUNTS if self._trusted else Meter.SOLVER
         for name, count in counts.items():
@@ -761,11 +761,11 @@ class Session:
         self._meter.add(**counts)
 
     def building(self) -> AbstractContextManager[None]:
-        """Return a context manager that adds the wall time of its block to ``build_s`` (in s)."""
+        """Return a context manager that adds the wall time of its block to ``build_s``."""
         return self._timing("build_s")
 
     def solving(self) -> AbstractContextManager[None]:
-        """Return a context manager that adds the wall time of its block to ``solve_s`` (in s)."""
+        """Return a context manager that adds the wall time of its block to ``solve_s``."""
         return self._timing("solve_s")
 
     @contextmanager
@@ -780,11 +780,12 @@ class Session:
     # Only for this project's compiled methods.
 
     def reveal(self, *information: Information) -> Task:
-        """Return the task itself, for methods of this project.
+        """Return the task itself to a method of this project.
 
-        The caller has to count its evaluations by :meth:`spend`. ``information`` has at least one
-        item, and all items are added to :attr:`used`. Raises UndeclaredError if the method is not
-        of this project, if no item is passed, or if the method does not declare an item.
+        The method has to count its evaluations by :meth:`spend`. ``information`` is what the method
+        uses of the task, at least one item; all items are added to :attr:`used`. Raises
+        UndeclaredError if the method is not of this project, if no item is passed, or if the method
+        does not declare an item.
         """
         self._needs_trust("reveal")
         if not information:

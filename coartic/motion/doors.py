@@ -1,7 +1,8 @@
 """Python functions for single movements and corrections, which call the compiled kernels.
 
-A movement is straight in joint space, or follows a path. Its length is measured in the norm of the
-motion model, in which a length unit of the base counts as much as ``base_weight`` rad of a joint.
+A movement is straight in joint space, or follows a path through waypoints. Its length is measured
+in the norm of the motion model, in which a length unit of the base counts as much as
+``base_weight`` rad of a joint.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def move(
     stop_on_arrival: bool = True,
     model: MotionModel = PAPER,
 ) -> MoveResult:
-    """Move straight in joint space until the hand hits the goal or arrives.
+    """Move the robot straight in joint space, until a hand hits its goal or arrives.
 
     Parameters
     ----------
@@ -78,8 +79,8 @@ def move(
         position that the hand has at the target. If False, as in a corrective movement, the
         movement ends only on a hit or at its target.
     model : MotionModel
-        The motion model, of which ``gain``, ``correction_tolerance`` and ``max_iterations`` are not
-        used.
+        The motion model. Its constants ``gain``, ``correction_tolerance`` and ``max_iterations``
+        are not used.
 
     Returns
     -------
@@ -125,18 +126,22 @@ def follow(
     *,
     model: MotionModel = PAPER,
 ) -> MoveResult:
-    """Move along a path through waypoints until the hand hits the goal.
+    """Move the robot along a path through waypoints, until a hand hits its goal.
 
-    Without a hit the movement ends at the last waypoint. A movement of k steps takes k + 1 ticks.
+    If the hand does not hit the goal, the movement ends at the last waypoint. A movement of k steps
+    takes k + 1 ticks.
 
     Parameters
     ----------
     robot : Robot
+        The robot.
     q : ndarray, shape (dof,)
         Configuration in which the robot stands, in length units (base) and rad (joints).
     waypoints : ndarray, shape (W, dof)
-        At least one configuration to pass through (:func:`path_points`).
+        Configurations through which the path passes, at least one, in the same units
+        (:func:`path_points`).
     hand : {"left", "right"}
+        The hand that is to hit the goal.
     goal : tuple of float
         Centre of the goal, x and y in length units.
     radius : float
@@ -146,8 +151,9 @@ def follow(
     Returns
     -------
     MoveResult
-        Result of the movement, which stops at the first point of the path at which the hand is in
-        the goal, or else at the last waypoint.
+        Where the robot stopped, the control ticks of the movement, and whether the goal is hit. The
+        robot stops at the first point of the path (:func:`path_points`) at which the hand is in the
+        goal, or else at the last waypoint.
 
     Raises
     ------
@@ -167,11 +173,11 @@ def follow(
 
 
 def scale_base(changes: Array, model: MotionModel) -> Array:
-    """Multiply the base coordinates of configuration changes by the model's weight of the base.
+    """Multiply the base coordinates of changes of a configuration by the weight of the base.
 
-    ``changes`` and the result have shape ``(..., dof)``. For a model with the Euclidean norm, the
-    norm of a row of the result is the length of a straight movement by that change. If the weight
-    is 1, ``changes`` itself is returned.
+    ``changes`` and the result have shape ``(..., dof)``. The norm of a row of the result, in the
+    norm of the model, is the length of a straight movement by this change. If the weight is 1,
+    ``changes`` itself is returned.
     """
     if model.base_weight == 1.0:
         return changes
@@ -181,11 +187,27 @@ def scale_base(changes: Array, model: MotionModel) -> Array:
 
 
 def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
-    """Return the n + 1 configurations of a straight movement of n steps, including both ends.
+    """Return the configurations of a straight movement, one after each control step.
 
-    ``q`` and ``target`` have shape ``(dof,)``, and the result ``(n + 1, dof)``, in length units and
-    rad. An entry does not move if its target is NaN. The result is equal to that of the kernels,
-    bit for bit.
+    Parameters
+    ----------
+    q : ndarray, shape (dof,)
+        Configuration at the beginning, in length units (base) and rad (joints).
+    target : ndarray, shape (dof,)
+        Configuration at the end. An entry that is NaN does not move.
+    model : MotionModel
+        Motion model with the length of a step, the norm and the weight of the base.
+
+    Returns
+    -------
+    ndarray, shape (n + 1, dof)
+        Configurations of a movement of n steps, including both ends. They are equal to those of the
+        kernels, bit for bit.
+
+    Examples
+    --------
+    >>> line_points(np.zeros(3), np.array([0.0, 0.0, 0.025]))[:, 2]
+    array([0.   , 0.01 , 0.02 , 0.025])
     """
     target = np.where(np.isnan(target), q, target)
     difference, square = target - q, 0.0
@@ -199,8 +221,14 @@ def line_points(q: Array, target: Array, model: MotionModel = PAPER) -> Array:
 def segment_lengths(configurations: ArrayLike, model: MotionModel = PAPER) -> Array:
     """Return the joint-space distance from each configuration to the next.
 
-    The distance is in the norm of ``model``, with its weight of the base. ``configurations`` has
-    shape ``(k, dof)``, the result ``(k - 1,)``, in a mix of length units and rad.
+    The distance is measured in the norm of ``model``, with its weight of the base.
+    ``configurations`` has shape ``(k, dof)``, in length units and rad. The result has shape
+    ``(k - 1,)``, in a mix of both units.
+
+    Examples
+    --------
+    >>> segment_lengths([[0.0, 0.0, 0.0], [0.0, 0.0, 3.0], [4.0, 0.0, 0.0]])
+    array([3., 5.])
     """
     changes = scale_base(np.diff(configurations, axis=0), model)
     if model.norm == "maximum":
@@ -211,10 +239,27 @@ def segment_lengths(configurations: ArrayLike, model: MotionModel = PAPER) -> Ar
 def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = PAPER) -> Array:
     """Return points on a path through waypoints in joint space, spaced by ``model.step``.
 
-    The path begins at ``q``, shape ``(dof,)``, and is straight from each of the W > 0
-    ``waypoints``, shape ``(W, dof)``, to the next. The result has shape ``(n + 1, dof)``, in length
-    units and rad. Point k < n lies at arc length ``k * model.step``; point n is the last waypoint.
-    Raises ValueError for a wrong shape, and for a number that is not finite or beyond 100,000.
+    The path is straight from each configuration to the next.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : ndarray, shape (dof,)
+        Configuration at the beginning of the path, in length units (base) and rad (joints).
+    waypoints : ndarray, shape (W, dof)
+        At least one configuration.
+    model : MotionModel
+        Motion model with the length of a step, the norm and the weight of the base.
+
+    Returns
+    -------
+    ndarray, shape (n + 1, dof)
+        Point k < n lies at arc length ``k * model.step`` of the path; point n is the last waypoint.
+
+    Raises
+    ------
+    ValueError
+        A shape is wrong, or a number is not finite or is beyond ±100,000.
     """
     shape = (len(waypoints), robot.dof)
     corners = np.vstack([configuration(robot, q), finite_array("waypoints", waypoints, shape)])
@@ -226,7 +271,7 @@ def path_points(robot: Robot, q: Array, waypoints: Array, model: MotionModel = P
 
 
 def configuration(robot: Robot, q: Any) -> Array:
-    """Return one configuration as a new contiguous array, shape ``(dof,)``.
+    """Convert a configuration to a new contiguous array of float64, shape ``(dof,)``.
 
     Raises ValueError for a wrong shape, and for an entry that is not finite or beyond ±100,000.
     """
@@ -234,10 +279,10 @@ def configuration(robot: Robot, q: Any) -> Array:
 
 
 def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
-    """Return numbers as a new contiguous array of float64.
+    """Convert numbers to a new contiguous array of float64 with a given shape.
 
-    Raises ValueError for a shape other than ``shape``, and for a number that is not finite or
-    beyond ±100,000. ``name`` is the name of the value in the error message.
+    Raises ValueError if the numbers do not have this shape, or if a number is not finite or is
+    beyond ±100,000. The error message begins with ``name``.
     """
     array = np.array(real_array(name, value), order="C")
     if array.shape != shape:
@@ -251,10 +296,26 @@ def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> Array:
 
 
 def one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Batch:
-    """Return a batch with one run; its configuration and its target are ``q``.
+    """Return a batch of kernels with one run, whose configuration and target are ``q``.
 
-    ``radius`` is checked, but not used. Raises TypeError if ``robot`` is not a Robot, and
-    ValueError for any other argument that does not fit.
+    Parameters
+    ----------
+    robot : Robot
+    q : array_like, shape (dof,)
+        Configuration, in length units and rad.
+    hand : {"left", "right"}
+        The hand that is to hit the goal.
+    goal : array_like, shape (2,)
+        Centre of the goal, x and y in length units.
+    radius : float
+        Radius of the goal (in length units). It is only checked.
+
+    Raises
+    ------
+    TypeError
+        ``robot`` is not a Robot.
+    ValueError
+        Another argument does not fit.
     """
     if not isinstance(robot, Robot):
         raise TypeError(f"robot is {brief_value(robot)}; it must be a Robot")
@@ -267,10 +328,10 @@ def one_run(robot: Any, q: Any, hand: Any, goal: Any, radius: float = 0.0) -> Ba
 
 
 def check_goal(centre: Any, radius: float = 0.0) -> tuple[float, float]:
-    """Return the centre of a goal, x and y, as two floats.
+    """Convert the centre of a goal to two floats, x and y (in length units).
 
-    Raises ValueError if ``centre`` is not two finite numbers within ±100,000, or if ``radius`` is
-    not from 0 to 100,000 (in length units).
+    Raises ValueError if ``centre`` does not consist of two finite numbers within ±100,000, or if
+    ``radius`` is not from 0 to 100,000 (in length units).
     """
     x, y = finite_array("goal", centre, (2,)).tolist()
     check_limits("radius", radius, 0.0, MAX_ENTRY)
@@ -304,8 +365,8 @@ def correct(
     locked_base : collection of {"x", "y"}
         Coordinates of the base that do not move.
     model : MotionModel
-        The constants; only ``gain``, ``correction_tolerance`` (0.01 length units for None) and
-        ``max_iterations`` are used.
+        The motion model. Only its constants ``gain``, ``correction_tolerance`` (0.01 length units
+        for None) and ``max_iterations`` are used.
 
     Returns
     -------

@@ -1,11 +1,12 @@
-"""Execute solutions: the one function that makes and scores the movements of a solution.
+"""Execute solutions: make the movements of a solution, and score them.
 
 A solution is executed from the task's start by the rule of :mod:`coartic.motion.kernels.trial`, and
-every tick counts. If the movements miss a goal, the corrective process moves the hand into the
-goal. The score of a solution is the reward of this execution; what a method itself reports does not
-count.
+each control tick counts. If the movements miss a goal, the corrective process moves the hand into
+the goal. The score of a solution is the reward of this execution; a reward that a method itself
+reports does not count.
 
-:func:`execute` executes without noise, :func:`execute_noisy` many times with motor noise.
+:func:`execute` executes a solution without noise, :func:`execute_noisy` many times with motor
+noise.
 """
 
 from __future__ import annotations
@@ -62,9 +63,9 @@ class Execution:
     """Result of executing a solution: movements made, ticks and reward (:func:`execute`)."""
 
     movements: tuple[Movement, ...]
-    """The movements that were made, in order, with targets and ticks. Targets are the intended
-    targets, without noise. With noise a goal can need several corrections; they are combined into
-    one movement with the target of the last correction and the sum of all ticks."""
+    """The movements that were made, in order, with targets and ticks. With motor noise, targets are
+    those without the noise. Several corrections for a goal, which occur only with motor noise, are
+    combined into one movement with the target of the last correction and the sum of all ticks."""
     configurations: Array
     """Configuration at the moment each goal was hit, shape ``(goals hit, dof)``, in length units
     and rad."""
@@ -75,9 +76,9 @@ class Execution:
     iterations: int = 0
     """Iterations of the corrective process, with one Jacobian each."""
     evaluations: int = 0
-    """Forward-kinematics evaluations. A correction makes one evaluation more than it makes
-    iterations. Each goal that is tried adds one evaluation if its first movement is corrective, and
-    two otherwise."""
+    """Forward-kinematics evaluations. A correction of k iterations makes k + 1 evaluations. Each
+    goal that is tried adds one evaluation if its first movement is corrective, and two
+    otherwise."""
     reason: str = ""
     """Sentence on why the task was not completed; empty if it was completed."""
     __eq__ = equal_contents
@@ -112,7 +113,7 @@ Refused = SolutionError | ValueError | TypeError | OverflowError
 def execute(
     task: TaskLike, solution: Iterable[Movement], *, model: MotionModel = PAPER
 ) -> Execution:
-    """Execute a solution from the task's start and score it.
+    """Execute a solution from the task's start, and score it.
 
     If the movements for a goal miss it, the corrective process starts from the robot's present
     configuration and makes a corrective movement, whose ticks count.
@@ -163,11 +164,23 @@ def execute_many(
     solutions: Iterable[Iterable[Movement]],
     worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> list[Execution | Refused]:
-    """Execute many solutions of one task, and return a list of executions in the same order.
+    """Execute many solutions of one task side by side.
 
-    For a solution that cannot be executed, the entry is the error that :func:`execute` would raise;
-    the error is not raised. If the model of ``compiled`` has motor noise, ``worlds`` has the seed
-    and the draw of the noise for each solution (:func:`.noise_draws`).
+    Parameters
+    ----------
+    compiled : CompiledTask
+        The task with its motion model.
+    solutions : iterable of iterable of Movement
+        K solutions.
+    worlds : ndarray of int, shape (K, 2), optional
+        Noise seed and noise draw of each solution, if the model has motor noise
+        (:func:`.noise_draws`).
+
+    Returns
+    -------
+    list
+        For each solution, in order, its Execution. For a solution that cannot be executed, the
+        entry is the error that :func:`execute` would raise, which is not raised here.
     """
     executions: list[Plan | Refused] = []
     for solution in solutions:
@@ -181,7 +194,7 @@ def execute_many(
 
 
 class Requested(NamedTuple):
-    """Requested movements of K solutions as arrays: G goals, at most M movements for each."""
+    """Requested movements of K solutions for G goals, as arrays."""
 
     hands: Hands
     """Shape ``(K, G)``, 0 left or 1 right."""
@@ -195,11 +208,12 @@ class Requested(NamedTuple):
 
 
 def _with_targets(movements: list[Movement], corrective: float = math.inf) -> list[Movement | None]:
-    """Return the movements for a goal that have targets, up to the first one without.
+    """Return the movements for a goal that are made before the corrective process acts.
 
-    The corrective process acts from the first movement without a target on, or after a number of
-    ``corrective`` movements with targets. If the first movement is corrective, the list begins with
-    None, which stands for a check whether the hand is in the goal.
+    These are the movements with targets, up to the first movement without a target or, if that
+    comes earlier, up to the corrective movement after ``corrective`` others. If the first movement
+    is corrective, the list begins with None, which stands for a check whether the hand is in the
+    goal already.
     """
     aimed: list[Movement | None] = [None] if movements[0].kind == "corrective" else []
     for movement in movements:
@@ -213,10 +227,15 @@ def _with_targets(movements: list[Movement], corrective: float = math.inf) -> li
 def _requested(
     compiled: CompiledTask, aims: Sequence[list[list[Movement | None]]], hands: Any
 ) -> Requested:
-    """Return plans as arrays for the kernels.
+    """Convert requested movements to arrays for the kernels.
 
-    ``aims`` has the movements with targets of each solution, by goal (:func:`_with_targets`), and
-    ``hands`` the hand of each of its goals.
+    Parameters
+    ----------
+    compiled : CompiledTask
+    aims : sequence of list of list
+        For each solution and goal, the movements of :func:`_with_targets`.
+    hands : list of int
+        Hand of each goal of each solution, 0 left or 1 right.
     """
     goals = [movements for of_solution in aims for movements in of_solution]
     length = max(map(len, goals))
@@ -261,8 +280,8 @@ def movements_in(
     ----------
     records : ndarray, shape (N, G, M)
         Per-goal records of the trials.
-            dof : int
-        Length of a configuration.
+    dof : int
+        Number of entries of a configuration.
     requested : iterable of iterable of sequence of Movement or None
         For each trial and goal, the movements that were requested (:func:`_with_targets`). The
         kinds of the returned movements are copied from the requested movements.
@@ -270,7 +289,7 @@ def movements_in(
     Returns
     -------
     list of list of Movement
-        A list for each trial.
+        The movements made in each trial.
     """
     names = ("hand", "hit", "ticks", "corrections")
     goals = records[..., 0]
@@ -302,10 +321,17 @@ def movements_in(
 def _execution_of(
     compiled: CompiledTask, plan: Plan, movements: list[Movement], goals: NDArray[np.void]
 ) -> Execution:
-    """Return the execution of a plan from the movements and the per-goal records of its trial.
+    """Return the execution of a plan.
 
-    ``movements`` are the movements made, up to the first goal that was missed; ``goals`` are the
-    per-goal records, shape ``(G,)``.
+    Parameters
+    ----------
+    compiled : CompiledTask
+    plan : list of list of Movement
+        Requested movements for each goal.
+    movements : list of Movement
+        Movements that were made, up to the first goal that was missed.
+    goals : ndarray, shape (G,)
+        Per-goal records of the trial.
     """
     hits = sum(goals["hit"].tolist())
     # The hand is evaluated before the first movement and, unless it is corrective, at its end.
@@ -325,9 +351,9 @@ def _execution_of(
 def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float:
     """Compute the joint travel of the idle arm, summed over the goals (in rad).
 
-    The idle arm of a goal is the arm that does not hit the goal. Its travel for the goal is the
-    Euclidean distance between its joint angles at the hit of this goal and its joint angles at the
-    hit of the goal before (for goal 1, at the start).
+    The idle arm of a goal is the arm that does not hit the goal. Its travel on the way to the goal
+    is the Euclidean distance between its joint angles at the hit of this goal and at the hit of the
+    goal before (for goal 1, at the start).
 
     Parameters
     ----------
@@ -335,7 +361,12 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
     hands : iterable of {"left", "right"}
         The hand for each goal.
     reached : ndarray, shape (G, dof)
-        The configuration at each hit.
+        Configuration at the hit of each goal, in length units and rad.
+
+    Returns
+    -------
+    float
+        Sum of the travels (in rad).
     """
     travel, previous = 0.0, task.q0
     for hand, q in zip(hands, reached, strict=True):
@@ -352,12 +383,21 @@ def other_arm_travel(task: Task, hands: Iterable[Hand], reached: Array) -> float
 def sample_execution(
     task: Task, movements: Iterable[Movement], model: MotionModel = PAPER
 ) -> Array:
-    """Return the configuration at every control tick of an execution without noise.
+    """Return the configuration at each control tick of an execution without noise.
 
-    ``movements`` are the movements of the execution (:attr:`Execution.movements`), with targets and
-    ticks. The result has shape ``(ticks, dof)``, in length units and rad. The first row is the
-    start. A movement of k steps has k + 1 rows, so that its last row is repeated as the first row
-    of the next movement.
+    Parameters
+    ----------
+    task : Task
+    movements : iterable of Movement
+        The movements of the execution (:attr:`Execution.movements`), with targets and ticks.
+    model : MotionModel
+        The motion model of the execution.
+
+    Returns
+    -------
+    ndarray, shape (ticks, dof)
+        Configurations, in length units and rad. The first row is the start. A movement of k steps
+        has k + 1 rows, so that its last row is repeated as the first row of the next movement.
     """
     q, rows = np.array(task.q0), [np.empty((0, task.robot.dof))]
     for movement in movements:
@@ -439,10 +479,10 @@ def execute_noisy(
         waypoint k of K        w_kc + (k / K) s z_c     if c moves, else q_c
         correction             a_c + s min(1, L) z_c    for base and chosen arm, else a_c
 
-    - An *aimed movement* has the target t: it is learned or planned. A path has the waypoints w_1
-      to w_K and one z; it is not steered while it is made (open loop).
-    - A coordinate *moves* if the target is a number, or any waypoint, that differs by more than
-      1e-9 from where the robot stands now. A locked base does not move.
+    - An *aimed movement* is a learned or planned movement with the target t. A path has the
+      waypoints w_1 to w_K and one vector z; it is not steered while it is made (open loop).
+    - A coordinate *moves* if its entry of the target, or of any waypoint, is a number that differs
+      by more than 1e-9 from where the robot stands now. A locked base does not move.
     - The target of a *correction* is the configuration a that the corrective process finds from q.
       If the solution has a corrective movement with a target, that target is not used. L is the
       Euclidean distance from q to a. A locked base coordinate keeps a_c.
@@ -519,11 +559,11 @@ def _ticks_of(records: TrialRecords) -> Array:
 def _execute_exactly(
     compiled: CompiledTask, plans: Sequence[Plan]
 ) -> tuple[list[list[list[Movement | None]]], Array]:
-    """Execute plans without noise, and find which movements are aimed.
+    """Execute plans without noise, and find out which movements are aimed movements.
 
-    A corrective movement with a target is made by the corrective process if the process finds this
-    target, to within 1e-9, where the robot then stands. Otherwise, and if the process does not
-    converge there, it is an aimed movement.
+    A corrective movement with a target counts as made by the corrective process if the process,
+    starting where the robot then stands, finds this target to within 1e-9. Otherwise, and if the
+    process does not converge there, it counts as an aimed movement.
 
     Returns
     -------
@@ -557,11 +597,11 @@ def _execute_exactly(
 
 
 def _is_found(goal: np.void, target: Array) -> bool:
-    """Return whether the corrective process itself finds ``target``.
+    """Return whether the corrective process itself finds the target of a corrective movement.
 
     ``goal`` is the record of the goal in an execution in which the process acts in place of the
-    corrective movement to ``target``. The result is also True
-    if the movement is not made, because the goal is hit already.
+    corrective movement to ``target``. The result is True, too, if the movement is not made, because
+    the goal is hit already.
     """
     if goal["corrections"] == 0:
         return bool(goal["hit"])
@@ -570,9 +610,9 @@ def _is_found(goal: np.void, target: Array) -> bool:
 
 
 def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
-    """Return the movements of ``solutions[number]`` by goal.
+    """Return the movements of ``solutions[number]`` for each goal.
 
-    Raises SolutionError if the solution breaks the task's rules.
+    Raises SolutionError, with this number in the message, if the solution breaks the task's rules.
     """
     try:
         return movements_by_goal(task, solution)
@@ -581,10 +621,10 @@ def _plan_of(task: Task, number: int, solution: Iterable[Movement]) -> Plan:
 
 
 def _check_ticks(task: Task, number: int, plan: Plan, ticks: float) -> None:
-    """Check that a solution's movements have the ticks that they take without noise.
+    """Check that the movements of a solution have the ticks that they take without noise.
 
-    ``ticks`` is the number that they take, or NaN if the execution fails. Nothing is checked if a
-    movement has no ticks. Raises SolutionError if the numbers differ.
+    ``ticks`` is the number of ticks of the execution, or NaN if it fails. Nothing is checked if a
+    movement of the solution has no ticks. Raises SolutionError if the numbers differ.
     """
     stored = [movement.ticks for movements in plan for movement in movements]
     counts = [count for count in stored if count is not None]
@@ -692,9 +732,9 @@ def initial_hands(
     hands : tuple of {"left", "right"}, optional
         The hands among which a policy chooses; the task's by default.
     model : MotionModel
-        The motion model; its motor noise is ignored in the search.
+        The motion model. Its motor noise is ignored in the search.
 
-            Returns
+    Returns
     -------
     str
         The hand for each goal, such as ``"RRRR"``.
@@ -712,6 +752,11 @@ def initial_hands(
     Notes
     -----
     Source: paper, section *Experiments*.
+
+    Examples
+    --------
+    >>> initial_hands("ascending")
+    'RRR'
     """
     task = as_task(task)
     return search_initial_hands(task, hands, model=check_model(model))[0]
@@ -720,8 +765,8 @@ def initial_hands(
 def initial_reward(task: Task, model: MotionModel = PAPER) -> int | None:
     """Return the reward of the corrective process on its own with a task's initial hands.
 
-    The process is executed without the motor noise of ``model``. Return None if the trial fails, or
-    if the task names a policy that finds no hands (:func:`initial_hands`).
+    The motor noise of ``model`` is ignored. The result is None if the trial fails, or if the task
+    names a policy that finds no hands (:func:`initial_hands`).
     """
     try:
         hands = initial_hands(task, model=model)

@@ -42,10 +42,10 @@ def ranked_sequences(
     Returns
     -------
     list of tuple
-        An entry ``(sequence, reward, reason, counts)`` for each sequence. ``reward`` is None if the
-        trial failed, and ``reason`` says why (otherwise it is empty). ``counts`` maps the names
-        :data:`COUNTED` to the counts of the trial; as in :func:`coartic.execute`, each goal that is
-        tried adds an evaluation. The order is
+        Tuple ``(sequence, reward, reason, counts)`` for each sequence. ``reward`` is None if the
+        trial failed; ``reason`` says why, and is empty otherwise. ``counts`` is a dict that maps
+        the names in :data:`COUNTED` to the counts of the trial; as in :func:`coartic.execute`, each
+        goal that is tried adds an evaluation of the forward kinematics. The tuples are sorted
 
         - by reward, the highest first and failed trials last;
         - then by the number of changes of hand, the fewest first;
@@ -88,25 +88,31 @@ def _best_of_all(task_json: str, model: MotionModel) -> tuple[str, int] | None:
 
 
 def best_hands(task: Task, model: MotionModel = PAPER) -> tuple[str, int] | None:
-    """Return the hand sequence with the fewest ticks of the corrective process, and these ticks.
+    """Return the best hand sequence of the corrective process on its own, and its ticks.
 
-    The corrective process acts on its own, without the motor noise of ``model``. For a task with
-    more than 4096 hand sequences, the result is its initial sequence. The result is None if the
-    process completes the task with no sequence. Results are cached; the trials are not counted.
+    The best sequence is the one with the fewest ticks; motor noise of ``model`` is ignored. For a
+    task with more than 4096 hand sequences, only its initial sequence is tried. The result is None
+    if the process completes the task with no sequence, or if a task with more than 4096 sequences
+    names a policy instead of an initial sequence. Results are cached; the trials are not counted.
     """
     return _best_of_all(task.model_dump_json(), model.without_noise())
 
 
 def changes_of_hand(sequence: str) -> int:
-    """Count how often the hand changes between successive goals: 3 for ``"LRLR"``."""
+    """Count how often the hand changes from one goal to the next: 3 for ``"LRLR"``."""
     return sum(a != b for a, b in itertools.pairwise(sequence))
 
 
 def sequences_with(hands: Collection[Hand], goals: int, task: str) -> list[str]:
-    """List all sequences of ``hands`` for a number of goals in alphabetical order.
+    """List all hand sequences for a number of goals, in alphabetical order.
 
-    The sequences are strings such as ``"LRLR"``. Raises NotApplicableError, with the name ``task``
-    in the message, if there are more than 4096 sequences.
+    The sequences are strings such as ``"LRLR"`` of the letters of ``hands``. Raises
+    NotApplicableError, with the name ``task`` in the message, if there are more than 4096.
+
+    Examples
+    --------
+    >>> sequences_with(("left", "right"), 2, "mine")
+    ['LL', 'LR', 'RL', 'RR']
     """
     ordered = [hand for hand in HANDS if hand in hands]
     if reason := too_many_sequences(task, goals, len(ordered)):
@@ -127,7 +133,7 @@ def too_many_sequences(task: str, goals: int, hands: int) -> str | None:
 
 
 def hands_among(task: Task, hands: Iterable[Hand] | None) -> tuple[Hand, ...]:
-    """Return ``hands`` as a tuple, or all hands of the task for None.
+    """Check hands and return them as a tuple; None stands for all hands.
 
     Raises ValueError if ``hands`` is empty or names a hand that the task does not have.
     """
@@ -169,9 +175,9 @@ def search_initial_hands(
     -------
     sequence : str
         The hand sequence, such as ``"RRRR"``.
-    counts : mapping
-        Maps names of counters of :class:`~coartic.method.Meter` to counts. The mapping is cached:
-        do not change it.
+    counts : mapping of str to int
+        Dict that maps names of counters of :class:`~coartic.method.Meter` to the counts of the
+        search. It is cached: do not change it.
 
     Raises
     ------
@@ -194,11 +200,10 @@ def search_initial_hands(
 def _search_by_policy(
     task_json: str, hands: tuple[Hand, ...], model: MotionModel
 ) -> tuple[str, Mapping[str, int]]:
-    """Search for the hands of trial 0 by the task's policy.
+    """Search for the hands of trial 0 by the task's policy (:func:`search_initial_hands`).
 
-    An LRU cache stores 64 results. The task is passed as JSON, and ``hands`` as an ordered tuple,
-    so that both are hashable. The caller counts the trials. The result is as in
-    :func:`search_initial_hands`.
+    The last 64 results are cached (LRU). So that the arguments are hashable, the task is passed as
+    JSON, and ``hands`` as a tuple. The caller counts the trials.
     """
     task = Task.model_validate_json(task_json, context=WITHOUT_REACH)
     goals = len(task.goals)

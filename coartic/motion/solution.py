@@ -1,4 +1,4 @@
-"""Solutions: a list of movements, at least one for each goal of a task.
+"""Solutions of tasks. A solution is a list of movements, at least one for each goal of a task.
 
 :func:`coartic.motion.execution.execute` executes and scores them.
 """
@@ -59,7 +59,7 @@ class Movement:
     """Control ticks of the movement; None before the movement is executed."""
     waypoints: Array | None = None
     """Configurations through which a path passes, in order, shape ``(k, dof)``, in length units and
-    rad; None for the other kinds."""
+    rad; None for a movement of another kind."""
     __eq__ = equal_contents
 
     def __post_init__(self) -> None:
@@ -85,10 +85,10 @@ def goals_without_target(movements: Iterable[Movement]) -> tuple[int, ...]:
 
 
 def next_action(movements: Iterable[Movement]) -> tuple[Movement, ...]:
-    """Return copies of movements without the results of one noisy execution.
+    """Return copies of movements without what depends on the noise of one execution.
 
-    Ticks and the targets of corrective movements depend on the noise of one execution. In the
-    copies they are None, so that the movements can be executed again with other noise.
+    These are the ticks, and the targets of corrective movements. In the copies they are None, so
+    that the movements can be executed again with other noise.
     """
     return tuple(
         replace(movement, ticks=None, target=None)
@@ -99,14 +99,30 @@ def next_action(movements: Iterable[Movement]) -> tuple[Movement, ...]:
 
 
 Plan = list[list[Movement]]
-"""List of the movements for each goal, in the order of the goals (not the plan of a suite)."""
+"""Movements of a solution: a list of movements for each goal, in the order of the goals. (The plan
+of a suite is something else.)"""
 
 
 def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
-    """Check a solution, and return a list of the movements for each goal.
+    """Check a solution, and return a list of its movements for each goal.
 
-    In the result the target of a path is its last waypoint, and locked base coordinates have their
-    values at the start. Raises SolutionError if the solution breaks the task's rules.
+    In the result, the target of a path is its last waypoint, and locked base coordinates of targets
+    have their values at the task's start.
+
+    Parameters
+    ----------
+    task : Task
+    solution : iterable of Movement
+
+    Returns
+    -------
+    list of list of Movement
+        The movements for each goal, in the order of the goals.
+
+    Raises
+    ------
+    SolutionError
+        The solution breaks a rule of the task.
     """
     if not isinstance(solution, Iterable):
         raise SolutionError(
@@ -144,10 +160,10 @@ def movements_by_goal(task: Task, solution: Iterable[Movement]) -> Plan:
 
 
 def _check_movement(task: Task, movement: Movement) -> Movement:
-    """Check a movement's hand, kind, target and waypoints.
+    """Check the hand, the kind, the target and the waypoints of a movement.
 
-    Return the movement itself, or a copy with arrays as in :func:`movements_by_goal`. Raises
-    SolutionError or ValueError if something does not fit.
+    Return the movement itself, or a copy whose arrays are changed as :func:`movements_by_goal`
+    says. Raises SolutionError or ValueError if something does not fit.
     """
     kind, target, waypoints = movement.kind, movement.target, movement.waypoints
     if not isinstance(movement.hand, str) or movement.hand not in task.hands:
@@ -203,10 +219,10 @@ def _check_point(task: Task, point: Any, kind: Kind = "path") -> Array:
 
 
 def _hold_base(task: Task, points: Array) -> Array:
-    """Set locked base coordinates of points to their values at the start, in place.
+    """Set locked base coordinates of configurations to their values at the start, in place.
 
-    ``points`` has shape ``(..., dof)`` and is returned; NaN stays. Raises ValueError if a
-    coordinate differs from the start by more than :data:`HELD`, 1e-6 length units.
+    ``points`` has shape ``(..., dof)`` and is returned; entries that are NaN do not change. Raises
+    ValueError if a coordinate differs from the start by more than 1e-6 length units (:data:`HELD`).
     """
     for coordinate in task.locked_base:
         k = "xy".index(coordinate)
@@ -221,10 +237,12 @@ def _hold_base(task: Task, points: Array) -> Array:
 
 
 def check_targets(task: Task, targets: Any) -> Configs:
-    """Check targets, and return a copy in which locked base coordinates equal the start.
+    """Check the targets of N trials, and return a copy of them.
 
-    The shape is ``(N, G, dof)``, in length units and rad; NaN is allowed. Raises ValueError for
-    another shape, for infinite entries, and for targets that move a locked base by more than 1e-6.
+    ``targets`` and the copy have shape ``(N, G, dof)``, in length units and rad; NaN is allowed. In
+    the copy, locked base coordinates have their values at the task's start. Raises ValueError for
+    another shape, for infinite entries, and for targets that move a locked base by more than 1e-6
+    length units.
     """
     copy = np.array(real_array("targets", targets))
     if copy.ndim != 3 or copy.shape[1:] != (len(task.goals), task.robot.dof):
@@ -260,6 +278,11 @@ def movements_of(hands: str, targets: ArrayLike) -> tuple[Movement, ...]:
     ------
     ValueError
         The hands are not letters L and R, or the number of rows is not the number of hands.
+
+    Examples
+    --------
+    >>> [movement.kind for movement in movements_of("RL", [[0.1] * 10, [np.nan] * 10])]
+    ['learned', 'corrective']
     """
     chosen, targets = hands_of(hands), real_array("targets", targets)
     if targets.ndim != 2 or len(targets) != len(chosen):

@@ -1,6 +1,6 @@
-"""Trials with given targets, made by the compiled kernels and counted.
+"""Make trials with given targets by the compiled kernels, and count them.
 
-Sessions, objectives, executions and environments make their trials by this module. The kernels
+Sessions, objectives, executions and environments make their trials through this module. The kernels
 make many trials side by side.
 """
 
@@ -42,8 +42,8 @@ class TrialRecords(NamedTuple):
     """Per-goal records, counts and rewards of N trials with G goals."""
 
     goals: NDArray[np.void]
-    """What happened at each goal, a structured array of shape ``(N, G, M)``
-    (:func:`goal_record_type`). M is the number of requested movements for each goal."""
+    """Per-goal records, a structured array of shape ``(N, G, M)`` (:func:`goal_record_type`). M is
+    the number of requested movements for each goal."""
     counts: NDArray[np.int64]
     """Counts of the trials, shape ``(N, 5)``, columns in the order of :data:`COUNTED`."""
     rewards: NDArray[np.int64]
@@ -51,16 +51,27 @@ class TrialRecords(NamedTuple):
 
 
 SHARE = 14 * SLOTS
-"""Smallest number of arms for a thread. Starting a thread takes as long as a hundred trials."""
+"""Smallest number of arms for which a thread is started. Starting a thread takes as long as about a
+hundred trials."""
 _IDLE: defaultdict[int, list[Batch]] = defaultdict(list)
-"""Dict that maps :attr:`Robot.max_links` to a list of batches that no thread uses."""
+"""Pool of batches that no thread uses: a dict that maps :attr:`Robot.max_links` to a list of
+batches."""
 
 
 def empty_records(robot: Robot, count: int, goals: int, moves: int = 1) -> TrialRecords:
-    """Allocate the records of ``count`` trials with ``goals`` goals.
+    """Allocate the records of trials.
 
-    There are ``moves`` movements to targets for each goal. The counts of the trials are 0; the
-    caller fills in everything else.
+    The counts of the trials are 0; the caller fills in everything else.
+
+    Parameters
+    ----------
+    robot : Robot
+    count : int
+        Number of trials.
+    goals : int
+        Number of goals.
+    moves : int
+        Largest number of movements to targets for each goal.
     """
     return TrialRecords(
         np.empty((count, goals, moves), goal_record_type(width_of(robot))),
@@ -75,8 +86,9 @@ NO_WAYPOINTS = np.empty((0, 0))
 NO_NOISE = np.zeros((1, 2), dtype=np.uint64)
 """Value of :attr:`Requests.worlds` for trials without noise."""
 PRACTICE, JUDGE = 0x70726163, 0x6A756467
-"""Keys by which two noise seeds are derived from a seed: ``PRACTICE`` for the trials of a method,
-``JUDGE`` for scoring its solution. So no solution is scored on the noise of the trials."""
+"""Keys by which two different noise seeds are derived from the seed of a run: ``PRACTICE`` for the
+trials of the method, ``JUDGE`` for scoring its solution. So no solution is scored on noise that the
+method has met in its trials."""
 
 
 @lru_cache(maxsize=4096)
@@ -129,7 +141,7 @@ def reach(robot: Robot, arms: Requests, parameters: NDArray[np.void]) -> TrialRe
 
 
 class Reached(NamedTuple):
-    """Results of N arms that reached for a goal each (:func:`reach_goals`)."""
+    """Results of N arms, each of which reached for one goal (:func:`reach_goals`)."""
 
     q: Configs
     """Configuration in which each arm ended, shape ``(N, dof)``, in length units and rad."""
@@ -161,7 +173,7 @@ def reach_goals(
     locked_base: Sequence[str] = (),
     model: MotionModel = PAPER,
 ) -> Reached:
-    """Let N arms reach for one goal each, side by side, from where they are.
+    """Let each of N arms reach for one goal, side by side.
 
     Parameters
     ----------
@@ -176,8 +188,9 @@ def reach_goals(
     radius : float
         Radius of all goals (in length units).
     targets : ndarray, shape (N, dof), optional
-        Targets of the first movements. An entry that is NaN keeps its value. An arm whose row is
-        NaN has no target: only the corrective process acts. By default no arm has a target.
+        Targets of the first movements, in length units and rad. A coordinate whose entry is NaN
+        does not move. An arm whose row is all NaN has no target: only the corrective process acts.
+        By default no arm has a target.
     checks : bool
         True if an arm without a target does not move when its hand is in its goal already; False if
         the corrective process begins at once.
@@ -242,8 +255,7 @@ class CompiledTask(NamedTuple):
     """Parameters of the robot (:func:`coartic.motion.kernels.slots.robot_parameters`)."""
     model: MotionModel
     options: tuple[bool, bool]
-    """Two options: whether an arm without a target stays where it is if its hand is in the goal,
-    and whether the noise of aimed movements grows with their length."""
+    """Values of the options ``checks`` and ``grows`` (:func:`compiled_task`)."""
 
 
 _last_compiled: CompiledTask | None = None
@@ -252,11 +264,23 @@ _last_compiled: CompiledTask | None = None
 def compiled_task(
     task: Task, model: MotionModel, *, checks: bool = True, grows: bool = False
 ) -> CompiledTask:
-    """Return a task with a model as arrays for the kernels.
+    """Convert a task and a motion model to arrays for the kernels.
 
-    The arrays are cached: do not change them. If ``checks`` is False, the corrective process begins
-    at once when an arm has no target. If ``grows`` is True, the noise of aimed movements grows with
-    their length.
+    The arrays are cached: do not change them.
+
+    Parameters
+    ----------
+    task : Task
+    model : MotionModel
+    checks : bool
+        True if an arm without a target does not move when its hand is in its goal already; False if
+        the corrective process begins at once.
+    grows : bool
+        True if the motor noise of aimed movements grows with their length.
+
+    Returns
+    -------
+    CompiledTask
 
     Raises
     ------
@@ -298,16 +322,17 @@ _outside = 0
 
 
 def count_trials(count: int) -> None:
-    """Add ``count`` to the number of trials made outside the sessions of runs.
+    """Add to the number of trials made outside the sessions of runs.
 
-    :func:`trials_outside` returns that number. The session of a run subtracts its own trials.
+    All trials are added here when they are made. The session of a run then subtracts its own
+    trials, with a negative ``count``. :func:`trials_outside` returns the number.
     """
     global _outside
     _outside += count
 
 
 def trials_outside() -> int:
-    """Return the number of trials that :func:`count_trials` has counted in this process."""
+    """Return how many trials this process has made outside the sessions of runs."""
     return _outside
 
 
@@ -339,11 +364,27 @@ def reach_next(
     first: int,
     worlds: NDArray[np.uint64] = NO_NOISE,
 ) -> TrialRecords:
-    """Let a robot reach for goals ``first`` (from 0), ``first`` + 1, ... of a task.
+    """Continue a trial: let a robot reach for consecutive goals of a task.
 
-    ``q``, shape ``(1, dof)``, is the robot's present configuration. The other arguments are as in
-    :class:`Requests`; the number of ``targets`` is the number of goals for which the robot reaches.
     The trial is not counted.
+
+    Parameters
+    ----------
+    compiled : CompiledTask
+    q : ndarray, shape (1, dof)
+        Present configuration of the robot, in length units and rad.
+    hands, targets : ndarray
+        Hands and targets, as in :class:`Requests`. They determine for how many goals the robot
+        reaches.
+    first : int
+        Index in the task of the first of these goals, from 0.
+    worlds : ndarray of int, shape (1, 2)
+        Noise seed and noise draw of the trial. Without motor noise they have no effect.
+
+    Returns
+    -------
+    TrialRecords
+        Records of these goals.
     """
     goals = compiled.goals[:, first : first + targets.shape[1]]
     arms = Requests(q, hands, targets, ALL_MOVE, NO_WAYPOINTS, goals, first, worlds)
@@ -369,7 +410,7 @@ def reason_of_failure(compiled: CompiledTask, goals: NDArray[np.void]) -> str:
 
 
 class Trials(NamedTuple):
-    """Results of N trials."""
+    """Results of N trials of a task with G goals."""
 
     ticks: NDArray[np.int64]
     """Control ticks of each trial, shape ``(N,)``."""
@@ -383,10 +424,12 @@ class Trials(NamedTuple):
     """Forward-kinematics evaluations, shape ``(N,)``; a correction takes one more than its
     iterations."""
     targets: Configs
-    """Targets of the movements made, shape ``(N, G, dof)``, in length units and rad. A row is NaN
-    if no target was passed. For goals after a failure the row is the target as it was passed."""
+    """Targets of the movements made, shape ``(N, G, dof)``, in length units and rad. The entries of
+    a goal are NaN if no target was passed for it. For goals after a goal at which the trial failed,
+    they are the targets as they were passed."""
     reached: Configs
-    """Configuration when each goal was hit, shape ``(N, G, dof)``; NaN if it was not hit."""
+    """Configuration in which each goal was hit, shape ``(N, G, dof)``, in length units and rad; NaN
+    for a goal that was not hit."""
 
     @property
     def rewards(self) -> Array:

@@ -136,10 +136,10 @@ def stage(
 
 
 def _scene(axes: Axes, movement: Trajectory, colour: str) -> Callable[[int], None]:
-    """Draw goals, robot, paths of the hands and a counter of ticks.
+    """Draw the goals, the robot, the paths of the hands and a counter of ticks.
 
-    Return a function that updates the drawing to a row, from 0, of the movement's configurations. A
-    row past the end shows the last configuration.
+    Return a function that shows a given row, from 0, of the configurations of the movement. For a
+    row past the end it shows the last configuration.
     """
     task = movement.task
     paths = {hand: movement.hand_path(hand) for hand in task.hands}

@@ -1,4 +1,4 @@
-"""The page of `coartic play`: one HTML file that needs no other."""
+"""Make the page of ``coartic play``: one HTML file that needs no other file."""
 
 from __future__ import annotations
 
@@ -109,7 +109,10 @@ def part_of_page(name: str) -> str:
 
 @cache
 def templates() -> Environment:
-    """Return Jinja's environment of the templates next to this file, always the same object."""
+    """Return the Jinja environment for the templates next to this file.
+
+    Each call returns the same object.
+    """
     return Environment(
         loader=FileSystemLoader(FOLDER),
         undefined=StrictUndefined,

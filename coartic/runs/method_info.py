@@ -1,4 +1,4 @@
-"""MethodInfo: the declaration of a method, and the location of its code."""
+"""Declarations of methods, with the location of their code (:class:`MethodInfo`)."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ class MethodInfo:
         return None if reason is None else plain(str(reason))
 
     def rules(self) -> dict[str, Any]:
-        """Return the settings of the method that its conformance check needs.
+        """Return the settings of the method that the check of its conformance needs.
 
         Returns
         -------
@@ -134,16 +134,18 @@ class MethodInfo:
         return dict(self._ask("rules"))
 
     def _ask(self, question: str, *arguments: Any) -> Any:
-        """Ask the method (:func:`answer`), directly or in the process that has imported its
-        file."""
+        """Ask the method a question (:func:`answer`), and return the answer.
+
+        A method from a file is asked in the process that has imported this file.
+        """
         if self.where in READERS:
             return READERS[self.where](self.name, question, *arguments)
         return answer(self.load(), question, *arguments)
 
 
 READERS: dict[str, Callable[..., Any]] = {}
-"""Dict that maps the path of a method file to a function that asks the process of this file. This
-process itself does not import these files."""
+"""Dict that maps the path of each method file that was read to a function. The function asks the
+process that has imported the file, because this process does not import method files."""
 
 
 def answer(method: type[Method], question: str, *arguments: Any) -> Any:
@@ -204,7 +206,10 @@ def answer(method: type[Method], question: str, *arguments: Any) -> Any:
 
 
 def method_info(method: type[Method], origin: str, where: str, code: str) -> MethodInfo:
-    """Make the MethodInfo of a class. The other arguments are fields of the MethodInfo."""
+    """Make the declaration of a method from its class.
+
+    ``origin``, ``where`` and ``code`` are fields of the :class:`MethodInfo`.
+    """
     return MethodInfo(
         name=method.name,
         title=method.title,
@@ -221,9 +226,10 @@ def method_info(method: type[Method], origin: str, where: str, code: str) -> Met
 
 
 def _defaults(method: type[Method]) -> dict[str, Any]:
-    """Return a dict that maps parameters to defaults as plain data; None for no default.
+    """Return a dict that maps the parameters of a method to defaults.
 
-    Raises CoarticError for a default that is infinite or NaN.
+    The value of a parameter without a default is None. Raises CoarticError for a default that is
+    infinite or NaN.
     """
     defaults = {
         name: None if field.is_required() else field.get_default(call_default_factory=True)
@@ -233,7 +239,7 @@ def _defaults(method: type[Method]) -> dict[str, Any]:
 
 
 def _plain_parameters(method: type[Method], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a dict that maps parameters to their values as plain data.
+    """Return a dict that maps parameters to values, as plain data.
 
     Raises CoarticError for a value with infinity or NaN, which JSON does not have.
     """
@@ -294,11 +300,18 @@ def methods_in(module: ModuleType, *, abstract: bool = False) -> list[type[Metho
 
 @cache
 def load_file(path: Path, code: str = "") -> tuple[ModuleType, frozenset[str]]:
-    """Import a method file; return its module and the names of the modules that it loaded.
+    """Import a method file, and find out which modules it loads.
 
-    The names do not include the module itself. A process imports the file
-    once for each ``code``, a hash. The file and the user's modules are compiled from their source
-    (:func:`.import_from`). Errors of the file are raised as they are.
+    A process imports the file once for each ``code``, a hash of the code. The file and the user's
+    modules are compiled from their source (:func:`.import_from`). Errors of the file are raised as
+    they are.
+
+    Returns
+    -------
+    module
+        The module of the file.
+    frozenset of str
+        Names of the modules that were loaded by its import, without the module itself.
     """
     name = f"coartic_method_{path.stem}"
     import_from(path.parent)

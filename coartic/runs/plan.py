@@ -72,7 +72,7 @@ class Cell:
 
     @cached_property
     def definition(self) -> dict[str, Any]:
-        """The task as plain data: its fields, such as ``goals`` and ``start``, by name."""
+        """The task as plain data: a dict that maps its fields to values."""
         return self.task.model_dump(mode="json")
 
     @cached_property
@@ -106,8 +106,9 @@ class Job:
     seed: int
     """Seed of the suite."""
     numbers: Sequence[int]
-    """Numbers of the runs; in each cell they count from 0. In a plan the numbers are a range. The
-    plan of a results folder stores a job of runs 50 to 99 as a job of runs 0 to 99."""
+    """Numbers of the runs of the job; the runs of a cell are numbered from 0. In a plan the numbers
+    are a range. The plan of a results folder stores a job with runs 50 to 99 as a job with runs 0
+    to 99."""
     time_limit_s: float | None = None
     """Limit of the total CPU time of all runs of the job (in s); None for no limit."""
     suite: str = ""
@@ -152,8 +153,9 @@ def cell_of(
     ----------
     task : Task
     method : MethodInfo
-    parameters : mapping
-        Parameters of the method, by name. Parameters that are not passed have their defaults.
+    parameters : mapping of str to object
+        Dict that maps parameters of the method to values. Parameters that are not passed have their
+        defaults.
     trials : int, optional
         Default of parameter ``trials``, for methods that have it.
     trial_budget : int, optional
@@ -217,14 +219,17 @@ def reference_seed(suite_seed: int, task: str) -> int:
 
 
 def _seed_of(suite_seed: int, text: str, number: int) -> int:
-    """Return a seed from 0 to 2^63 - 1 that depends on a seed, a text and a number."""
+    """Derive a 63-bit seed from another seed, a text and a number."""
     words = np.frombuffer(hashlib.sha256(text.encode()).digest()[:16], dtype="<u4")
     sequence = np.random.SeedSequence(suite_seed, spawn_key=(*map(int, words), number))
     return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
 def hash_of(content: Any) -> str:
-    """Return the SHA-256 of plain data as hex digits, computed from its JSON with sorted keys."""
+    """Return the SHA-256 of plain data as 64 hex digits.
+
+    The hash is computed from the JSON of the data with sorted keys.
+    """
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -243,7 +248,10 @@ def world_title(world: str) -> str:
 
 
 def trials_in(parameters: Mapping[str, Any]) -> int:
-    """Return the value of parameter ``trials``; 0 if it is missing or is not an ``int`` above 0."""
+    """Return the value of parameter ``trials``, or 0 if there is none.
+
+    The result is 0, too, if the value is not an ``int`` above 0.
+    """
     trials = parameters.get("trials")
     return trials if type(trials) is int and trials > 0 else 0
 

@@ -137,7 +137,10 @@ class Row:
         return [*map(movement_from, self.movements.get(name, []))]
 
     def with_values(self, **values: Any) -> Row:
-        """Return a copy of the row in which the values of the named columns are changed."""
+        """Return a copy of the row in which some columns have other values.
+
+        The columns and their new values are passed as keyword arguments.
+        """
         return replace(self, values=self.values | values)
 
     def downsample(self) -> Row:
@@ -215,9 +218,9 @@ def row_of(job: Job, outcome: Outcome, executions: Mapping[str, Execution], date
 
 
 def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
-    """Return the corrective movements in trial 0 and in each tenth of a learner's later trials.
+    """Return a learner's corrections in trial 0 and each tenth of later trials.
 
-    The result is None if the corrections were not counted.
+    ``details`` are those of the run. The result is None if the corrections were not counted.
     """
     counts = details.get(CORRECTIONS_BY_TENTH)
     if not isinstance(counts, list) or len(counts) != 11:
@@ -227,9 +230,9 @@ def _corrections_by_tenth(details: Mapping[str, Any]) -> list[int] | None:
 
 
 def _practice_of(rewards: Sequence[int | None]) -> str:
-    """Return the mean ticks of the completed trials in each tenth, as a JSON list of ten.
+    """Return the mean ticks in each tenth of the trials, as JSON.
 
-    null stands for a tenth without a completed trial.
+    The JSON is a list of ten numbers, with null for a tenth without a completed trial.
     """
     tenths = np.array_split(np.array(rewards, np.float64), 10)
     means = [-float(np.nanmean(part)) if np.isfinite(part).any() else None for part in tenths]
@@ -403,13 +406,13 @@ def execute_all(
     solutions : sequence of sequence of Movement
         Solutions, whose targets and waypoints are arrays of floats.
     model : MotionModel
-        The motion model; its motor noise is ignored.
+        The motion model. Its motor noise is ignored.
 
-            Returns
-            -------
-            list of Execution or Exception
-                Execution of each solution, in order. For a solution that breaks the rules of the
-                task or is too long (:func:`too_long`), the entry is the error, which is not raised.
+    Returns
+    -------
+    list of Execution or Exception
+        Execution of each solution, in order. For a solution that breaks the rules of the task or is
+        too long (:func:`too_long`), the entry is the error, which is not raised.
     """
     exact = model.without_noise()
     errors = [too_long(task, solution, exact) for solution in solutions]
@@ -460,7 +463,7 @@ def judge(
 def too_long(
     task: Task, solution: Sequence[Movement], model: MotionModel = PAPER
 ) -> SolutionError | None:
-    """Return the error of a solution that is too long; None for any other solution.
+    """Return an error if a solution is too long to be executed; return None otherwise.
 
     A solution is too long if it has
 

@@ -227,9 +227,9 @@ class Store:
         return Counter({(name, old, now): count for name, old, now, count in self._rows(query)})
 
     def marks(self) -> dict[str, list[str]]:
-        """Return a dict that maps ids of methods to warnings about their runs in the plan.
+        """Return a dict that maps ids of methods to warnings about their stored runs.
 
-        A warning is a sentence which says that
+        Only runs of the plan are considered. A warning is a sentence which says that
 
         - a run had another result when it was made again;
         - runs were made with other versions of packages that the method's file imports.
@@ -452,7 +452,9 @@ class Store:
             }
 
     def rewards(self) -> Iterator[tuple[str, Array]]:
-        """Yield the rewards of the trials of each run of the plan, if rewards are stored.
+        """Yield the rewards of the trials of each run of the plan.
+
+        Runs without stored rewards are left out.
 
         Yields
         ------
@@ -468,10 +470,10 @@ class Store:
                 yield run_id, _unpack(blob)
 
     def outdated_noise(self) -> list[list[str]]:
-        """Return the ids of the solved runs whose ticks follow an older rule of motor noise.
+        """Return the ids of runs whose ticks follow another rule of noise.
 
-        Only runs of the plan are considered. The result has a list of ids for each cell with such
-        runs.
+        Only runs of the plan with status ``ok`` are considered. The result has a list of ids for
+        each cell with such runs.
         """
         rule = "noise_rule" if "noise_rule" in self._columns("asked") else "NULL"
         query = f"""SELECT position, run_id FROM asked WHERE status = 'ok'
@@ -683,9 +685,10 @@ def _connect(where: str) -> sqlite3.Connection:
 
 
 def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
-    """Return True for a file of coartic in this format, and False for an empty file.
+    """Return whether a file has the tables of coartic; False for an empty file.
 
-    Raises CoarticError for any other file.
+    Raises CoarticError for a file that coartic did not write, or whose format this version cannot
+    read.
     """
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
@@ -711,7 +714,7 @@ def _has_tables(connection: sqlite3.Connection, path: Path) -> bool:
 
 
 def _add_columns(connection: sqlite3.Connection) -> None:
-    """Add the columns to an older file that its format lacks, and replace its views."""
+    """Update a file of an older format: add columns, and replace views."""
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if version == FORMAT:
         return

@@ -1,14 +1,14 @@
-"""Families of random tasks: distributions as data, and instances that never change.
+"""Families of random tasks: distributions of tasks, and instances that never change.
 
-A family is a file, ``families/NAME.vN.toml``. The file has the distributions of the number and the
-positions of the goals, of the hands, the arms and the base, and of the start. The file of a
-released family does not change; a changed family is a new version.
+A family is defined by a file, ``families/NAME.vN.toml``. The file has the distributions from which
+the number and the positions of the goals, the links of the arms, the base and the start are drawn.
+The file of a released family does not change; a changed family gets a new version.
 
-An instance is a task with a name such as ``two-armed/v1/i017``. An instance depends only on the
-file and the name, because its numbers come from a counter-based generator
-(:mod:`coartic.tasks.philox`). The key of the generator is a hash of family, version and stream, and
-its counter contains the number of the instance. Streams are ``d`` (development, to tune on), ``i``
-(test, to report on) and years (``2027-``, fresh instances).
+An instance is a task with a name such as ``two-armed/v1/i017``. It depends only on the file of the
+family and on its name, because its numbers come from a counter-based random number generator
+(:mod:`coartic.tasks.philox`). The key of the generator is a hash of family, version and stream; its
+counter contains the number of the instance. Streams are ``d`` (development, to tune on), ``i``
+(test, to report on) and years such as ``2027-`` (fresh instances).
 
 An instance is drawn in two stages. The *structure* (number of goals and links, base, kind of start)
 is drawn once. Positions and angles are drawn again until they break no rule (rejection sampling,
@@ -302,7 +302,7 @@ def broken_rule(family: Family, task: Task) -> str | None:
     - ``corrective``: the corrective process on its own does not complete the task, with the base of
       the draft or of a restriction; or there are more than 4096 hand sequences to try.
 
-          The last four rules consider only the hands of the family.
+    The last four rules consider only the hands of the family.
     """
     goals = [(_in_thousandths(x), _in_thousandths(y)) for x, y in task.goals]
     (left, right), (low, high) = family.region.x, family.region.y
@@ -379,11 +379,11 @@ def instance_of(family: Family, address: Address) -> Task:
 
 @lru_cache(maxsize=4096)
 def instance(name: str) -> Task:
-    """Return an instance of a family (a task) by its name.
+    """Return the instance of a family (a task) with a given name.
 
     Examples of names are ``two-armed/v1/i017`` and, for the family of a file,
-    ``mine.v1.toml/i017``. The last 4096 instances are cached. Raises TaskError if the instance does
-    not exist.
+    ``mine.v1.toml/i017``. The last 4096 instances are cached (LRU). Raises TaskError if the family
+    is unknown or cannot be used, or if the name has another form.
     """
     family, _, short = name.rpartition("/")
     address = address_of(f"{load_family(family).name}/{short}" if is_file(family) else name)
@@ -410,6 +410,11 @@ def named_by(text: str) -> list[str]:
     ``text`` as its only entry, without a check. Raises TaskError for a range that is malformed,
     goes backwards or has more than 10,000 instances. Whether a shipped family exists is not
     checked.
+
+    Examples
+    --------
+    >>> named_by("two-armed/v1/i008..i010")
+    ['two-armed/v1/i008', 'two-armed/v1/i009', 'two-armed/v1/i010']
     """
     if "/" not in text or ".." not in text.rpartition("/")[2] or text.endswith(".toml"):
         return [text]
@@ -453,10 +458,10 @@ def own_families(paths: Iterable[Path]) -> dict[str, Family]:
 
 
 def load_family(name: str) -> Family:
-    """Return a shipped family by its name, or another family by the path of its file.
+    """Return a family by its name, or by the path of its file.
 
-    The name includes the version, as in ``two-armed/v1``. A file is read once per process. Raises
-    TaskError if the family does not exist or cannot be used.
+    The name of a shipped family includes the version, as in ``two-armed/v1``. A file is read once
+    per process. Raises TaskError if the family does not exist or cannot be used.
     """
     if is_file(name):
         return read_family(Path(name))
@@ -483,8 +488,7 @@ def read_family(path: Path) -> Family:
     """Read a family from its TOML file, and cache the family.
 
     The name of the family comes from the name of the file: ``two-armed.v1.toml`` is family
-    ``two-armed/v1``. Raises TaskError
-    if the file is not a family.
+    ``two-armed/v1``. Raises TaskError if the file cannot be read or is not a family.
     """
     content, name = read_toml(path, error=TaskError), "/".join(path.stem.rsplit(".", 1))
     if "name" in content:

@@ -65,15 +65,16 @@ def task_hash(task: Task) -> str:
 
 
 def best_shipped(task: Task, model: MotionModel = PAPER) -> KnownOptimum | None:
-    """Look up the best known reward of a task and motion model in the shipped files.
+    """Look up the best known reward of a task under a motion model.
 
     The task is identified by :func:`task_hash`; its name does not matter. The shipped files have
+    best known rewards for
 
     - the paper's model, and the paper's model with motor noise 0.01, but no other models;
     - the paper's tasks, and the first 40 test instances of each shipped family (with motor noise
       only of families with up to eight goals).
 
-    Return None for any other task or model.
+    The result is None for any other task or model.
     """
     if not same_world(model.without_noise(), PAPER, task.radius):
         return None

@@ -21,9 +21,9 @@ _WEYL = 0x9E3779B9, 0xBB67AE85  # golden ratio, sqrt(3) - 1
 
 
 def philox4x32(counter: Words, key: tuple[int, int]) -> Words:
-    """Return four random words of 32 bits for a counter and a key.
+    """Return four random words of 32 bits: a function of a counter and a key.
 
-    The counter has four words, the key two. Equal arguments give equal words.
+    The counter has four words of 32 bits, the key two. Equal arguments give equal words.
     """
     a, b, c, d = counter
     left, right = key
@@ -51,8 +51,13 @@ def hash_key(name: str) -> tuple[int, int]:
 class Draws:
     """Stream of random integers; equal keys and counters give equal streams.
 
-    The generator's counter has four words. The first word counts the blocks of four random words
-    that were used; ``counter`` has the other three words.
+    Parameters
+    ----------
+    key : tuple of int
+        Key of the generator, two words of 32 bits.
+    *counter : int
+        The last three words of the generator's counter, of 32 bits each. The first word counts the
+        blocks of four random words that were used.
     """
 
     def __init__(self, key: tuple[int, int], *counter: int) -> None:

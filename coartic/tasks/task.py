@@ -99,10 +99,15 @@ class Address(NamedTuple):
 
 
 def address_of(name: str) -> Address | None:
-    """Parse the name of an instance; return None if the name has another form.
+    """Parse the name of an instance, or return None for another form.
 
-    ``two-armed/v1/i017`` is family ``two-armed/v1``, stream ``i``, number 17; ``i0017`` does not
-    have the form. The function does not check whether the family exists.
+    The number has at least three digits, without needless zeros: ``i017``, but not ``i0017``.
+    Whether the family exists is not checked.
+
+    Examples
+    --------
+    >>> address_of("two-armed/v1/i017")
+    Address(family='two-armed/v1', stream='i', number=17)
     """
     parts = _ADDRESS.fullmatch(name)
     if parts is None:
@@ -385,11 +390,12 @@ def _out_of_reach(task: Task, tolerance: float) -> str | None:
 
 
 def beyond_reach(task: Task, hand: Hand, goal: Point, tolerance: float) -> float:
-    """Return the distance by which a goal is out of a hand's reach (in length units).
+    """Return how far a goal is out of a hand's reach (length units).
 
-    A hand can have a range of distances from its shoulder. The result is the distance of the goal's
-    centre from that range, minus ``tolerance``: above 0 if the goal is out of reach, otherwise at
-    most 0. Base coordinates that are not locked can take any value.
+    The result is above 0 if the goal is out of reach, and otherwise at most 0. It is the difference
+    between two distances: how far the goal's centre is outside the range of distances that the hand
+    can have from its shoulder, and ``tolerance``. Base coordinates that are not locked can take any
+    value.
     """
     arm = task.robot.arm(hand)
     near, far = task.robot.reach(hand)

@@ -1,9 +1,10 @@
 """Kernels: functions that Numba compiles when they are first called.
 
-Numba is imported with the first call, so that a command that only lists names needs no compiler.
-Machine code is stored on disk. Numba itself looks only at the file of the cached function, and
-would miss a change in a function from another file. Here the folder of the machine code is named
-after a hash of the files that kernels consist of, so that changed kernels are compiled again.
+Numba is imported at the first call of a kernel, so that a command that only lists names does not
+need it. The machine code is stored on disk. Numba compiles a cached function again only if its own
+file has changed; it would miss a change of a function from another file that it calls. So here the
+name of the folder of the machine code contains a hash of all files that define kernels. If one of
+these files changes, all kernels are compiled again.
 """
 
 from __future__ import annotations
@@ -43,12 +44,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def python_files(*folders: str) -> list[Path]:
-    """Return the Python files in folders of the package ``coartic``, and in their subfolders."""
+    """Return the Python files in folders of the package ``coartic``, also in their subfolders."""
     return sorted(path for folder in folders for path in (PACKAGE / folder).rglob("*.py"))
 
 
 def hash_of_files(files: Iterable[Path]) -> str:
-    """Return 16 hex digits of the SHA-256 hash of the names and contents of files."""
+    """Return 16 hex digits of the SHA-256 of file names and contents."""
     texts = (path.name.encode() + b"\0" + path.read_bytes() for path in files)
     return hashlib.sha256(b"\0".join(texts)).hexdigest()[:16]
 
@@ -134,7 +135,10 @@ def record_type(fields: Mapping[str, Any]) -> np.dtype[np.void]:
 
 @inlined
 def fill_row(row: Any, values: Any) -> None:
-    """Copy the first n numbers of ``values`` into ``row``, in place; n is the smaller length."""
+    """Copy numbers from the beginning of ``values`` into ``row``, in place.
+
+    If the lengths differ, as many numbers are copied as the shorter of the two has.
+    """
     for j in range(min(len(row), len(values))):
         row[j] = values[j]
 
@@ -145,10 +149,10 @@ _DRAWS = ("state", "next_uint64", "next_double")  # of a bit generator, as NumPy
 
 
 def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
-    """Return the addresses through which kernels draw from N > 0 NumPy generators.
+    """Return the memory addresses through which kernels draw from N > 0 NumPy generators.
 
-    The result has shape ``(N, 3)``: the state and two functions of each generator, for
-    :func:`generator_at`. The generators must outlive the kernel's call.
+    The result has shape ``(N, 3)``. A row has the addresses of the state and of two C functions of
+    a generator, for :func:`generator_at`. The generators must exist until the kernel returns.
     """
     rows = [
         [ctypes.cast(getattr(c, name), ctypes.c_void_p).value for name in _DRAWS]
@@ -159,10 +163,11 @@ def addresses(generators: Iterable[np.random.Generator]) -> NDArray[np.uintp]:
 
 @intrinsic
 def _generator_of(_: Any, state: Any, next_uint64: Any, next_double: Any) -> Any:
-    """Return signature and builder of a call that makes NumPy's generator in a kernel.
+    """Build the call that makes a NumPy generator in a kernel.
 
-    The call makes the generator from the addresses of its state and drawing functions
-    (:func:`addresses`). As for every intrinsic, the arguments are types of Numba.
+    The call makes the generator from the addresses of its state and its functions
+    (:func:`addresses`). As in every intrinsic of Numba, the arguments of this function are types of
+    Numba, and the result is a pair: the signature of the call, and a function that builds its code.
     """
     from numba.core import cgutils, types
 
@@ -348,7 +353,10 @@ def _remove_old(root: Path, current: Path) -> None:
 
 @cache
 def _command_id() -> int:
-    """Return the id of the process that started this one as a worker, or else of this one."""
+    """Return the id of the process of the command.
+
+    For a worker it is the id of its parent process, and otherwise of this process.
+    """
     parent = parent_process()
     return (parent.pid if parent else None) or os.getpid()
 
@@ -375,7 +383,7 @@ class _MachineCode:
         self.lock: IO[bytes] | None = None  # held while this process compiles
 
     def load_overload(self, *signature: Any) -> Any:
-        """Return a signature's machine code, or None if this process is to compile it.
+        """Return a signature's machine code, or None if it has to be compiled.
 
         If another process compiles the same code, this process waits for it
         (:meth:`wait_for_lock`). The first time that code is to be compiled, a message is logged.

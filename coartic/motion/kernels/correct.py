@@ -1,10 +1,10 @@
 """The corrective process **A**: find a configuration that hits a goal.
 
-The process is Jacobian-transpose descent on the distance to the goal, ``q += α Jᵀ e`` with the
-error e of the hand (paper, section *The Corrective Process*, Figure 2). It uses only the primary
-objective: where the goal is, and how the chosen hand's position depends on the base and the chosen
-arm. The other arm's joints do not change, and a locked base coordinate has no column in the
-Jacobian.
+The process is Jacobian-transpose inverse kinematics: gradient descent on the distance of the hand
+from the goal, ``q += α Jᵀ e`` with the error e of the hand (paper, section *The Corrective
+Process*, Figure 2). It uses only the primary objective: where the goal is, and how the position of
+the chosen hand depends on the base and the chosen arm. The joints of the other arm do not change,
+and a locked base coordinate has no column in the Jacobian.
 
 The kernels make the iterations of the process for many arms side by side.
 """
@@ -65,9 +65,10 @@ def descend(
 ) -> tuple[int, bool]:
     """Make an iteration of the corrective process in the first ``count`` slots, in place.
 
-    Slots that do not go on stay as they are; the status of a slot that goes on and does not change
-    becomes stuck. ``find_changes`` is as in :func:`descend_to_goals`. Return how many slots have
-    ended, and whether all link angles are certainly below 1e5 rad in size afterwards.
+    Only slots whose status is going on change. If the configuration of such a slot does not change
+    in the iteration, its status becomes stuck. ``find_changes`` is as in :func:`descend_to_goals`.
+    Return how many slots have ended, and whether all link angles are certainly below 1e5 rad in
+    size afterwards.
     """
     ended = 0
     large = 0
@@ -111,8 +112,9 @@ def descend_to_goals(batch: Batch, count: int, robot: RobotRecord, find_changes:
     free afterwards. In the record of each run
 
     - ``converged`` is set, and ``iterations`` grows;
-    - ``target`` gets base and arm of the last iterate; the entries of the other arm stay;
-    - ``evaluations`` grows by these iterations + 1.
+    - ``target`` gets the base and the arm of the last iterate, while the entries of the other arm
+      do not change;
+    - ``evaluations`` grows by the number of iterations plus 1.
 
     ``find_changes`` is None or a kernel ``find_changes(slots, count, robot, runs)``. The kernel
     sets ``slots.nullspace_change`` to what the next iteration adds to ``slots.q`` in addition to

@@ -18,8 +18,9 @@ movement ends if
 A movement of k steps takes k + 1 ticks; the last tick detects arrival (inferred: it gives the
 published initial rewards exactly).
 
-The kernels move many arms side by side. They give the same results as a loop that evaluates the
-rule at every step, although they do not visit every step (:func:`clear_steps`).
+The kernels move many arms side by side. They skip steps at which the hand certainly cannot be in
+the goal yet (:func:`clear_steps`). The results are those of a loop that evaluates the stopping rule
+at each step.
 """
 
 from __future__ import annotations
@@ -82,9 +83,9 @@ def largest_square(length: float) -> float:
 
 @inner
 def clear_steps(square: float, rim: float, closing: float, slowness: float, bend: float) -> Any:
-    """Return a lower bound of the number of steps until the hand can enter a disc.
+    """Return a lower bound of the steps until a hand can enter a disc.
 
-    The bound is usually not an integer. The bound is 0 if the hand may be in the disc already.
+    The bound is usually not an integer. It is 0 if the hand may be in the disc already.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def divide_steps(slots: SlotArrays, count: int, model: Any) -> bool:
 
 @inner
 def _place_between(slots: SlotArrays, count: int, step: float) -> None:
-    """Set ``q`` in the first ``count`` slots to the movement's point at its present step.
+    """Set ``q`` in the first ``count`` slots to the present point of the movement.
 
     ``step`` is the length of a step in joint space.
     """
@@ -286,7 +287,7 @@ def move_acting(count: int, stops: bool, robot: RobotRecord, batch: Batch) -> No
 
 @inlined
 def move_runs(count: int, robot: RobotRecord, batch: Batch) -> None:
-    """Let each of the first ``count`` runs do its ``action``, unless it follows a path.
+    """Perform the next ``action`` of each of the first ``count`` runs, except paths.
 
     :data:`IDLE` lists the actions. ``q``, ``hit``, ``ticks``, ``evaluations`` and ``acting`` change
     in place. Ticks are 0 if there is no movement. A movement to a target misses it by noise.
@@ -329,7 +330,10 @@ def _corner(run: RunRecord, waypoints: Any, k: int, j: int, noisy: bool) -> Any:
 def _sum_of_squares(
     run: RunRecord, waypoints: Any, k: int, entries: Any, noisy: bool, weight: float
 ) -> float:
-    """Add the squared changes of some entries from corner ``k`` - 1 to corner ``k`` of a path."""
+    """Return the squared distance over some entries between two corners of a path.
+
+    The corners are ``k`` - 1 and ``k``. Base coordinates are multiplied by ``weight`` first.
+    """
     square = 0.0
     for j in entries:
         delta = _corner(run, waypoints, k, j, noisy) - _corner(run, waypoints, k - 1, j, noisy)
@@ -368,7 +372,7 @@ def _segment_length(run: RunRecord, waypoints: Any, k: int, model: Any) -> float
 
 @inner
 def follow(run: RunRecord, waypoints: Any, robot: RobotRecord, slots: SlotArrays) -> None:
-    """Move a run along a path until its hand hits the goal or the path ends.
+    """Move a run along a path, until its hand hits or the path ends.
 
     ``waypoints`` has shape ``(W, dof)``. Point k of n = ceil(length / m) lies k m along the path;
     point n is the last waypoint. With noise, one displacement is drawn, and waypoint k of W is
@@ -425,7 +429,11 @@ def _point(
     j: int,
     noisy: bool,
 ) -> Any:
-    """Return entry ``j`` of the point of a path at length ``along``, in ``segment``."""
+    """Return entry ``j`` of the point of a path at arc length ``along``.
+
+    The point is in the segment from corner ``segment``, at arc length ``before``, to the next
+    corner, at arc length ``after``. If ``at_end`` is True, it is the last waypoint.
+    """
     if at_end:
         return _corner(run, waypoints, len(waypoints) - 1, j, noisy)
     begin = _corner(run, waypoints, segment, j, noisy)

@@ -1,20 +1,21 @@
-"""Motor noise: standard normal numbers from a counter-based generator without state.
+"""Motor noise: standard normal numbers from a counter-based random number generator.
 
-A number is a function of
+The generator has no state. Each number is a function of
 
 - the seed of the noise, and the number of the draw, such as the number of the trial;
 - the goal, and the number of the movement that is made for this goal, from 0;
 - the coordinate of the configuration.
 
-The numbers are not a sequence. So no number depends on the order of trials, on the other runs of a
-batch or on the number of threads. Two solutions that are executed with the same seed and draw have
-the same noise (*common random numbers*).
+So no number depends on the order of trials, on the other runs of a batch or on the number of
+threads. Two solutions that are executed with the same seed and the same draw have the same noise
+(*common random numbers*).
 
 The arguments are hashed one after another by SplitMix64 (Steele, Lea & Flood 2014, *Fast splittable
-pseudorandom number generators*, OOPSLA), and the hash becomes a normal number by its inverse
-distribution function, algorithm AS 241 (Wichura 1988, *The percentage points of the normal
-distribution*, Applied Statistics 37:477-484; relative error 1e-16). The logarithm is a series,
-because that of the C library differs between systems in the last bit.
+pseudorandom number generators*, OOPSLA). The inverse distribution function of the normal
+distribution converts the hash to a normal number, by algorithm AS 241 (Wichura 1988, *The
+percentage points of the normal distribution*, Applied Statistics 37:477-484; relative error 1e-16).
+The logarithm in this algorithm is computed as a series, because the logarithms of C libraries
+differ between systems in the last bit.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ _LN_2 = math.log(2.0)
 
 @inner
 def hashed(word: Any, number: int) -> Any:
-    """Return the hash of a 64-bit word and an integer from 0: a step of SplitMix64."""
+    """Hash a 64-bit word and an integer from 0 by SplitMix64."""
     mixed = word + _GOLDEN * (_WORD(number) + _WORD(1))
     mixed = (mixed ^ (mixed >> _30)) * _FIRST
     mixed = (mixed ^ (mixed >> _27)) * _SECOND
@@ -129,10 +130,11 @@ def miss_target(run: RunRecord, robot: RobotRecord) -> None:
 
 @inlined
 def displace_path(run: RunRecord, waypoints: Any, robot: RobotRecord) -> None:
-    """Set ``end`` of a run to the noisy displacement of the last waypoint of its path.
+    """Draw the noise of a path: the displacement of its last waypoint, in place.
 
-    ``target`` is the last of the ``waypoints``, shape ``(W, dof)``. The displacement is s z_c in
-    each coordinate that any waypoint moves, and NaN in the others.
+    The displacement becomes the ``end`` of the run. It is s z_c in each coordinate c that any of
+    the ``waypoints``, shape ``(W, dof)``, moves, and NaN in the other coordinates. The ``target``
+    of the run is the last waypoint.
     """
     sd, key = robot.model.motor_noise, _key_of_movement(run)
     if robot.grows:

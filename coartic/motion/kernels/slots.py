@@ -1,14 +1,17 @@
 """Data layout with which the compiled kernels move many arms side by side.
 
-A *run* is a robot that makes a trial; a *batch* has a record for each run. A *slot* is a column of
-arrays that holds the arm of a run while the arm moves or is corrected. The innermost loop of a
-kernel runs over slots, so that the compiler turns it into vector instructions. The number of links
-belongs to the type of the rows, so that loops over links are unrolled. No operation combines
-numbers of different slots, and the compiler may not reorder or fuse operations. The result of a
-slot therefore does not depend on the other slots, the number of slots or the width of the vectors.
+- A *run* is a robot that makes a trial. A *batch* has a record for each of its runs.
+- A *slot* is a column of some arrays. It holds the arm of a run while the arm moves or is corrected
+  (structure of arrays).
 
-Robot parameters are one record, because Numba looks at every field of a tuple each time it calls a
-kernel.
+The innermost loop of a kernel is over slots, so that the compiler turns it into vector
+instructions. The number of links belongs to the type of the arrays, so that loops over links are
+unrolled. No operation combines numbers of different slots, and the compiler may not reorder or fuse
+operations. Therefore the result in a slot depends neither on the other slots, nor on the number of
+slots, nor on the width of the vectors.
+
+The parameters of a robot are one record. If they were a tuple, Numba would look at each of its
+fields whenever it calls a kernel.
 """
 
 from __future__ import annotations
@@ -25,10 +28,10 @@ from coartic.motion.kernels.trigonometry import MAX_ANGLE, cosine, near_cosine, 
 from coartic.robot import BASE_DOF, HANDS, Arm, Robot
 
 SLOTS = 72
-"""Number of slots of a batch: few enough to stay in the processor's innermost cache."""
+"""Number of slots of a batch, so small that they fit into the processor's first-level cache."""
 _VECTOR = 8  # number of slots in a vector; SLOTS is a multiple of it
 NORMS = get_args(Norm)
-"""Norms of joint space; kernels know a norm by its index."""
+"""Norms of joint space. Kernels represent a norm by its index in this tuple."""
 GOING = 0.0
 """Status of a slot whose movement or correction goes on."""
 RobotRecord = Any
@@ -89,7 +92,7 @@ def robot_parameters(
     checks: bool = True,
     grows: bool = False,
 ) -> NDArray[np.void]:
-    """Return robot, constants and options as a record for kernels.
+    """Convert a robot, a motion model and options to a record for kernels.
 
     The array is cached: copy it before you change it.
 
@@ -101,8 +104,9 @@ def robot_parameters(
     locked_base : tuple of {"x", "y"}
         Coordinates of the base that the corrective process does not change.
     model : MotionModel
+        The motion model. Tolerances that are None are replaced by a tenth of ``radius``.
     checks : bool
-        True if an arm without a target does not move when its hand is in the goal already; False if
+        True if an arm without a target does not move when its hand is in its goal already; False if
         the corrective process begins at once.
     grows : bool
         True if the motor noise of aimed movements grows with their length.
@@ -247,9 +251,10 @@ def layout(links: int) -> tuple[np.dtype[np.void], slice, slice]:
 
 @inlined
 def _copy_arm(row: Any, slot: int, q: Any, arm: Arm) -> None:
-    """Copy base and joints of an arm from configuration ``q`` into a column, in place.
+    """Copy base and joints of an arm from a configuration into a column, in place.
 
-    ``row`` has shape ``(2 + links, slots)``. Entries of links that the arm does not have become 0.
+    The entries of configuration ``q`` are copied into column ``slot`` of ``row``, shape
+    ``(2 + links, slots)``. Entries for links that the arm does not have become 0.
     """
     row[0, slot] = q[0]
     row[1, slot] = q[1]
@@ -312,8 +317,8 @@ def squared_length(run: RunRecord, model: Any) -> float:
 def start(slots: SlotArrays, slot: int, number: int, run: RunRecord, robot: RobotRecord) -> None:
     """Load a run into a slot for a movement, in place.
 
-    In addition to what :func:`load` does, this function copies start and end and the squared length
-    of the movement, so that :func:`move_slots` can make the movement.
+    In addition to what :func:`load` does, this function copies the start, the end and the squared
+    length of the movement into the slot, so that :func:`move_slots` can make the movement.
     """
     arm = arm_of(robot, run.hand)
     load(slots, slot, number, run, arm)
@@ -336,10 +341,10 @@ def store(slots: SlotArrays, slot: int, q: Any) -> None:
 
 @inlined
 def compact(rows: Any, slot: int, last: int) -> None:
-    """Copy column ``last`` over column ``slot``, in place.
+    """Replace column ``slot`` by column ``last``, in place.
 
-    The run in ``slot`` has ended, and the run in slot ``last`` takes its place. ``rows`` has shape
-    ``(rows, slots)``.
+    The run in slot ``slot`` has ended, and the run in slot ``last``, the last one in use, takes its
+    place. ``rows`` has shape ``(rows, slots)``.
     """
     if slot != last:
         for row in range(len(rows)):
@@ -348,9 +353,10 @@ def compact(rows: Any, slot: int, last: int) -> None:
 
 @inner
 def padded_count(count: int) -> int:
-    """Return the number of slots to work on if ``count`` are in use.
+    """Return how many slots a kernel computes if the first ``count`` slots are in use.
 
-    Counts above 1 are rounded up to whole vectors of 8 slots, whose last slots may hold no run.
+    A number above 1 is rounded up to a multiple of 8, the number of slots in a vector. The last of
+    these slots may hold no run.
     """
     return count if count < 2 else (count + _VECTOR - 1) // _VECTOR * _VECTOR
 

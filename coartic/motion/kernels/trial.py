@@ -1,17 +1,17 @@
-"""The rule of trials, goal by goal, that executions, learners and environments share.
+"""The rule of trials, which executions, learners and environments share.
 
-A run is one of many robots that make trials side by side. At each goal it passes through five
+A run is one of many robots that make trials side by side. At each goal, a run passes through five
 phases (paper, sections *Generating Movement for Each Goal* and *The Corrective Process*):
 
 1. *begin*: the run's next goal is set.
-2. *aim*: a hand and perhaps a target are chosen. Callers differ in how they choose.
+2. *aim*: a hand and, usually, a target are chosen. How they are chosen depends on the caller.
 3. *move*: the robot moves to the target. Without a target it only checks whether its hand is in the
    goal already.
 4. *correct*: if the goal is missed, the corrective process **A** looks for a configuration that
    hits the goal, and the robot moves to that configuration.
 5. *record*: the results at the goal are recorded. The trial goes on if the goal is hit.
 
-Two loops consist of these phases: :func:`reach_kernel` moves to given targets, and
+Two kernels consist of these phases: :func:`reach_kernel` moves to given targets, and
 :mod:`coartic.learner.kernel` explores around learned targets. The result of a run depends neither
 on the other runs nor on their number.
 """
@@ -181,10 +181,10 @@ NO_REWARD = -(2**63 - 1)
 
 @inlined
 def _are_within(targets: Any) -> bool:
-    """Return whether no entry of a trial's targets is beyond :data:`MAX_ENTRY` in size.
+    """Return whether all entries of the targets of a trial are from -1e5 to 1e5.
 
-    ``targets`` has shape ``(G, M, dof)``. NaN means that a joint stays, and counts as within the
-    bound.
+    The bound is :data:`MAX_ENTRY`. ``targets`` has shape ``(G, M, dof)``. NaN, which stands for a
+    joint that does not move, is allowed.
     """
     large = 0
     for g in range(targets.shape[0]):
@@ -252,7 +252,7 @@ REQUESTED = len(Requests._fields)
 
 @entry
 def reach_kernel(robot: Any, goals: Any, counts: Any, rewards: Any, *arrays: Any) -> None:
-    """Let every arm reach for its goals, as many at once as the batch holds.
+    """Let each arm reach for its goals, a batch of arms at a time.
 
     ``goals``, ``counts`` and ``rewards`` are the entries of
     :class:`~coartic.motion.trials.TrialRecords`, filled in place; the caller sets ``counts`` to 0.

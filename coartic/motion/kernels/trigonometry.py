@@ -1,9 +1,9 @@
-"""Cosine and sine for the compiled kernels from IEEE arithmetic only.
+"""Cosine and sine for the compiled kernels, computed only by basic IEEE arithmetic.
 
-The C library's functions differ between systems in the last bit, and a last bit can end a movement
-one step earlier. The functions here use only +, -, * and rounding, so that kinematics in the
-kernels are the same wherever the code runs. :func:`near_cosine` and :func:`near_sine` have no
-branch and therefore become vector instructions.
+The cosines and sines of C libraries differ between systems in the last bit, and a difference of one
+bit can end a movement one step earlier. The functions here use only +, -, * and rounding, so that
+the kinematics in the kernels are the same on all systems. :func:`near_cosine` and :func:`near_sine`
+have no branches, so that the compiler can use vector instructions.
 
 The angle is reduced by multiples of π/2 in three parts (Cody & Waite 1980, *Software Manual for the
 Elementary Functions*). The Taylor series follows; its truncation error on [-π/4, π/4] is below
@@ -35,10 +35,11 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16 = ((-1) ** n / math.factorial(2 * n) for n
 
 @scalar
 def _reduced(angle: float) -> tuple[float, float, int]:
-    """Return sine and cosine of an angle's rest, and its quarter turn modulo 4.
+    """Reduce an angle, and return sine and cosine of the remainder.
 
-    The rest is ``angle`` (in rad) minus the nearest integer number of quarter turns. |angle| must
-    be below 1e5 rad.
+    The angle (in rad, |angle| < 1e5) is the sum of an integer number of quarter turns and a
+    remainder from -π/4 to π/4. Return the sine and the cosine of the remainder, and the number of
+    quarter turns modulo 4.
     """
     quarters = np.rint(angle * _PER_QUARTER)
     x = ((angle - quarters * _HIGH) - quarters * _MIDDLE) - quarters * _LOW
@@ -73,17 +74,17 @@ def near_sine(angle: float) -> float:
 
 @scalar
 def cosine(angle: float) -> float:
-    """Return cos(angle), angle in rad.
+    """Return the cosine of an angle in rad.
 
-    The bits are the same on every system for |angle| < 1e5 rad.
+    The bits are the same on every system for |angle| < 1e5.
     """
     return near_cosine(angle) if abs(angle) < MAX_ANGLE else math.cos(angle)
 
 
 @scalar
 def sine(angle: float) -> float:
-    """Return sin(angle), angle in rad.
+    """Return the sine of an angle in rad.
 
-    The bits are the same on every system for |angle| < 1e5 rad.
+    The bits are the same on every system for |angle| < 1e5.
     """
     return near_sine(angle) if abs(angle) < MAX_ANGLE else math.sin(angle)
