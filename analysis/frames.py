@@ -85,16 +85,19 @@ def checked(
         The object is not a DataFrame, it has no rows, a column is missing, or a value is wrong.
     """
     if not isinstance(frame, pd.DataFrame):
-        raise CoarticError(f"the frame must be a pandas.DataFrame, not a {type(frame).__name__}")
+        raise CoarticError(f"the frame is a {type(frame).__name__}; it must be a pandas.DataFrame")
     has_value, there = "reward" in numbers, {*frame.columns}
     status = ["status"] if has_value and "status" in there else []
     of_noise = [name for name in ("mean_ticks", "motor_noise") if has_value and name in there]
     numbers = [*numbers, *of_noise]
     wanted = [*dict.fromkeys((*names, *others, *status, *numbers))]
     if missing := [name for name in wanted if name not in {*frame.columns}]:
-        raise CoarticError(f"the frame has no column {', '.join(map(inline, missing))}")
+        raise CoarticError(
+            f"the frame has no column {', '.join(map(inline, missing))}; it needs "
+            f"{', '.join(map(inline, wanted))}"
+        )
     if not len(frame):
-        raise CoarticError("the frame has no rows")
+        raise CoarticError("the frame has no rows; it must have at least one")
     columns = frame[wanted].copy()
     columns.index = columns.index.set_names([None] * columns.index.nlevels)
     not_na = "it must be a name; read_csv reads some names as NA, unless keep_default_na=False"
@@ -105,7 +108,10 @@ def checked(
             of_name = columns[name].astype("Float64")
             values = of_name.to_numpy(np.float64, na_value=np.nan)
         except (TypeError, ValueError) as error:
-            raise CoarticError(f"column {inline(name)} must have numbers ({error})") from None
+            raise CoarticError(
+                f"column {inline(name)} has values that are not numbers ({error}); each value must "
+                "be a finite number or missing (NaN)"
+            ) from None
         refuse_rows(columns, name, np.isinf(values), "it must be a finite number")
         columns[name] = values
     if has_value:

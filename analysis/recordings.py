@@ -183,7 +183,10 @@ def solutions_of(task: Task, hits: pd.DataFrame) -> Solutions:
             )
             runs[f"{subject} {trial:g}"] = Execution(movements, postures, sum(ticks), 0)
     if not runs:
-        raise CoarticError("no trial hits all goals: signatures need at least one")
+        raise CoarticError(
+            f"the frame has no trial with hits of all {len(task.goals)} goals; signatures need at "
+            "least one"
+        )
     return Solutions(task, "recorded", tuple(runs.values()), tuple(runs), unfinished)
 
 
@@ -340,7 +343,8 @@ def _judged(hits: pd.DataFrame, task: Task, source: str) -> pd.DataFrame:
     """
     for subject, fit in _fit(hits, task).groupby("subject", sort=False):
         far, pace = fit.off > FAR, fit.pace.median()
-        words = f"{source}: {far.sum()} of {len(far)} hits of {subject} are more than 2 radii off"
+        words = f"{source}: {far.sum()} of {len(far)} hits of {subject} are more than 2 radii from "
+        words += "the centres of their goals"
         if far.mean() > 0.5:
             raise CoarticError(
                 f"{words}. Joint angles must be in rad, anticlockwise, from the direction of the "

@@ -331,7 +331,10 @@ def runtimes(
             f"targets are {brief_value(targets)}; they must be numbers above 0 and up to 1"
         )
     if not target_ranges(study):
-        raise CoarticError("no task has a best known reward above the corrective process alone")
+        raise CoarticError(
+            f"{study.folder} has no task whose best known reward is above the reward of the "
+            "corrective process alone; running times need one, because targets lie between the two"
+        )
     rows = []
     for name, runs in runs_with_targets(study).items():
         for spend in SPENDS:
@@ -400,7 +403,10 @@ def ecdf(frame: pd.DataFrame, targets: Sequence[float]) -> pd.DataFrame:
             "ticks)"
         )
     if not frame.best_known.notna().any():
-        raise CoarticError("the frame has no best_known reward; targets need one")
+        raise CoarticError(
+            "column best_known has no reward; targets need the best known reward of at least one "
+            "task"
+        )
     tasks, rows = frame.task[frame.best_known.notna()].unique(), []
     for method, of_method in frame.groupby("method", sort=False):
         times = []

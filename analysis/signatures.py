@@ -173,8 +173,9 @@ def isolated_reaches(
         fit = False
     if not fit or not np.isin(goals, numbers).all():
         raise ValueError(
-            f"goals must be from 1 to {len(numbers)}, and the shapes of goals and hands must "
-            f"broadcast to {shape}: q has shape {q.shape}"
+            f"goals are {np.asarray(goals)}, hands have shape {np.shape(hands)}, and q has shape "
+            f"{q.shape}; goals must be from 1 to {len(numbers)}, and the shapes of goals and hands "
+            f"must broadcast to {shape}"
         )
     reached = reach_goals(
         task.robot,
@@ -784,8 +785,8 @@ def lean(
     if contexts[0].shape[1:] != contexts[1].shape[1:]:
         numbers = [runs.shape[2] for runs in contexts]
         raise ValueError(
-            "postures must have the same number of coordinates in both contexts, not "
-            f"{numbers[0]} and {numbers[1]}"
+            f"first has {numbers[0]} coordinates and second {numbers[1]}; both must have the same "
+            "number"
         )
     n = (len(contexts[0]), len(contexts[1]))
     if toward is not None:
@@ -848,7 +849,9 @@ def _postures(runs: Numbers) -> Array:
             "run, with three postures: at the start, at the shared goal, and at the next goal"
         )
     if not np.isfinite(postures).all():
-        raise ValueError("the postures of a context have numbers that are not finite")
+        raise ValueError(
+            "the postures of a context have numbers that are not finite; all must be finite"
+        )
     return postures
 
 

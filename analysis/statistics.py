@@ -53,7 +53,7 @@ from coartic.estimates import (
     vector,
 )
 from coartic.internal.arguments import Numbers
-from coartic.internal.limits import MAX_RUNS
+from coartic.internal.limits import MAX_RUNS, brief_value
 from coartic.robot import Array
 
 Alternative = Literal["greater", "less", "two-sided"]
@@ -400,7 +400,8 @@ def holm(p_values: Numbers, family: _Count | None = None) -> list[float]:
     planned = tests if family is None else family
     if tests > planned or not ((p >= 0) & (p <= 1) | np.isnan(p)).all():
         raise ValueError(
-            f"p_values must be p-values from 0 to 1, or NaN, of at most {planned} tests"
+            f"p_values is {brief_value(p.tolist())}; it must have p-values from 0 to 1, or NaN, of "
+            f"at most {planned} tests"
         )
     order = np.argsort(p, kind="stable")  # NaN last
     steps = np.maximum.accumulate(p[order] * (planned - np.arange(len(p))))
@@ -458,7 +459,11 @@ def other_tasks(scores: Scores) -> Estimate:
     highest score of a run, each as a mean over families.
     """
     if not scores or not all(scores.values()):
-        raise ValueError("scores must have at least one family, and one instance of each family")
+        sizes = {family: len(instances) for family, instances in scores.items()}
+        raise ValueError(
+            f"scores has the families {sizes} with these numbers of instances; it must have at "
+            "least one family, and at least one instance of each family"
+        )
     samples = {family: [*map(vector, instances)] for family, instances in scores.items()}
     values = {
         family: np.array([runs.mean() for runs in instances])

@@ -99,8 +99,8 @@ def check_study(study: object) -> None:
     """
     if not isinstance(study, Study):
         raise CoarticError(
-            "the study must be one that coartic.analysis.load(folder) returns, not a "
-            f"{type(study).__name__}"
+            f"the study is a {type(study).__name__}; it must be one that "
+            "coartic.analysis.load(folder) returns"
         )
     _ = study.world
 
@@ -151,7 +151,9 @@ def _label_in(study: Study, name: str) -> str:
         for wanted in (name, f"{METHOD_PREFIX}{name}"):
             labels = [str(label) for label in methods.index[names == wanted]]
             if len(labels) > 1:
-                raise CoarticError(f"{name} names several methods; use one of {', '.join(labels)}")
+                raise CoarticError(
+                    f"method {name!r} is ambiguous; write one of the labels {', '.join(labels)}"
+                )
             if labels:
                 return labels[0]
     raise CoarticError(unknown("method", name, [*methods.index]))

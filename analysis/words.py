@@ -123,7 +123,9 @@ def interval(row: Any, column: str, digits: _Digits = 1, scale: float = 1.0, uni
     try:
         value, low, high = (scale * float(row[name]) for name in names)
     except (KeyError, IndexError, TypeError, ValueError, OverflowError):
-        raise CoarticError(f"the row must have the numbers {', '.join(names)}") from None
+        raise CoarticError(
+            f"the row lacks one of the numbers {', '.join(names)}; it must have all three"
+        ) from None
     return f"{number(value, digits)}{unit} {in_brackets(low, high, digits)}".strip()
 
 

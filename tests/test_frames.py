@@ -78,7 +78,7 @@ def test_what_is_no_frame_and_no_argument_is_refused():
     frame = small_frame()
     for words, compute, *given in (
         ("no rows", frames.relative_gaps, frame[:0]),
-        ("must be a pandas.DataFrame, not a list", frames.ranking, [1]),
+        ("the frame is a list; it must be a pandas.DataFrame", frames.ranking, [1]),
         ("no column reward", frames.relative_gaps, frame[["best_known"]]),
         ("status has 'crashed'", frames.relative_gaps, frame.assign(status=["crashed", "ok"])),
         ("by is empty.*names", frames.means, frame, [], ["reward"]),
@@ -103,7 +103,7 @@ def test_a_task_that_a_method_lacks_is_not_reached():
     assert none.to_dict("records") == [{"method": "none", "trials": np.inf, "share": 0.0}]
     unknown = small_frame(task=["easy", "unknown"], method="a", best_known=[-300, np.nan])
     assert ecdf(unknown, [0.05]).share.tolist() == [1.0]
-    with pytest.raises(CoarticError, match="no best_known"):
+    with pytest.raises(CoarticError, match="best_known has no reward; targets need"):
         ecdf(unknown.assign(best_known=np.nan), [0.05])
 
 

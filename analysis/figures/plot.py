@@ -183,8 +183,7 @@ def picture(drawing: Figure, ending: str) -> bytes:
     """
     if ending not in FORMATS:
         raise CoarticError(
-            f"the name of a picture must end in one of {', '.join(FORMATS)}, not in "
-            f"{brief_value(ending)}"
+            f"suffix of a picture is {brief_value(ending)}; it must be one of {', '.join(FORMATS)}"
         )
     dated = {".pdf": "CreationDate", ".svg": "Date", ".png": "Software"}[ending]
     return _saved(drawing, style.RC, format=ending[1:], dpi=300, metadata={dated: None})

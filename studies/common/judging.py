@@ -173,12 +173,17 @@ def mean_beyond(
     (True, 'Planning saves 5.50 ticks (4 tasks)')
     """
     if sentence.count("{}") != 1:
-        raise CoarticError(f"sentence {sentence!r} must have exactly one {{}}, for the mean")
+        raise CoarticError(
+            f"sentence {sentence!r} has {sentence.count('{}')} {{}}; it must have exactly one, for "
+            "the mean"
+        )
     if side not in SIGNS:
-        raise CoarticError(f"side must be 'greater' or 'less', not {side!r}")
+        raise CoarticError(f"side is {side!r}; it must be 'greater' or 'less'")
     found = np.asarray(values, dtype=np.float64)
     if found.ndim != 1:
-        raise CoarticError(f"values have shape {found.shape}; they need one value for each task")
+        raise CoarticError(
+            f"values has shape {found.shape}; it must be (tasks,), with one value for each task"
+        )
     found = found[~np.isnan(found)]
     if len(found) < MIN_TASKS:
         return Finding(None, f"fewer than {MIN_TASKS} random tasks can be judged")
@@ -216,7 +221,7 @@ def all_of(*findings: Finding) -> Finding:
     'fewer than 3 random tasks can be judged'
     """
     if not findings:
-        raise CoarticError("all_of needs at least one finding")
+        raise CoarticError("findings is empty; all_of needs at least one finding")
     for finding in findings:
         if finding.holds is None:
             return finding
@@ -324,15 +329,17 @@ def judge_means(words: str | Path, values: Mapping[str, Any]) -> pd.DataFrame:
     claims, of_file = {}, tomllib.loads(Path(words).read_text("utf-8"))
     for name, means in values.items():
         if name not in of_file:
-            raise CoarticError(f"{words} has no claim {name!r}")
+            raise CoarticError(f"{words} has no claim {name!r}; it has {', '.join(of_file)}")
         claim = of_file[name]
         if missing := [key for key in ("text", "test", "means") if key not in claim]:
-            raise CoarticError(f"{words}: claim {name} has no {missing[0]}")
+            raise CoarticError(
+                f"{words}: claim {name!r} has no {missing[0]}; it needs text, test and means"
+            )
         by_group = [entry if isinstance(entry, Mapping) else {"": entry} for entry in means]
         if len(claim["means"]) != len(by_group):
             raise CoarticError(
-                f"{words}: claim {name} has {len(claim['means'])} means, but values has "
-                f"{len(by_group)} of them"
+                f"{words}: claim {name!r} has {len(claim['means'])} means, but values has "
+                f"{len(by_group)} for it; both must have the same number"
             )
         asked = [*zip(claim["means"], by_group, strict=True)]
         groups = dict.fromkeys(group for values_of in by_group for group in values_of)

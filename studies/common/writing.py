@@ -85,13 +85,15 @@ def write_study(
     """
     folder = Path(folder)
     if not (folder / PAGE).is_file():
-        raise CoarticError(f"{folder} has no {PAGE}, so it is not the folder of a study")
+        raise CoarticError(f"{folder} has no template {PAGE}; the study's folder needs it")
     for name, table in tables.items():
         file = f"{name}.csv{'.xz' if name == 'runs' else ''}"
         table.to_csv(folder / file, float_format="%.6g")
     stored = {path.stem: pd.read_csv(path, index_col=0) for path in folder.glob("*.csv")}
     if "results" not in stored:
-        raise CoarticError(f"{folder} has no results.csv, and there is no table 'results'")
+        raise CoarticError(
+            f"{folder} has no results.csv, and tables has no 'results'; one of the two is needed"
+        )
     (folder / "figure.svg").write_bytes(stored_picture(draw, stored["results"]))
     page = fill_page(folder / PAGE, **stored)
     (folder / "README.md").write_text(page, encoding="utf-8")
