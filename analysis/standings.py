@@ -147,7 +147,7 @@ def standings(study: Study) -> pd.DataFrame:
 
         - how many trials the solved runs of a method from a file made, if a run made another number
           of trials than was asked for;
-        - how many of a method's solutions, found without noise, can fail with motor noise;
+        - how many of a method's solutions, found in the paper's world, can fail with motor noise;
         - in a world with noise, how many executions failed.
 
         Methods that have runs only in other worlds (:attr:`.Study.elsewhere`) have a row, too, with
