@@ -330,7 +330,7 @@ class Signature:
     """Columns that LaTeX tables also have: ``value`` (the method's), ``value and control`` (the
     method's and that of random search), or empty for none."""
     by_hands: bool = True
-    """True if a run is compared only with runs of random search that have the same hand sequence."""
+    """True if runs are only compared with runs of random search with the same hand sequence."""
 
     @property
     def column(self) -> str:
@@ -1179,9 +1179,10 @@ class TwoContexts:
 
         The lean (:func:`.lean`) is the fraction of the difference between the next postures of the
         two contexts that is already there at the shared goal. Its attribute ``more`` is this
-        fraction minus the same fraction at the start of the movement. The coordinates are those of :func:`coordinates`; for ``"all"``, they are
-        the coordinates that move the hand. In each context, the next goal may be hit with either
-        hand. Only the runs with the more frequent hand count.
+        fraction minus the same fraction at the start of the movement. The coordinates are those of
+        :func:`coordinates`; for ``"all"``, they are the coordinates that move the hand. In each
+        context, the next goal may be hit with either hand. Only the runs with the more frequent
+        hand count.
         """
         kept = coordinates(self.first.task, self.hand, self.part)
         goal, hand = self.goal - 1, HANDS.index(self.hand)
