@@ -402,9 +402,9 @@ class Study:
     def _corrective_by_number(self) -> dict[str, dict[int, float]]:
         """Maps each task to a dict that maps numbers of runs to values, in a world with noise.
 
-        The value for a number is minus the mean ticks of the corrective process with its best hands,
-        executed with the noise by which runs of this number are judged. It is NaN if the corrective
-        process does not complete the task.
+        The value for a number is minus the mean ticks of the corrective process with its best
+        hands, executed with the noise by which runs of this number are judged. It is NaN if the
+        corrective process does not complete the task.
         """
         by_task = {}
         for name, of_task in self.stored.groupby("task", sort=False):
