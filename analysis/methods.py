@@ -428,8 +428,8 @@ def _looks_of(rows: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, tuple[s
 def without_settings(rows: pd.DataFrame) -> pd.DataFrame:
     """Return rows of methods without settings and ablations of other methods in these rows.
 
-    ``rows`` are rows of :attr:`.Study.methods`. Column ``parent`` names the method of which a row is
-    a setting or an ablation. The settings of a study that varies parameters are kept.
+    ``rows`` are rows of :attr:`.Study.methods`. Column ``parent`` names the method of which a row
+    is a setting or an ablation. The settings of a study that varies parameters are kept.
     """
     return rows[~rows.parent.isin(rows.index)]
 

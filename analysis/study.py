@@ -511,7 +511,8 @@ class Study:
         - ``headline``: True if the method, with any setting, represents its algorithm;
         - ``parent``: label of the method of which this row is a setting or an ablation, and below
           which lists show it; empty for any other row;
-        - ``style``: names of the colour and the marker in figures, a tuple of two strings.
+        - ``style``: names of the colour and the marker in figures, a tuple of two strings. Write
+          ``methods["style"]``, because ``methods.style`` is an attribute of pandas.
         """
         return methods_of(self.runs, self.declared, self.marks)
 
