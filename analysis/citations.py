@@ -1,6 +1,6 @@
-"""Cite the software, the paper, and the works on which methods, solvers and analysis are based.
+"""Cite the software, the paper, and the works behind methods, solvers and analysis.
 
-The works are entries of ``references.bib``.
+The entries of the works are in ``references.bib``.
 """
 
 from __future__ import annotations

@@ -72,11 +72,12 @@ of the methods that have this marker."""
 
 
 KNOWN_METHODS: Mapping[str, type[Method]] = built_in_methods()
-"""Classes of the built-in methods by id, in the order of lists and figures."""
+"""Maps the id of each built-in method to its class, in the order of lists and figures."""
 SEARCHES = tuple(name for name in KNOWN_METHODS if name.startswith("optimum/"))
-"""Ids of the searches for the optimum, which are references and not compared with methods."""
+"""Ids of the searches for the optimum. Their results are references, with which methods are
+compared; the searches themselves are not ranked."""
 _WITHOUT_ARTICLE = ("CMA-ES", "random search", "hill climbing", "posture planning")
-"""Algorithms whose names have no article in a sentence."""
+"""Names of algorithms that have no article in a sentence."""
 _WORDS = {
     "other_arm": "other arm ",
     "noise_sd": "σ ",

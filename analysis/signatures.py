@@ -58,7 +58,7 @@ from coartic.tasks.task import hands_of
 
 @dataclass(frozen=True)
 class Solutions:
-    """Executed solutions of n runs of one method with one setting on one task with G goals."""
+    """The executed solutions of n runs of a method, with one setting, on a task with G goals."""
 
     task: Task
     label: str
@@ -319,13 +319,13 @@ class Signature:
     """Function of n runs that returns the signature of each run, shape ``(n,)``. A value is NaN for
     a run without the signature. The array is empty if there are no runs."""
     heading: str
-    """Heading of its column, with the unit."""
+    """Heading of the signature's column in tables, with its unit."""
     decimals: int
-    """Number of decimals in tables."""
+    """Number of decimals of the signature in tables."""
     words: str
-    """What the signature measures, in words with its unit."""
+    """Short description of what the signature measures, with its unit."""
     definition: str
-    """Definition on the site: sentences after the name and the unit."""
+    """Definition of the signature on the site, which follows its name and unit there."""
     in_latex: str = ""
     """Columns that LaTeX tables also have: ``value`` (the method's), ``value and control`` (the
     method's and that of random search), or empty for none."""
@@ -484,7 +484,7 @@ are NaN if the corrective process does not complete the task with the hands of t
 
 
 IN_MEMORY = 500
-"""Largest number of permutations or resamples of runs in memory at once."""
+"""Number of permutations or bootstrap samples whose runs are in memory at the same time."""
 
 
 def _groups(*groups: Numbers) -> list[Array]:
@@ -732,7 +732,8 @@ STANDARD_ERRORS = 3
 """Smallest distance between the mean next postures of two contexts, in its standard errors, for
 which a lean is computed."""
 MIN_RUNS = 5
-"""Smallest number of runs in each context for the interval of a lean or posture difference."""
+"""Smallest number of runs in each context for which the interval of a lean or of a posture
+difference is computed."""
 
 
 class Lean(NamedTuple):
@@ -860,9 +861,10 @@ def lean(
         return Lean(Estimate(math.nan, n=n), math.nan, math.nan, apart)
 
     def shares(means: Sequence[Sequence[Array]]) -> Array:
-        """Return the leans at start and goal, shape (..., 2).
+        """Return the leans at the start and at the goal, shape ``(..., 2)``.
 
-        ``means`` has the mean postures, shape (..., 3, k), of the parts of both contexts.
+        ``means`` has, for each context, the mean postures of each part of its runs, shape
+        ``(..., 3, k)``. The parts are the odd and the even runs, or all runs (with ``toward``).
         """
         differences = [one - other for one, other in zip(*means, strict=True)]
         ways = [way]
@@ -1094,7 +1096,7 @@ class TwoContexts:
     part: Part = "all"
 
     def __post_init__(self) -> None:
-        """Check the part."""
+        """Raise ValueError if ``part`` is unknown."""
         coordinates(self.first.task, self.hand, self.part)
 
     @property
@@ -1126,14 +1128,15 @@ class TwoContexts:
         return first[:, kept], second[:, kept]
 
     def of_part(self, part: Part) -> TwoContexts:
-        """Return the comparison of the same runs in another part of the posture."""
+        """Return a comparison of the same runs in another part of the posture (``part``)."""
         return replace(self, part=part)
 
     @property
     def in_both(self) -> bool:
-        """True if each context has a run that hits ``goal`` with ``hand``.
+        """True if each context has at least one run that hits ``goal`` with ``hand``.
 
-        If it is False, posture differences and p raise ValueError.
+        If it is False, :attr:`posture_difference` and the attributes computed from it raise
+        ValueError.
         """
         return all(map(len, self.configurations))
 
@@ -1144,7 +1147,7 @@ class TwoContexts:
 
     @property
     def can_test(self) -> bool:
-        """True if each context has the five compared runs that a test needs."""
+        """True if each context has at least the five compared runs that a test needs."""
         return min(map(len, self.configurations)) >= MIN_VALUES
 
     @property

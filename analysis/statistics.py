@@ -356,9 +356,10 @@ def _extreme(null: Array, observed: float, alternative: Alternative) -> int:
 
 
 def drawn_rows(runs: int, chosen: int, size: int, rng: np.random.Generator) -> NDArray[np.int32]:
-    """Draw ``chosen`` of the indices 0 to ``runs`` - 1 without replacement, ``size`` times.
+    """Draw random subsets of the indices 0 to ``runs`` - 1.
 
-    The result has shape ``(size, chosen)``.
+    Each of the ``size`` rows has ``chosen`` indices, drawn without replacement. The result has
+    shape ``(size, chosen)``.
     """
     order = rng.random((size, runs)).argpartition(chosen - 1, axis=1)
     return order[:, :chosen].astype(np.int32)  # a view would hold all of order in memory

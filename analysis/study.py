@@ -198,8 +198,8 @@ class Study:
     """Maps the id of a method from a file to the names and versions of the packages that the file
     imports."""
     elsewhere: pd.DataFrame = field(default_factory=pd.DataFrame)
-    """Rows of :attr:`methods` for methods that have runs only in other worlds of the folder. The
-    ranking lists them as not ranked."""
+    """Rows like those of :attr:`methods`, for methods that have runs only in other worlds of the
+    folder. The ranking lists these methods as not ranked."""
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields of the study for pickle, without the values computed from them."""

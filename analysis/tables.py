@@ -404,8 +404,9 @@ def _number_text(column: Column, value: float, *spread: float) -> str:
 def html_of(table: Table, study: Study, frame: pd.DataFrame) -> str:
     """Return a table as HTML, made by pandas' Styler.
 
-    - If the table has gaps on tasks, whose runs can be played, the cell in row 2 and column 3 has
-      the id ``T_ID_row2_col3``, where ``ID`` is the table's id with :func:`.ending_of`.
+    - If the table has gaps on single tasks, each cell has an id, with which the page links it to
+      runs that can be played. The cell in row 2 and column 3 has the id ``T_ID_row2_col3``, where
+      ``ID`` is the id of the table with the suffix of the world (:func:`.ending_of`).
     - Cells without a value are empty.
     - Cells of columns that are not numbers have the class ``text``.
     - Rows of methods from files have the class ``own``, unless all methods are from files.
@@ -488,7 +489,7 @@ def _named(study: Study, runs: pd.DataFrame) -> Row:
 ROUNDING = 1e-9
 """Largest posture difference, in length units and rad, that can be due to rounding."""
 _EARLY = 1_000
-"""Number of trials after which the ranking also reports the gap, as ``gap_early``."""
+"""Number of trials after which column ``gap_early`` of the ranking reports the gap."""
 BUDGETS = (100, 1_000, 10_000)
 """Numbers of trials after which the table of learning reports rewards."""
 COSTS = (

@@ -60,7 +60,7 @@ def need(holds: Any, words: str) -> None:
 
 
 WORLD = {"motor_noise": 0.0, "norm": "euclidean", "base_weight": 1.0}
-"""Constants of the paper's world, which cells leave out."""
+"""Constants of the paper's world. A stored cell leaves a constant out if it has this value."""
 
 # One bit of a hand's position can decide where a movement stops. Therefore it is computed in the
 # same order and with the same polynomials as in coartic: IEEE arithmetic then gives the same

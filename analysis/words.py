@@ -36,9 +36,10 @@ coartic itself writes, to LaTeX commands."""
 
 
 def id_of(function: Callable[..., Any]) -> str:
-    """Return the id of a table or figure from the name of its function.
+    """Return the id of a table or figure, made from the name of its function.
 
-    It is ``family-gaps`` for ``list_family_gaps``, and ``ranking`` for ``draw_ranking``.
+    The id is the name after its first underscore, with dashes instead of underscores:
+    ``family-gaps`` for ``list_family_gaps``, and ``ranking`` for ``draw_ranking``.
     """
     return function.__name__.partition("_")[2].replace("_", "-")
 

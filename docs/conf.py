@@ -1,4 +1,4 @@
-"""The site: `make docs` builds it, and ends at the first warning."""
+"""Configure Sphinx for the site, which ``make docs`` builds. Warnings are errors."""
 
 import os
 import re

@@ -39,9 +39,9 @@ _STYLE = Path(__file__).with_name("paper.mplstyle")
 RC: Any = dict(rc_params_from_file(_STYLE, use_default_template=False))
 """Settings of Matplotlib (rcParams) for all figures."""
 MIN_PANEL, MIN_SMALL_PANEL, MIN_DOTS = 2.2, 1.6, 0.8
-"""Smallest widths (in inches) of panels side by side, if the width of a figure is set: of panels
-with names next to them, of panels without names, and of the panels of a dot plot, which share
-their names."""
+"""Smallest widths, in inches, of panels that are side by side in a figure whose width is set. They
+are for panels with names to their left, for panels without names, and for the panels of a dot plot,
+which share the names of rows."""
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 COVERAGE = f"{100 * estimates.CONFIDENCE:.0f} %"
 """Coverage of all intervals, for captions."""

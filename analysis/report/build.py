@@ -1,4 +1,4 @@
-"""Write a report: the page ``report.html``, and tables and figures as files."""
+"""Write a report: the page ``report.html``, and files with its tables and figures."""
 
 from __future__ import annotations
 

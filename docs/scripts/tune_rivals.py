@@ -129,7 +129,10 @@ def table_of(runs):
 
 
 def main():
-    """Make the runs that are missing in the first folder, and write the table into the second."""
+    """Make the missing runs, and write the table of settings.
+
+    The command line names two folders: that of the runs, and that of the table.
+    """
     os.nice(15)
     folder, stored = map(Path, sys.argv[1:])
     folder.mkdir(parents=True, exist_ok=True)

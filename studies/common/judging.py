@@ -77,7 +77,8 @@ class Finding:
     """True if the means lie where the claim says, otherwise False. It is None if there are too few
     tasks to judge the claim."""
     evidence: str
-    """Sentence with the means and their intervals, or why the claim cannot be judged."""
+    """Sentence with the means and their intervals, or with the reason why the claim cannot be
+    judged."""
     tests: tuple[Estimate, ...] = ()
     """Tests of the claim. All of them must be significant. A positive estimate is in the direction
     of the claim."""
