@@ -152,8 +152,8 @@ def consistency(hits: pd.DataFrame, task: Task) -> pd.DataFrame:
     >>> hits = read_hits("docs/examples/recordings/metres.csv", task, ticks_per_unit=100)
     >>> consistency(hits, task).round(2).head(2)
       subject  trial  goal   hand     x     y   off  pace
-    0      p1    1.0   1.0  right  0.06  0.45  0.98  1.01
-    1      p1    1.0   2.0  right  0.24  0.40  1.00  1.00
+    0      p1    1.0   1.0  right  0.05  0.46  0.98  2.66
+    1      p1    1.0   2.0  right  0.25  0.41  0.80  2.02
     """
     return _fit(_readable(hits, task, "the frame"), task)
 
