@@ -94,7 +94,7 @@ def with_control(
 
 @lru_cache(maxsize=4_096)
 def signature_by_hands(study: Study, signature: str, task: str, label: str) -> dict[str, Array]:
-    """Return a dict that maps each hand sequence to the signature of the runs with these hands.
+    """Return a dict that maps each hand sequence to the signature of its runs.
 
     The hand sequences are in alphabetical order. Each array has shape ``(n,)`` and is in the unit
     of the signature. It has a value for each run that has these hands and the signature, and is one
@@ -112,7 +112,7 @@ def signature_by_hands(study: Study, signature: str, task: str, label: str) -> d
 
 
 def control_of(study: Study, task: str, label: str, hands: str, *, alike: bool = False) -> str:
-    """Return the label of the random search that is the control of a method on a task.
+    """Return the label of the random search that controls a method on a task.
 
     This form of random search has the same number of trials as the method. Among these forms, the
     one that treats the idle arm as the method does is preferred.
@@ -161,7 +161,7 @@ def explores_idle_arm(study: Study, task: str, label: str) -> bool:
 
 @lru_cache(maxsize=4_096)
 def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
-    """Return a dict that maps properties of the forms of random search on a task to their labels.
+    """Return a dict that maps forms of random search on a task to their labels.
 
     A form is a method ``random-search...`` with its setting. Each key is a tuple of
 
@@ -194,7 +194,7 @@ def _controls(study: Study, task: str) -> dict[tuple[str, float, bool], str]:
 
 @lru_cache(maxsize=4_096)
 def _most_trials(study: Study, task: str, label: str) -> float:
-    """Return the largest number of trials that a run of a method on a task made.
+    """Return the largest number of trials of a method's runs on a task.
 
     The result is 0 for a method without trials.
     """
@@ -234,7 +234,7 @@ def mean_excess(study: Study, signature: str, task: str, label: str) -> float:
 
 
 def selects(study: Study, label: str) -> bool:
-    """Return True if a method can select its solution from trials, and is not random search.
+    """Return True if a method selects its solution from trials, and is not random search.
 
     A method can select its solution if it declares that it uses the reward of each trial, and if at
     least one of its runs made more than one trial.

@@ -282,7 +282,7 @@ def scored(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
 
 def _scored_runs(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """Return the result of :func:`scored` for a frame in which each run must have one row.
+    """Return :func:`scored` of a frame, in which each run must have one row.
 
     Raises CoarticError if the frame is wrong (:func:`scored`), or if two rows belong to one run.
     """

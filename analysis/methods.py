@@ -1,4 +1,4 @@
-"""Describe methods: names, groups, colours and markers, and a frame of the methods of a study.
+"""Describe methods: their names, groups, colours and markers.
 
 The facts about a method, such as its title, are declared in the class of the method.
 :func:`methods_of` returns the frame.
@@ -191,7 +191,7 @@ MARK = " ‡"
 def methods_of(
     runs: pd.DataFrame, declared: Mapping[str, MethodInfo], marked: Collection[str] = ()
 ) -> pd.DataFrame:
-    """Return a frame of the methods that have runs, with a row for each setting of a method.
+    """Return a frame with a row for each setting of each method with runs.
 
     Built-in methods come first, in the order of :data:`.MODULES`. Methods from files follow, in the
     order of the suite. If two conditions of the learner share a row of the ranking
@@ -262,7 +262,7 @@ def methods_of(
 
 
 def parameters_varied(runs: pd.DataFrame, declared: Mapping[str, MethodInfo]) -> pd.DataFrame:
-    """Return the values of the parameters that a study varies, for each setting of its method.
+    """Return the values of the parameters that a study varies, for each setting.
 
     A study varies parameters if, apart from searches for the optimum,
 
@@ -337,7 +337,7 @@ def _group_with(information: Collection[str]) -> str:
 
 
 def ranked_as(runs: pd.DataFrame) -> pd.Series:
-    """Return, for each run, the name of the row of the ranking in which the run counts.
+    """Return the name of the row of the ranking in which each run counts.
 
     The name is the label of the run (column ``label``), with one exception. The learner needs one
     condition for tasks with one arm and another condition for tasks with two arms. If both have
@@ -377,7 +377,7 @@ def _pairs_of(group: str) -> list[tuple[str, str]]:
 
 
 def _looks_of_built_in() -> dict[str, tuple[str, str]]:
-    """Return a dict that maps ids of built-in methods to the names of their colours and markers.
+    """Return a dict that maps ids of built-in methods to colours and markers.
 
     It has the methods that represent their algorithms. The methods of each group (:data:`GROUPS`)
     take the pairs of :func:`_pairs_of`, in the order of the methods. The learner for one arm gets

@@ -169,7 +169,7 @@ def restrictions(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def relative_gap(rewards: ArrayLike, optimum: ArrayLike) -> Array:
-    """Return (optimum − reward) / |optimum| as a fraction: 0.01 stands for 1 % more ticks.
+    """Return (optimum − reward) / |optimum|, a fraction: 0.01 is 1 % more ticks.
 
     ``rewards`` and ``optimum`` are in negative ticks. The result has the shape to which both
     broadcast.

@@ -235,7 +235,7 @@ def _hits_in_file(path: str | Path, task: Task, ticks_per_unit: float) -> pd.Dat
 
 
 def _table(path: str | Path) -> pd.DataFrame:
-    """Return a CSV file as a frame whose index is the number of the data row, from 1.
+    """Return a CSV file as a frame, indexed by data rows from 1.
 
     Raises CoarticError if the file cannot be read, or is not a table.
     """
@@ -257,7 +257,7 @@ def _table(path: str | Path) -> pd.DataFrame:
 
 
 def _require(frame: pd.DataFrame, columns: list[str], source: str) -> None:
-    """Raise CoarticError if a column is missing or occurs twice, or if there are no rows.
+    """Raise CoarticError if a column is missing or duplicate, or rows are missing.
 
     ``source`` is the name of the frame in the message.
     """

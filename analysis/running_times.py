@@ -42,7 +42,7 @@ method reaches each target. The cost is infinite if the run does not reach the t
 
 
 def _pairs(times: RunningTimes) -> tuple[Array, Array, NDArray[np.int32]]:
-    """Return the pairs of run and target that are reached, in ascending order of running time.
+    """Return the reached pairs of run and target, in ascending order of running time.
 
     Parameters
     ----------
@@ -91,10 +91,10 @@ def share_by_budget(times: RunningTimes) -> tuple[Array, Array]:
 
 
 def share_reached(times: RunningTimes) -> float:
-    """Return the fraction (0 to 1) of pairs of run and target that are reached at any cost.
+    """Return the fraction of pairs of run and target that are reached.
 
-    ``times`` has the running times on each task, shape ``(runs, targets)``. All tasks have the same
-    weight.
+    The fraction, from 0 to 1, counts pairs that are reached at any cost. ``times`` has the running
+    times on each task, shape ``(runs, targets)``. All tasks have the same weight.
     """
     return float(_pairs(times)[1].sum())
 
@@ -222,7 +222,7 @@ def best_after(steps: tuple[Array, Array], trials: Any) -> Array:
 
 @lru_cache(maxsize=4)
 def target_ranges(study: Study) -> dict[str, tuple[float, float]]:
-    """Return a dict that maps the name of each task to the range of its reward targets.
+    """Return a dict that maps each task's name to the range of its targets.
 
     The range goes from :attr:`.Study.corrective_best` to the best known reward, both in negative
     ticks. A task is left out if one of the two rewards is missing, or if both are equal. The dict
@@ -239,7 +239,7 @@ def target_ranges(study: Study) -> dict[str, tuple[float, float]]:
 def times_of(
     study: Study, task: str, label: str, spend: str, shares: tuple[float, ...] = TARGETS
 ) -> Array:
-    """Return the running times of a method on a task: the cost of each target in each run.
+    """Return the running times of a method on a task.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def times_of(
 
 
 def solve_times(runs: pd.DataFrame) -> pd.Series:
-    """Return the wall time of solving of each run that was made in a warm process.
+    """Return the wall time of solving of each run in a warm process.
 
     A process is warm if it has performed the method before, so that compiling does not count. If no
     run was made in a warm process, the times of all runs are returned.
@@ -311,7 +311,7 @@ def solve_times(runs: pd.DataFrame) -> pd.Series:
 
 @lru_cache(maxsize=4)
 def runs_with_targets(study: Study) -> dict[str, pd.DataFrame]:
-    """Return a dict that maps the label of each method to its runs on ranked tasks with targets.
+    """Return a dict that maps each method's label to its runs on tasks with targets.
 
     The tasks are those of :func:`.ranked_tasks` that have targets (:func:`target_ranges`). Methods
     that did not run on all of these tasks are left out. The dict is cached: do not change it.

@@ -58,7 +58,7 @@ from coartic.tasks.task import hands_of
 
 @dataclass(frozen=True)
 class Solutions:
-    """The executed solutions of n runs of a method, with one setting, on a task with G goals."""
+    """The executed solutions of n runs of a method on a task with G goals."""
 
     task: Task
     label: str
@@ -78,7 +78,7 @@ class Solutions:
 
     @cached_property
     def hands(self) -> NDArray[np.int64]:
-        """Hands that hit the goals, shape ``(n, G)``: 0 for left, 1 for right, as in HANDS."""
+        """Hands that hit the goals, shape ``(n, G)``: 0 for left, 1 for right."""
         hands = [[HANDS.index(hand) for hand in hands_of(run.hands)] for run in self.runs]
         return np.array(hands, dtype=np.int64).reshape(-1, len(self.task.goals))
 
@@ -201,9 +201,9 @@ def isolated_reaches(
 
 
 def gain_at_next(runs: Solutions) -> Array:
-    """Return the ticks that each posture saves for the next goal, shape ``(n, G − 1)``.
+    """Return the ticks that each posture saves for the next goal.
 
-    For run i and goal g < G, the value is
+    The result has shape ``(n, G − 1)``. For run i and goal g < G, the value is
 
     r(q', g + 1, h(i, g + 1)) − r(q'', g + 1, h(i, g + 1)),
 
@@ -234,9 +234,9 @@ def gain_at_next(runs: Solutions) -> Array:
 
 
 def ticks_slower(runs: Solutions) -> Array:
-    """Return how many ticks slower the chosen hand is than the fastest hand, shape ``(n, G)``.
+    """Return how many ticks slower the chosen hand is than the fastest hand.
 
-    For run i and goal g, the value is
+    The result has shape ``(n, G)``. For run i and goal g, the value is
 
     r(q(i, g − 1), g, h(i, g)) − min over the task's hands h of r(q(i, g − 1), g, h).
 
@@ -258,7 +258,7 @@ def ticks_slower(runs: Solutions) -> Array:
 
 
 def preshaping(task: Task, run: Execution, initial: Execution) -> Array:
-    """Return how much nearer to its own next goal the idle arm has brought its hand, at each goal.
+    """Return how much nearer the idle hand is to its next goal, at each goal.
 
     At the hit of goal g, the idle hand is the hand that does not hit goal g. The value is
 
@@ -351,7 +351,7 @@ def hand(runs: Solutions) -> Array:
 
 
 def as_in_isolation(runs: Solutions) -> Array:
-    """Return whether each goal is hit with the hand that is fastest for this goal on its own.
+    """Return whether each goal is hit with the hand that is fastest for it alone.
 
     The result a(i, g) has shape ``(n, G)``. It is 1 if
 
@@ -365,7 +365,7 @@ def as_in_isolation(runs: Solutions) -> Array:
 
 
 def other_arm(runs: Solutions) -> Array:
-    """Return how much nearer to its own next goal the idle arm brings its hand, on average.
+    """Return how much nearer the idle hand is to its next goal, on average.
 
     The result has a fraction for each run, shape ``(n,)``: the mean of :func:`preshaping` over the
     goals at which :func:`preshaping` is not NaN. The fraction is negative if the idle arm moves its
@@ -385,7 +385,7 @@ def other_arm(runs: Solutions) -> Array:
 
 
 def arm(runs: Solutions) -> Array:
-    """Return how many ticks the posture at a goal saves for the next goal, on average.
+    """Return the mean number of ticks that postures save for the next goal.
 
     The posture is compared with the posture in which the corrective process would have hit the
     goal. Only the base and the arm that hits the goal count. The result has a mean for each run, in
@@ -709,7 +709,7 @@ def beyond_p(
 
 
 def _means_of(pool: Array, rows: NDArray[Any]) -> tuple[Array, Array]:
-    """Return the mean of the chosen configurations and the mean of the others, for each resample.
+    """Return the means of chosen configurations and of the others, for each resample.
 
     ``pool`` has configurations, shape ``(N, dof)``. Each row of ``rows``, shape ``(rows, k)``, has
     the indices of the k configurations that a resample chooses. Both means have shape
@@ -737,7 +737,7 @@ difference is computed."""
 
 
 class Lean(NamedTuple):
-    """Lean of postures at a shared goal, as fractions of the way to the next posture."""
+    """Lean of postures at a shared goal and at the start, as fractions."""
 
     more: Estimate
     """Lean at the shared goal minus lean at the start, with its interval for other runs. ``n`` has
@@ -759,7 +759,7 @@ def lean(
     deterministic: bool = False,
     resamples: Resamples = FEWER_RESAMPLES,
 ) -> Lean:
-    """Return how far postures at a shared goal lean towards the postures at the next goals.
+    """Return how far postures at a shared goal lean towards the next postures.
 
     In two contexts A and B, the robot hits the same goal (the shared goal), and then another goal
     in each context. The lean is the fraction of the difference between the next postures that is
@@ -935,7 +935,7 @@ the length of a step of the robot in the paper's model."""
 
 
 def context_pairs(tasks: Mapping[str, Task]) -> list[tuple[str, str, int]]:
-    """Return the pairs of tasks that begin with the same goals, and how many goals they share.
+    """Return the pairs of tasks that begin with the same goals.
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ def runs_on(study: Study, method: str, tasks: Iterable[str]) -> pd.DataFrame:
 
 
 def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return each pair of a task and a label of a method that occurs in ``runs``, once.
+    """Return the distinct pairs of task and label of a method in ``runs``.
 
     The pairs are in the order in which they first appear.
     """
@@ -97,10 +97,10 @@ def cells_of(runs: pd.DataFrame) -> list[tuple[str, str]]:
 
 @lru_cache(maxsize=4)
 def ranked_tasks(study: Study) -> tuple[str, ...]:
-    """Return the names of the tasks on which methods are ranked, in the order of the study.
+    """Return the names of the tasks on which methods are ranked.
 
-    These are all tasks that have a best known reward, and on which a method other than a search for
-    the optimum was run.
+    The names are in the order of the study. These are all tasks that have a best known reward, and
+    on which a method other than a search for the optimum was run.
     """
     tasks = {*compared_runs(study).task}
     return tuple(task for task in study.tasks if task in tasks)
@@ -108,7 +108,7 @@ def ranked_tasks(study: Study) -> tuple[str, ...]:
 
 @lru_cache(maxsize=4)
 def ranking_budget(study: Study) -> int | None:
-    """Return the number of trials that a ranked method must have been asked for, or None.
+    """Return the number of trials that ranked methods were asked for, or None.
 
     The numbers of trials of a method are those in column ``budget`` of its runs. The result is
 
@@ -195,7 +195,7 @@ def standings(study: Study) -> pd.DataFrame:
 
 
 def has_few_runs(study: Study, methods: Iterable[str], tasks: Iterable[str]) -> bool:
-    """Return True if a stochastic method has fewer runs on a task than a test needs.
+    """Return True if a stochastic method has too few runs for a test.
 
     ``methods`` are labels of methods, or labels of rows of the ranking. Deterministic methods among
     them are not checked, because one run of them is exact.

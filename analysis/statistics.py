@@ -484,7 +484,9 @@ this instance, shape ``(runs,)``."""
 
 
 def task_mean(values: Iterable[ArrayLike]) -> Estimate:
-    """Return the mean over tasks of the mean over runs, with its interval for other runs.
+    """Return the mean over tasks and runs, with its interval for other runs.
+
+    All tasks have the same weight: the mean over tasks is of the means over runs.
 
     Parameters
     ----------

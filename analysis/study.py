@@ -83,7 +83,7 @@ def solved(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def typical_run(runs: pd.DataFrame) -> str:
-    """Return the id of the run whose value is nearest to the median of the runs' values.
+    """Return the id of the run whose value is nearest to the median.
 
     If several runs are equally near, it is the first of them. All runs must have a solution (status
     ``ok``), and there must be at least one run.
@@ -212,7 +212,7 @@ class Study:
 
     @cached_property
     def worlds(self) -> dict[str, Study]:
-        """A dict that maps each world of the folder to a study of the runs in this world.
+        """A dict that maps each world of the folder to a study of its runs.
 
         A key names the constants in which the world differs from the paper's, such as
         ``motor_noise=0.01``. The key of the paper's world is the empty string. The paper's world
@@ -260,7 +260,7 @@ class Study:
 
     @cached_property
     def models(self) -> dict[str, MotionModel]:
-        """A dict that maps the name of each task to the motion model of the study's world.
+        """A dict that maps each task's name to the motion model of the world.
 
         Models of tasks differ in tolerances that depend on the radius of the goals. Raises
         CoarticError for a study of several worlds.
@@ -285,7 +285,7 @@ class Study:
 
     @property
     def question(self) -> tuple[str, str]:
-        """Title and description of the suite, if a user wrote it and it was run on its own tasks.
+        """Title and description of a user's suite that was run on its own tasks.
 
         For any other suite, both are empty strings.
         """
@@ -318,12 +318,13 @@ class Study:
 
     @cached_property
     def optima(self) -> dict[str, BestKnown]:
-        """A dict that maps the name of each task to its best known reward, with bound and source.
+        """A dict that maps each task's name to its best known reward.
 
-        Tasks without a best known reward are left out (:func:`.best_known`). If the reward of the
-        corrective process with its best hands is higher than the best known reward, it replaces
-        this reward. In a world with noise, a reward is minus the mean ticks of 1,000 executions,
-        whose noise differs from the noise by which runs are judged.
+        A best known reward has its bound and its source. Tasks without a best known reward are left
+        out (:func:`.best_known`). If the reward of the corrective process with its best hands is
+        higher than the best known reward, it replaces this reward. In a world with noise, a reward
+        is minus the mean ticks of 1,000 executions, whose noise differs from the noise by which
+        runs are judged.
         """
         fresh = self._executed_afresh if self.is_noisy else None
         runs, tasks = self.stored, self.tasks.values()
@@ -374,12 +375,12 @@ class Study:
 
     @cached_property
     def corrective_best(self) -> dict[str, float]:
-        """A dict that maps each task to the reward of the corrective process with its best hands.
+        """A dict that maps each task's name to the reward of the corrective process.
 
-        Shares of the possible gain, and reward targets, start from this reward. It is in negative
-        ticks. For a task with more than 4,096 hand sequences, it is the reward with the task's
-        initial hands. It is NaN if the corrective process does not complete the task with any of
-        these hands.
+        The corrective process acts alone with its best hands. Shares of the possible gain, and
+        reward targets, start from this reward. It is in negative ticks. For a task with more than
+        4,096 hand sequences, it is the reward with the task's initial hands. It is NaN if the
+        corrective process does not complete the task with any of these hands.
 
         In a world with noise, the corrective process is executed with the same noise by which the
         runs are judged. As this noise depends on the number of the run, the reward is a mean over
@@ -400,11 +401,12 @@ class Study:
 
     @cached_property
     def _corrective_by_number(self) -> dict[str, dict[int, float]]:
-        """Maps each task to a dict that maps numbers of runs to values, in a world with noise.
+        """Values of the corrective process in a noisy world, by task and run number.
 
-        The value for a number is minus the mean ticks of the corrective process with its best
-        hands, executed with the noise by which runs of this number are judged. It is NaN if the
-        corrective process does not complete the task.
+        The keys are names of tasks; each value is a dict that maps numbers of runs to values. The
+        value for a number is minus the mean ticks of the corrective process with its best hands,
+        executed with the noise by which runs of this number are judged. It is NaN if the corrective
+        process does not complete the task.
         """
         by_task = {}
         for name, of_task in self.stored.groupby("task", sort=False):
@@ -518,10 +520,10 @@ class Study:
 
     @cached_property
     def cells(self) -> dict[CellKey, pd.DataFrame]:
-        """A dict that maps each cell to its runs, including failed runs, in the order of the plan.
+        """A dict that maps each cell to its runs, including failed runs.
 
-        A key has the name of the task and the label of the method. Raises CoarticError for a study
-        of several worlds.
+        Cells are in the order of the plan. A key has the name of the task and the label of the
+        method. Raises CoarticError for a study of several worlds.
         """
         check_study(self)
         runs = self.runs.copy(deep=False)
@@ -692,7 +694,7 @@ class Study:
         *,
         replay: bool = False,
     ) -> pd.Series:
-        """Return a signature of coarticulation of each run of a method on a task, or of all runs.
+        """Return a signature of coarticulation for each run.
 
         Parameters
         ----------
@@ -734,7 +736,7 @@ class Study:
         return values_of_all.reindex(self.runs.index)
 
     def movements(self, part: Part = "solution") -> dict[str, tuple[Movement, ...]]:
-        """Return a dict that maps ids of runs to the movements of their solutions or replays.
+        """Return a dict that maps ids of runs to the movements of solutions or replays.
 
         ``part`` is ``"solution"`` or ``"replay"``. Only the first 500 solved runs of each method on
         each task are included. For ``"replay"``, runs without a replay are left out.

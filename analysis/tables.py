@@ -173,7 +173,7 @@ class Table:
     table."""
 
     def __call__(self, study: Study) -> pd.DataFrame:
-        """Return the table of a study as a frame, indexed by the names of the rows.
+        """Return the table of a study as a frame, indexed by row names.
 
         The ends of intervals are in columns whose names end in ``_low`` and ``_high``, and standard
         deviations in columns whose names end in ``_sd``. Column ``note`` has the warnings about
@@ -258,7 +258,7 @@ def _with_marks(rows: pd.DataFrame, study: Study) -> pd.DataFrame:
 
 
 def is_setting(study: Study, frame: pd.DataFrame) -> pd.Series:
-    """Return whether the method of each row is a setting or an ablation of another row's method.
+    """Return whether each row is a setting or ablation of another row's method.
 
     The method of a row is the label in column ``against``, if the table has this column, otherwise
     the label in column ``method``. Column ``parent`` of :attr:`.Study.methods` names the method of
@@ -283,7 +283,7 @@ def caption_of(table: Table, study: Study) -> str:
 
 
 def csv_of_worlds(frames: Mapping[str, pd.DataFrame]) -> str:
-    """Return the rows of a table in all worlds of a folder as one CSV file.
+    """Return a table of all worlds of a folder as one CSV file.
 
     ``frames`` maps each world (:attr:`.Study.worlds`) to the table in this world. The first column
     of the file, ``world``, has the world of the row. It is left out if the folder has only the
@@ -325,7 +325,7 @@ class ShownColumn(NamedTuple):
 def shown_columns(
     table: Table, study: Study, frame: pd.DataFrame, *, in_latex: bool = False
 ) -> dict[str, ShownColumn]:
-    """Return a dict that maps names of columns to the columns as page and LaTeX show them.
+    """Return a dict that maps names to columns as page and LaTeX show them.
 
     These are the columns that have a heading and at least one value. A standard deviation or an
     interval is shown in the column of its number. Methods, tasks and uses of the reward are shown
@@ -387,7 +387,7 @@ def shown_columns(
 
 
 def _number_text(column: Column, value: float, *spread: float) -> str:
-    """Return a number as a string, with its standard deviation or the ends of its interval.
+    """Return a number as a string, with its standard deviation or its interval.
 
     ``spread`` is empty, the standard deviation, or the two ends of the interval. A standard
     deviation or interval that is NaN, and an interval of length 0, are left out.
@@ -477,10 +477,11 @@ def run_ids(*parts: pd.DataFrame) -> Row:
 
 
 def _named(study: Study, runs: pd.DataFrame) -> Row:
-    """Return the entries of a row that name its runs, which are of one method on one task.
+    """Return the entries of a row that name its task, method and runs.
 
-    The entries are ``task`` (title of the task, :func:`.marked`), ``method`` (label of the method),
-    ``runs`` (number of runs) and ``run_ids`` (their ids).
+    The runs are of one method on one task. The entries are ``task`` (title of the task,
+    :func:`.marked`), ``method`` (label of the method), ``runs`` (number of runs) and ``run_ids``
+    (their ids).
     """
     task, label = marked(study.tasks[runs.task.iloc[0]]), runs.label.iloc[0]
     return {"task": task, "method": label, "runs": len(runs), **run_ids(runs)}
@@ -578,7 +579,7 @@ def _mean_gap_after(study: Study, trials: int) -> pd.Series:
 
 
 def _standing_rows(study: Study, *, ranked: bool) -> Rows:
-    """Yield the rows of the methods of :func:`.standings` that are ranked, or of the other methods.
+    """Yield the rows of ranked methods (:func:`.standings`), or of the other methods.
 
     ``ranked`` is True for the methods that are ranked.
     """
@@ -688,7 +689,7 @@ def list_not_ranked(study: Study) -> Rows:
     """,
 )
 def list_differences(study: Study) -> Rows:
-    """Yield the difference between the gap of each other method and that of a reference method.
+    """Yield the difference of each method's gap from that of a reference method.
 
     The difference is the mean gap of the other method minus the mean gap of the reference method,
     over the tasks on which the reference method solved all runs. Rows are in ascending order of the
@@ -757,18 +758,18 @@ def _gaps_by_task(study: Study, method: str, tasks: Sequence[str]) -> _Gaps:
 
 
 def _mean_of_gaps(gaps: _Gaps) -> Estimate:
-    """Return the mean over tasks of the mean gap on each task, with its interval for other runs.
+    """Return the mean gap over tasks, with its interval for other runs.
 
-    There is no interval if all gaps are exact.
+    It is the mean over tasks of the mean over runs. There is no interval if all gaps are exact.
     """
     return _sum_of_gaps([(1 / len(gaps), of) for of in gaps])
 
 
 def _difference_of_gaps(first: _Gaps, second: _Gaps) -> Estimate:
-    """Return the mean gap of a first method minus that of a second method, over the same tasks.
+    """Return the mean gap of a first method minus that of a second.
 
-    The interval is for other runs on these tasks. The p-value is that of :func:`.stratified_test`.
-    If all gaps are exact, there is no interval and no p-value.
+    Both means are over the same tasks. The interval is for other runs on these tasks. The p-value
+    is that of :func:`.stratified_test`. If all gaps are exact, there is no interval and no p-value.
     """
     parts = [(sign / len(of), gaps) for sign, of in ((1, first), (-1, second)) for gaps in of]
     p = stratified_test([*zip(first, second, strict=True)])
@@ -843,7 +844,7 @@ def values_of_parameters(study: Study) -> dict[str, list[ValueOfParameter]]:
 
 
 def gaps_of_settings(study: Study, labels: Sequence[str]) -> pd.Series:
-    """Return the mean gap, over settings, of the runs with the same task and the same number.
+    """Return the mean gap, over settings, of runs with the same task and number.
 
     Runs of different settings with the same number have the same seed. Therefore their mean is the
     unit of resampling. ``labels`` are the labels of the settings. The result is a Series of
@@ -960,7 +961,7 @@ def _are_equal(study: Study, settings: Sequence[Sequence[str]]) -> bool:
     with_settings=True,
 )
 def list_contexts(study: Study) -> Rows:
-    """Yield a row for each method, pair of tasks, goal that both tasks share, and hand.
+    """Yield a row for each method, pair of tasks, shared goal, and hand.
 
     A row has the posture difference between the two tasks, with a verdict, and the lean
     (:func:`.lean`); both are also computed from the base alone and from the joints alone. For
@@ -999,7 +1000,7 @@ def list_contexts(study: Study) -> Rows:
 
 
 def _columns_by_part(shared: TwoContexts) -> Row:
-    """Return the columns of a comparison that are computed from the base or the joints alone.
+    """Return the columns of a comparison for the base and the joints alone.
 
     They are the posture difference, the lean, and the distance between the mean next postures.
     """
@@ -1249,9 +1250,10 @@ def list_learning(study: Study) -> Rows:
 
 @lru_cache(maxsize=4)
 def _instances(study: Study) -> dict[str, list[str]]:
-    """Return a dict that maps each family to the names of its instances with a best known reward.
+    """Return a dict that maps each family to the names of its instances.
 
-    Instances are random tasks of a family. The dict is cached: do not change it.
+    Only instances with a best known reward count. Instances are random tasks of a family. The dict
+    is cached: do not change it.
     """
     families: dict[str, list[str]] = {}
     for name in study.optima:
@@ -1262,7 +1264,7 @@ def _instances(study: Study) -> dict[str, list[str]]:
 
 @lru_cache(maxsize=4)
 def instance_runs(study: Study) -> pd.DataFrame:
-    """Return the runs of each method on those instances on which all its runs are solved.
+    """Return each method's runs on the instances that it solved in all runs.
 
     Only instances with a best known reward count. Runs are sorted by family and instance, as in
     :func:`_instances`. Column ``method`` has the label of the method's row in the ranking. The
@@ -1278,7 +1280,7 @@ def instance_runs(study: Study) -> pd.DataFrame:
 
 
 def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
-    """Return a dict that maps each family to the gaps of a method's runs on its instances.
+    """Return a dict that maps each family to a method's gaps on its instances.
 
     Parameters
     ----------
@@ -1313,7 +1315,7 @@ def gaps_by_family(study: Study, runs: pd.DataFrame) -> Scores:
     """,
 )
 def list_family_gaps(study: Study) -> Rows:
-    """Yield the mean gap of each method on instances of families, in each family and over families.
+    """Yield each method's mean gap on instances, by family and over families.
 
     Column ``gap`` is the mean over the families with two arms, and each column ``in FAMILY`` is the
     mean in this family. They are fractions. Intervals are for other tasks of the families. If a
@@ -1360,7 +1362,7 @@ def list_family_gaps(study: Study) -> Rows:
     """,
 )
 def list_tasks(study: Study) -> Rows:
-    """Yield the best known reward of each task, and the reward of the corrective process alone.
+    """Yield each task's best known reward, and that of the corrective process alone.
 
     There is a row for each individual task. Columns ``initial`` and ``best_hands`` are the rewards
     of the corrective process alone with the initial hands of the task and with the best hands. All
@@ -1447,7 +1449,7 @@ def list_methods(study: Study) -> Rows:
     """,
 )
 def list_failed(study: Study) -> Rows:
-    """Yield the number of failed runs of each method on each task, and why they failed.
+    """Yield the number of failed runs of each method and task, with reasons.
 
     There is a row for each method and task with at least one failed run. It has the three most
     frequent reasons.

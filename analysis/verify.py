@@ -89,10 +89,11 @@ def _cosine_and_sine(angles: Floats) -> tuple[Floats, Floats]:
 
 
 def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
-    """Return x and y of a hand, in length units, for n configurations, shape ``(n,)`` each.
+    """Return x and y of a hand (length units) for n configurations.
 
-    ``q``, shape ``(dof, n)``, has a configuration in each column. ``arm`` is a tuple of the slice
-    of the arm's joints, the lengths of its links, and the position of its shoulder on the base.
+    Both have shape ``(n,)``. ``q``, shape ``(dof, n)``, has a configuration in each column. ``arm``
+    is a tuple of the slice of the arm's joints, the lengths of its links, and the position of its
+    shoulder on the base.
     """
     joints, links, shoulder = arm
     x, y = q[0] + shoulder[0], q[1] + shoulder[1]
@@ -104,7 +105,7 @@ def hand_at(q: Floats, arm: Any) -> tuple[Floats, Floats]:
 
 @cache
 def stored_task(content: str) -> Any:
-    """Return the task of a cell, read from the JSON with which the cell is stored.
+    """Return the task of a cell, read from the cell's stored JSON.
 
     The task has the keys of a task file as attributes, and further attributes:
 
@@ -183,7 +184,7 @@ def path(q: Floats, waypoints: Floats, model: Any) -> Floats:
 def make(
     task: Any, q: Floats, goal: int, hand: str, kind: str, corners: Floats
 ) -> tuple[Floats, int, bool]:
-    """Make a movement, and return where it stops, its ticks, and whether it hits the goal.
+    """Make a movement, and return its end, its ticks, and whether it hits.
 
     The movement starts at ``q``. ``corners``, shape ``(rows, dof)``, has the target as its only
     row, or a row for each waypoint of a path. ``goal`` is the number of the goal, from 1.
@@ -203,7 +204,7 @@ def make(
 
 
 def _recompute(task: Any, movements: list[list[Any]]) -> tuple[Any, ...]:
-    """Make all movements of a part of a run again, and return what the results must state.
+    """Make all movements of a part of a run again, and return its results.
 
     Each movement is a list of its goal (from 1), hand, kind, ticks, and path as JSON.
 

@@ -1,4 +1,4 @@
-"""Write numbers and names in the same way on the page, in tables and on the terminal."""
+"""Write numbers and names alike on the page, in tables and on the terminal."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def marked(task: Task) -> str:
 
 
 def tally(names: Iterable[str]) -> str:
-    """Return a string with the number of occurrences of each name, as in ``LRLR 17, RRLR 3``.
+    """Return how often each name occurs, as in ``LRLR 17, RRLR 3``.
 
     The most frequent name comes first. Names that are equally frequent are in alphabetical order.
     The result is ``–`` if there are no names.
@@ -192,7 +192,7 @@ def tally(names: Iterable[str]) -> str:
 
 
 def commonest(texts: Iterable[str], most: int | None = 3) -> list[str]:
-    """Return the most frequent strings with their numbers of occurrences, as in ``12 × no hit``.
+    """Return the most frequent strings with their counts, as in ``12 × no hit``.
 
     The list is in descending order of frequency. It has at most ``most`` entries, or all if
     ``most`` is None.
@@ -215,7 +215,7 @@ def capital(text: str) -> str:
 
 
 def slugs(names: Iterable[str]) -> dict[str, str]:
-    """Return a dict that maps each name to a unique slug for names of files and HTML ids.
+    """Return a dict that maps each name to a unique slug for file names.
 
     A slug has only small letters, digits and dashes, and at most 80 characters before a number. If
     two names would have the same slug, such as ``a-b``, the second gets a number: ``a-b-2``.

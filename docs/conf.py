@@ -145,12 +145,12 @@ def setup(app):
         source[0] = _OUTSIDE.sub(path_of, source[0])
 
     def fold(app, name, source):
-        """Add a toctree of the pages that are folded under a page (:data:`FOLDED`) to this page."""
+        """Add a toctree of the pages folded under a page (:data:`FOLDED`)."""
         if name in FOLDED:
             source[0] += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(FOLDED[name]) + "\n```\n"
 
     def code(app, name, source):
-        """Turn the blocks of code on a page of :data:`NOTEBOOKS` into code cells of a notebook.
+        """Turn blocks of code on a page of :data:`NOTEBOOKS` into code cells.
 
         A block is a file that is saved (its first line is a comment with the name), commands for a
         shell, or Python code.

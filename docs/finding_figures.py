@@ -56,7 +56,7 @@ _NUMBER = r"(−?\d+(?:\.\d+)?)"
 
 
 def estimate(row: Any, column: str, scale: float = 1) -> tuple[float, float, float]:
-    """Return the value of a column in a row of a stored table, and the ends of its interval.
+    """Return a value of a stored table's row, and the ends of its interval.
 
     The ends are NaN if the table has no interval for the column. All three numbers are multiplied
     by ``scale``.
@@ -84,7 +84,7 @@ def draw(
     looks: Sequence[tuple[str, str]] = (),
     dashed: Mapping[str, Sequence[float]] = MappingProxyType({}),
 ) -> Figure:
-    """Draw a dot plot with a row for each name and a panel for each quantity.
+    """Draw a dot plot: a row for each name, a panel for each quantity.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def draw(
 
 @styled
 def first_movement(table: Table) -> Figure:
-    """Draw finding 2: how much slower the first movement is, and how much faster the whole task."""
+    """Draw finding 2: first movements are slower, and whole tasks are faster."""
     runs, equal = table("comparison", "signatures"), table("memory", "one_selection")
     scales = table("memory", "scales")
     names, first, whole = [], [], []
@@ -179,7 +179,7 @@ def gaps(table: Table) -> Figure:
 
 
 def over_random_tasks(tasks: pd.DataFrame) -> pd.DataFrame:
-    """Return the mean gap of each method over the random tasks with up to eight goals.
+    """Return the mean gap of each method over random tasks of up to eight goals.
 
     ``tasks`` is a stored table ``by-task``. The result has a row for each method, with the columns
     ``gap``, ``gap_low`` and ``gap_high`` (fractions).
@@ -194,7 +194,7 @@ def over_random_tasks(tasks: pd.DataFrame) -> pd.DataFrame:
 
 @styled
 def two_worlds(table: Table) -> Figure:
-    """Draw the gap of each method in the world without noise and in the world with motor noise.
+    """Draw the gap of each method in worlds without and with motor noise.
 
     In each world, methods practised and were judged in this world.
     """
@@ -237,7 +237,7 @@ def rewards(table: Table) -> Figure:
 
 @styled
 def idle_arms(table: Table) -> Figure:
-    """Draw finding 7: how much nearer to the next goal the chosen arm and the idle arm come."""
+    """Draw finding 7: how much nearer to the next goal both arms come."""
     runs, claims = table("comparison", "signatures"), table("replication", "claims")
     moving = claims.loc["arm-coarticulation-in-general"]
     idle = claims.loc["other-arm-coarticulation-in-general"]

@@ -57,11 +57,11 @@ def unpack_shipped(folder: Path) -> Path:
 
 
 def make_table(study: Study, name: str) -> pd.DataFrame:
-    """Return a table of a study of one world as it is stored: without ids of runs.
+    """Return a table of a study as it is stored, without ids of runs.
 
-    ``name`` is the id of a table of the report, or ``by-task``. The latter is not a table of the
-    report, but the result of :func:`coartic.analysis.by_task`, from which pages compute means over
-    tasks.
+    The study must have one world. ``name`` is the id of a table of the report, or ``by-task``. The
+    latter is not a table of the report, but the result of :func:`coartic.analysis.by_task`, from
+    which pages compute means over tasks.
     """
     if name == "by-task":
         return by_task(study.runs).set_index("task")
@@ -70,7 +70,7 @@ def make_table(study: Study, name: str) -> pd.DataFrame:
 
 @cache
 def table(suite: str, name: str, world: str = "") -> pd.DataFrame:
-    """Return a stored table of a suite or a study as a frame, indexed by the names of its rows.
+    """Return a stored table of a suite or a study, indexed by row names.
 
     If the suite is in :data:`NEW`, the table is first made again and stored. ``world`` is the world
     of the table; the empty string stands for the paper's world.
@@ -92,7 +92,7 @@ def row(suite: str, name: str, which: str) -> dict[Any, Any]:
 
 
 def claim(name: str, study: str = "replication") -> dict[Any, Any]:
-    """Return a judged claim of a study as a dict; ``name`` is the id of the claim."""
+    """Return a judged claim of a study as a dict; ``name`` is its id."""
     return row(study, "claims", name)
 
 
@@ -103,10 +103,11 @@ def cells_of_the_paper() -> pd.DataFrame:
 
 
 def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]:
-    """Return a dict that maps each verdict to the number of claims about the paper's tasks with it.
+    """Return how many claims about the paper's tasks have each verdict.
 
-    If ``others`` is True, the three claims that carry the main point of the paper are left out. If
-    ``published`` is True, claims about tasks with reconstructed goals are left out.
+    The result is a dict that maps each verdict to the number of claims. If ``others`` is True, the
+    three claims that carry the main point of the paper are left out. If ``published`` is True,
+    claims about tasks with reconstructed goals are left out.
     """
     judged = table("replication", "claims")
     judged = judged[judged.suite != "families"]
@@ -120,10 +121,11 @@ def verdicts(*, others: bool = False, published: bool = False) -> dict[str, int]
 
 
 def seen(evidence: str, words: str, which: int = 0) -> str:
-    """Return the number that follows some words in a claim's evidence, with its interval if given.
+    """Return the number that follows some words in a claim's evidence.
 
-    If the words occur several times, ``which`` says which occurrence is meant, from 0. The result
-    is a string. Raises IndexError if there is no such number.
+    The number has its interval, if the evidence has it. If the words occur several times, ``which``
+    says which occurrence is meant, from 0. The result is a string. Raises IndexError if there is no
+    such number.
     """
     estimate = r":?\s*(−?\d+(?:\.\d+)?(?: \[[^]]*\])?)"
     number_behind = re.escape(words) + estimate
@@ -143,7 +145,7 @@ def p_of_shares(values: dict[Any, Any], published_runs: int) -> float:
 
 
 def published_spreads() -> pd.DataFrame:
-    """Return the published spreads (±) of rewards, with the tests of both readings of a spread.
+    """Return the published spreads (±) of rewards, with tests of both readings.
 
     A spread can be read as a standard deviation or as a standard error. The published spread of a
     hand sequence is compared with our runs that have this sequence.
@@ -154,7 +156,7 @@ def published_spreads() -> pd.DataFrame:
 
 
 def gain_of_best_hands() -> float:
-    """Return how much the corrective process gains if it has its best instead of its initial hands.
+    """Return how much the corrective process gains from best instead of initial hands.
 
     The gain is in per cent of the distance from the reward with the initial hands to the best known
     reward. It is a mean over the random tasks of families with up to eight goals.
@@ -166,11 +168,12 @@ def gain_of_best_hands() -> float:
 
 @cache
 def early_less_late(family: str) -> dict[str, float]:
-    """Return how much more the informed learner gains in 100 trials than the paper's in 10,000.
+    """Return how much more the informed learner gains than the paper's learner.
 
-    The result is a dict with ``more`` and the ends of its interval, ``more_low`` and ``more_high``.
-    ``more`` is the difference of the gains, a mean over the tasks of a family. A gain is in per
-    cent of the distance from the reward of the corrective process to the best known reward.
+    The informed learner has 100 trials, and the paper's learner has 10,000 trials. The result is a
+    dict with ``more`` and the ends of its interval, ``more_low`` and ``more_high``. ``more`` is the
+    difference of the gains, a mean over the tasks of a family. A gain is in per cent of the
+    distance from the reward of the corrective process to the best known reward.
     """
     runs = pd.read_csv(STUDIES / "dial" / "runs.csv.xz").query(f"family == '{family}'")
     way = runs.best_known - runs.corrective_best
@@ -207,7 +210,7 @@ def foreign_rows(study: Study) -> pd.DataFrame:
 
 
 def foreign_gaps() -> pd.DataFrame:
-    """Return the gaps of the methods of suite ``foreign``, with a row for each method and setting.
+    """Return the gaps of suite ``foreign``, with a row for each method and setting.
 
     - ``gap``: mean gap on the paper's tasks, in per cent, with its interval for other runs;
     - ``random``: mean gap on random tasks, in per cent, with its interval for other tasks;
@@ -280,7 +283,7 @@ def in_worlds(claim: str) -> str:
 
 
 def filled_pages() -> dict[str, str]:
-    """Fill in all templates, and return a dict that maps paths below ``docs`` to the pages."""
+    """Fill in all templates, and return the pages by path below ``docs``."""
     replication = STUDIES / "replication"
     published = tomllib.loads((replication / "published.toml").read_text("utf-8"))
     values = {
@@ -308,7 +311,7 @@ def filled_pages() -> dict[str, str]:
 
 
 def figures() -> dict[str, bytes]:
-    """Draw the figures of the findings, and return a dict of the SVGs by path below ``docs``."""
+    """Draw the figures of the findings, and return SVGs by path below ``docs``."""
     return {
         f"stored/findings/{name}.svg": stored_picture(
             draw, table, *[early_less_late] * (name == "early-gain")
@@ -318,7 +321,7 @@ def figures() -> dict[str, bytes]:
 
 
 def draw_figure(study: Study, name: str) -> bytes:
-    """Return a figure of the report of a study, as SVG in the form in which it is stored.
+    """Return a figure of a study's report as SVG, as it is stored.
 
     The study must have one world. ``name`` is the id of the figure.
     """
@@ -355,7 +358,7 @@ def store_figures(pages: Iterable[str]) -> None:
 
 
 def main() -> None:
-    """Write the pages, after tables of new results are stored if the command line names results."""
+    """Store new results if the command line names them, then write the pages."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--from", dest="results", type=Path, help="Folder of the suites' results, or 'shipped'."

@@ -1,4 +1,4 @@
-"""Define the directive ``{made} NAME``, which puts text that is made from the code into a page.
+"""Define the directive ``{made} NAME``, which puts text made from code into pages.
 
 NAME is a function of this module that yields lines of Markdown, such as a table.
 """
@@ -65,7 +65,7 @@ def bare(kind: Any) -> Any:
 
 
 def claims() -> Iterator[str]:
-    """Yield the table of the paper's claims, in which the id of each claim is an anchor."""
+    """Yield the table of the paper's claims, whose ids are anchors."""
     judged = pd.read_csv(REPLICATION / "claims.csv", index_col=0).fillna("–")
 
     def goals(name: str, claim: dict[str, Any]) -> str:
@@ -89,7 +89,7 @@ def claims() -> Iterator[str]:
 
 
 def margins() -> Iterator[str]:
-    """Yield the table of the margins of claims, with the reason for each margin and its history."""
+    """Yield the table of the margins of claims, with their reasons and history."""
     entries = tomllib.loads((REPLICATION / "margins.toml").read_text("utf-8"))
     rows = ((f"`{name}`", f"{each['value']:g}", each["reason"]) for name, each in entries.items())
     yield from table(("margin", "value", "reason, and history if it was changed"), rows)
@@ -191,7 +191,7 @@ def columns() -> Iterator[str]:
 
 
 def play() -> Iterator[str]:
-    """Yield the interactive figure as HTML, with its styles and a link to its own page."""
+    """Yield the interactive figure as HTML, with styles and a link to its page."""
     yield "```{raw} html"
     yield f"<style>{part_of_page('play.css')}</style>"
     yield player_figure([up_or_down(), *map(preset_of, shipped_tasks().values())], page="play.html")
@@ -260,7 +260,7 @@ def plainly(
 
 
 def define(app: Sphinx, page: nodes.document, name: str) -> None:
-    """Give each link to a term of the glossary its definition as a title, which browsers show."""
+    """Give links to terms of the glossary their definitions, which browsers show."""
     terms = {
         key: section[1].astext().replace("\n", " ")
         for section in app.env.get_doctree("glossary").findall(nodes.section)

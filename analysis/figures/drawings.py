@@ -1,4 +1,4 @@
-"""Draw the figures of the report. Each is a function of a study; :data:`FIGURES` has them by id."""
+"""Draw the figures of the report, which :data:`FIGURES` lists by their ids."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ from coartic.tasks.task import shipped_tasks
 
 @figure("Gap to the best reward", "Ticks of the mean beyond the {reference}, in per cent of it")
 def draw_ranking(study: Study) -> Parts | None:
-    """Draw the gap of each ranked method, or of each value of the parameters that a study varies.
+    """Draw the gap of each ranked method, or of each value of varied parameters.
 
     If a study varies parameters, but their values cannot be compared, the gaps of ranked methods
     are drawn. The result is None if no method is ranked.
@@ -84,7 +84,7 @@ def draw_ranking(study: Study) -> Parts | None:
 
 
 def _draw_parameters(study: Study) -> Parts | None:
-    """Draw gaps by the values of the parameters that the study varies, a panel for each parameter.
+    """Draw the gap of each value of each varied parameter, a panel for each.
 
     A panel has the means of table ``parameters``. If several parameters vary, a panel also has the
     gaps at the best values of the other parameters. If only one parameter varies, the panel also
@@ -170,7 +170,7 @@ def _places_of(values: Sequence[Any]) -> tuple[np.ndarray[Any, Any], bool]:
 
 
 def _name_lines(axes: Axes, x: float, ends: Mapping[str, float]) -> None:
-    """Write the name of each line to the right of its end, so that names do not overlap.
+    """Write the names of lines to the right of their ends, without overlap.
 
     All lines end at ``x``. ``ends`` maps the name of each line to its y coordinate there.
     """
@@ -187,11 +187,11 @@ _FEW: Any = {"markersize": 3, "alpha": 0.6}
 
 
 def _gaps_of_few_runs(study: Study, row: Mapping[Any, Any]) -> list[float]:
-    """Return the gaps (in per cent) of a ranked method's runs if they are too few for an interval.
+    """Return the gaps of a method's runs if they are too few for an interval.
 
-    ``row`` is the method's row of :func:`.standings`. Each gap is the mean over tasks of the runs
-    with the same number. The list is empty if there are enough runs for an interval, or only one
-    run on a task.
+    Gaps are in per cent. ``row`` is the method's row of :func:`.standings`. Each gap is the mean
+    over tasks of the runs with the same number. The list is empty if there are enough runs for an
+    interval, or only one run on a task.
     """
     runs = runs_on(study, str(row["method"]), ranked_tasks(study))
     gaps = 100 * runs.groupby("run").gap.mean()
@@ -274,7 +274,7 @@ def _draw_gaps(study: Study) -> Parts | None:
 
 
 def _width_of(shape: tuple[int, int]) -> float:
-    """Return the usual width, in inches, of a figure with these numbers of rows and columns."""
+    """Return the usual width (inches) of a figure with these rows and columns of panels."""
     return style.TWO if shape[1] > 1 else style.ONE
 
 
@@ -424,7 +424,7 @@ the panel's axis."""
     f"{style.COVERAGE} bootstrap intervals over runs, if there are five runs.",
 )
 def draw_shared_goal(study: Study) -> Parts | None:
-    """Draw the posture difference and the lean of each method at a goal that two tasks share.
+    """Draw the posture difference and the lean of each method at a shared goal.
 
     The goal is that of :func:`.shared_goal`. The four panels show the posture difference, the lean,
     the lean of the base alone, and the lean of the joints alone. A vertical line shows the value of
@@ -465,7 +465,7 @@ def draw_shared_goal(study: Study) -> Parts | None:
 
 
 def _draw_contexts(axes: Axes, shared: TwoContexts) -> list[pd.DataFrame]:
-    """Draw the posture of each run at a shared goal, and the mean posture on each task.
+    """Draw the postures of runs at a shared goal, and their mean on each task.
 
     The result is a list with a frame for each task. A frame has a row for each run: ``task``,
     ``method``, ``goal``, ``hand``, and a column for each coordinate of the posture (length units
@@ -628,7 +628,7 @@ learning curves, too."""
     "Mean over runs (band: quartiles) of",
 )
 def draw_learning_curves(study: Study) -> Parts | None:
-    """Draw the best reward so far as a function of the trial, in a panel for each task.
+    """Draw the best reward so far against the trial, in a panel for each task.
 
     The curves are those of :func:`learning_curves`. In a world with noise, where the best trial is
     partly luck, the curves show instead the mean reward of the trials in each tenth of practice
@@ -728,7 +728,7 @@ def learning_curves(study: Study) -> pd.DataFrame:
 
 
 def practice_curves(study: Study) -> pd.DataFrame:
-    """Return the mean reward of the trials in each tenth of practice, in a world with noise.
+    """Return the mean reward of trials in each tenth of practice, in a noisy world.
 
     Methods and tasks are chosen as in :func:`learning_curves`. Failed trials do not count.
 
@@ -757,7 +757,7 @@ def practice_curves(study: Study) -> pd.DataFrame:
 def _runs_with_curves(
     study: Study, run_ids: Collection[str]
 ) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Yield the task, the label of the method, and the solved runs of each learning curve.
+    """Yield the task, the method's label, and the solved runs of each learning curve.
 
     Only runs whose ids are in ``run_ids`` count (:func:`learning_curves`).
     """
@@ -873,7 +873,7 @@ def draw_tasks(study: Study) -> Parts | None:
 
 @style.styled
 def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
-    """Return a figure with the start configuration and the goals of tasks, a panel for each."""
+    """Return a figure of tasks: the start configuration and the goals of each."""
     tasks = titled_apart(tasks)
     boxes = [box(task, [task.q0]) for task in tasks]
     width, height = (max(corner[1][i] - corner[0][i] for corner in boxes) for i in (0, 1))
@@ -920,7 +920,7 @@ def picture_of_tasks(tasks: Sequence[Task]) -> Figure:
 
 
 def _draw_order(axes: Axes, goals: Array, apart: float) -> None:
-    """Draw the goals of a task as numbered discs, and an arrow from each goal to the next.
+    """Draw goals as numbered discs, and an arrow from each goal to the next.
 
     ``goals`` has the centres of the goals in length units, shape ``(G, 2)``. Discs whose distance
     would be below ``apart``, in length units, are moved away from each other.

@@ -40,7 +40,7 @@ _NO_DATE = {"SOURCE_DATE_EPOCH": "0"}  # replaces the user's value, so that no d
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure with its title, its caption, its alternative text and the numbers that it shows."""
+    """A figure with its title, caption, alternative text and numbers."""
 
     id: str
     """Id of the figure. It is the name of the figure's files, without suffix."""
@@ -143,7 +143,7 @@ def figure(title: str, caption: str) -> Callable[[Callable[[Study], Parts | None
 
 
 def looks_in(study: Study, labels: Iterable[str]) -> dict[str, style.Look]:
-    """Return a dict that maps labels of methods to the looks of their lines and markers.
+    """Return a dict that maps each label to the look of its line and markers.
 
     A look is a dict of arguments of Matplotlib's ``plot``. A method has the same look in all
     figures of a study. Methods from files have wider lines and larger markers than built-in
@@ -322,7 +322,7 @@ def _with_short_lines(path: str) -> str:
 
 
 def panels_for_page(plot: Plot) -> list[str]:
-    """Return each panel and legend of a figure as an ``<svg>`` element, for a narrow page.
+    """Return each panel and legend of a figure as ``<svg>``, for a narrow page.
 
     The elements refer to parts of the element that :func:`for_page` returns. Call that function
     first, and put its element on the same page. The list is empty if the figure has only one panel,

@@ -65,7 +65,7 @@ Look = dict[str, Any]
 
 
 def look_of(method: str) -> Look:
-    """Return the colour, the marker and the line style that a built-in method has in all figures.
+    """Return the colour, the marker and the line style of a built-in method.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def panels(
 
 
 def name_rows(axes: Axes, names: Sequence[str]) -> None:
-    """Write names to the left of the rows of a plot, which are at y = 0, -1, -2 and so on."""
+    """Write names to the left of rows at y = 0, -1, -2, ..."""
     axes.set_yticks([-place for place in range(len(names))], names)
     axes.set_ylim(-len(names) + 0.4, 0.6)
     axes.tick_params(axis="y", length=0)
@@ -264,7 +264,7 @@ def dots(
     quantities: Mapping[str, str],
     lines: Mapping[str, float | Sequence[float]],
 ) -> Figure:
-    """Return a dot plot, with a row for each name and a panel for each quantity.
+    """Return a dot plot: a row for each name, a panel for each quantity.
 
     Parameters
     ----------
@@ -313,7 +313,7 @@ def dots(
 
 
 def tip(artist: Artist, text: str) -> None:
-    """Set the text that a page of HTML shows when the pointer rests on a mark of a figure.
+    """Set the text that HTML pages show when the pointer rests on a mark.
 
     Matplotlib stores the text as the mark's group id (gid), which is replaced.
     """
@@ -329,7 +329,7 @@ def legend_line(label: str, **line: Any) -> Line2D:
 
 
 def log_axis(axes: Axes) -> None:
-    """Make the x axis logarithmic, and label powers of ten by engineering prefixes: 1, 100, 1k, 1M.
+    """Make the x axis logarithmic, with labels such as 1, 100, 1k and 1M.
 
     A label of 100m stands for 0.1. Minor ticks are at 2 and 5 times each power of ten.
     """

@@ -145,7 +145,7 @@ def write_report(
 
 
 def _latex_of(study: Study, table: Table) -> str:
-    """Return a table of a study as LaTeX, or the empty string if no column is for LaTeX.
+    """Return a table as LaTeX; the empty string if no column is for LaTeX.
 
     The study must have one world.
     """
@@ -156,7 +156,7 @@ def _latex_of(study: Study, table: Table) -> str:
 
 
 def _files_of_figures(study: Study, section: Section, width: float | None) -> dict[str, bytes]:
-    """Return a dict that maps paths of a section's SVG and PDF files to their contents.
+    """Return a dict that maps paths of a section's picture files to their contents.
 
     ``width`` is the width of the figures in inches; None stands for the usual width of each figure.
     """
@@ -227,7 +227,7 @@ def stamp(runs: pd.DataFrame) -> str:
 
 
 def _first_figures(study: Study) -> list[Plot]:
-    """Return the figures at the top of the page, each as wide as a column of a journal.
+    """Return the figures at the top of the page, one journal column wide.
 
     The first figure is the ranking. If the study does not vary parameters, there is a second:
 
@@ -244,7 +244,7 @@ def _first_figures(study: Study) -> list[Plot]:
 
 
 def _heading_of(study: Study) -> str:
-    """Return a heading that names the tasks, or the suite if there are more than three tasks."""
+    """Return a heading that names up to three tasks, or otherwise the suite."""
     tasks = [marked(task) for task in study.tasks.values()]
     subject = listed(tasks) if len(tasks) <= 3 else f"suite {study.suite}"
     return f"Coarticulation of a simulated robot: {subject}"
@@ -257,7 +257,7 @@ def _sections_shown(
     failures: dict[str, str],
     watch: Callable[[str], object],
 ) -> list[dict[str, Any]]:
-    """Return the sections of a world for the page's template, as a dict for each section.
+    """Return a dict for each section of a world, for the page's template.
 
     Sections without figures, tables and errors are left out. ``first`` has the figures at the top
     of the page (:func:`_parts_of`). If a section cannot be made, its title and the error are added

@@ -84,7 +84,7 @@ def player(study: Study) -> str:
 
 
 def _cells_shown(study: Study) -> Iterator[tuple[str, str, str]]:
-    """Yield the table cells that show a gap on a task, with the runs from which it is computed.
+    """Yield the table cells that show a gap on a task, with their runs.
 
     Each item has the id of the HTML cell, the name of the task, and the label of the method. The
     cells are those of the table of ranked methods and of the table of methods that are not ranked.
@@ -126,7 +126,7 @@ def methods_played(study: Study, tasks: list[str]) -> list[dict[str, Any]]:
 
 
 def _film_of(study: Study, key: CellKey) -> dict[str, Any]:
-    """Return the film of a cell for ``model.js``: its run whose reward is nearest to the median.
+    """Return the run of a cell that is nearest to the median, for ``model.js``.
 
     The run is one of the first 500 solved runs. The film is a dict with the keys
 

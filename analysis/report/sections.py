@@ -102,7 +102,10 @@ IN_NOISE = (
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page. It is left out if no table has rows and no figure can be drawn."""
+    """A section of the page: its tables, its figures and its finding in words.
+
+    The page leaves a section out if no table has rows and no figure can be drawn.
+    """
 
     id: str
     title: str
@@ -292,7 +295,7 @@ ascending=[true, false]) %}
 
 
 def section_of_world(study: Study) -> Section:
-    """Return the section of the page for a world after the first world of a folder.
+    """Return the section of the page for a further world of a folder.
 
     ``study`` is the study of this world.
     """
@@ -327,7 +330,7 @@ def visible_sections(study: Study) -> list[Section]:
 def attempt(
     failures: dict[str, str], name: str, make: Callable[..., Made], *args: Any
 ) -> Made | None:
-    """Make a part of a report, and return it, or None if it cannot be made.
+    """Return a part of a report, or None if it cannot be made.
 
     If ``make(*args)`` raises an exception, the error with its file and line is stored in
     ``failures`` with the key ``name``, the name of the part, unless this part has an error already.
@@ -362,7 +365,7 @@ def finding(study: Study, section: Section) -> list[str]:
     subjects = methods.apply(subject_of, axis=1)
 
     def few(row: Mapping[str, Any]) -> str:
-        """Return a remark that a stochastic method has too few runs for a test, or ""."""
+        """Return a remark if a stochastic method has too few runs, otherwise ""."""
         labels = str(row["method"]), str(row["against"])
         return TOO_FEW * has_few_runs(study, labels, solved_tasks(study, labels[1]))
 
@@ -388,7 +391,7 @@ def finding(study: Study, section: Section) -> list[str]:
 
 
 def varies_parameters(study: Study) -> bool:
-    """Return True if a study varies parameters and the user named no method to compare with."""
+    """Return True if a study varies parameters and compares with no single method."""
     return not (study.varied.empty or study.against)
 
 
@@ -426,7 +429,7 @@ def _first_two(rows: pd.DataFrame) -> list[dict[Any, Any]]:
 
 
 def leading(rows: pd.DataFrame) -> list[dict[Any, Any]]:
-    """Return the rows of a table that a finding mentions, as dicts, in the order of the table.
+    """Return the rows of a table that a finding mentions, as dicts in order.
 
     These are all rows of the methods in the first two rows, of the paper's learner, of random
     search, and of methods from files.

@@ -36,7 +36,7 @@ setting."""
 
 
 def answer_on_parameters(study: Study) -> list[str]:
-    """Return the finding of a study that varies one or several parameters, as a list of lines.
+    """Return the finding of a study that varies parameters, as a list of lines.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def _effect_of(study: Study, parameter: str) -> str:
 
 
 def _settings_behind(study: Study, rows: pd.DataFrame) -> str:
-    """Return a sentence on how many of the ranked settings are worse than the corrective process.
+    """Return a sentence on the ranked settings that are worse than the corrective process.
 
     ``rows`` are the ranked settings. The result is the empty string if there is no such setting.
     """

@@ -24,7 +24,7 @@ TASKS, SEARCH = ("ascending", "descending"), "random-search"
 
 
 def calibrate(study):
-    """Return the share of pairs of samples that differ significantly, with a row for each test."""
+    """Return the share of pairs that differ significantly, for each test."""
     rng = np.random.default_rng(0)
     first = [study.signature("first", task, SEARCH).dropna().to_numpy() for task in TASKS]
     at_goal = [study.configurations(task, SEARCH)[:, 0] for task in TASKS]

@@ -1,4 +1,4 @@
-"""Measure the coverage of intervals and the error rate of a test, on samples of known populations.
+"""Measure the coverage of intervals and a test's error rate on known populations.
 
     python docs/scripts/calibrate_intervals.py docs/stored/intervals
 
@@ -41,10 +41,10 @@ def holds(interval, truth):
 
 
 def of_rewards(rng, draw, n, truth):
-    """Apply each procedure to two samples of n values from a population with a known mean.
+    """Apply each procedure to two samples from a population with known mean.
 
-    Returns a dict of booleans: for each interval, whether it contains the true value; and for each
-    test, whether it rejects the null hypothesis, which is true.
+    Each sample has n values. Returns a dict of booleans: for each interval, whether it contains the
+    true value; and for each test, whether it rejects the null hypothesis, which is true.
     """
     first, second = draw(rng, n), draw(rng, n)
     welch = stats.ttest_ind(first, second, equal_var=False).confidence_interval()
@@ -61,7 +61,7 @@ def of_rewards(rng, draw, n, truth):
 
 
 def of_tasks(rng, n):
-    """Return whether the interval over n random tasks with five runs each contains the mean gap."""
+    """Return whether the interval over n random tasks contains the mean gap."""
     gaps = [gap + rng.exponential(SPREAD, 5) for gap in rng.exponential(GAP, n)]
     return {"mean over random tasks": holds(other_tasks({"family": gaps}), GAP + SPREAD)}
 

@@ -1,4 +1,4 @@
-"""Choose the two-sided test of a mean over tasks by how often it rejects a true null hypothesis.
+"""Choose the two-sided test of a mean over tasks by its error rate.
 
     PYTHONPATH=studies python docs/scripts/calibrate_means.py docs/stored/means
 
@@ -75,7 +75,7 @@ shipped runs leave out."""
 
 
 def program(study):
-    """Import the program of a study, and return it with the runs that ship with the study."""
+    """Import the program of a study, and return it with the study's shipped runs."""
     folder = ROOT / "studies" / study
     for name in {path.stem for path in (ROOT / "studies").glob("*/*.py")} & {*sys.modules}:
         del sys.modules[name]  # modules of studies have the same names
@@ -117,7 +117,7 @@ def with_settings(rows):
 
 
 def claims_of(study):
-    """Judge the claims of a study by the runs that ship with it, and return its table of claims."""
+    """Judge the claims of a study by its shipped runs, and return the table."""
     program_, rows = program(study)
     if study == "dial":
         moved = pd.read_csv(ROOT / "studies/dial/moved.csv")
@@ -141,7 +141,7 @@ def claims_of(study):
 
 
 def samples_of_claims(study):
-    """Return the values over tasks of each mean in a study's claims, as pairs of words and values.
+    """Return the words and the values over tasks of each mean in a study's claims.
 
     The bound is subtracted from the values. If the mean is claimed to lie below the bound, their
     sign is changed, so that each claim is that the mean is above 0.
@@ -207,7 +207,7 @@ def samples_of_noise():
 
 
 def every_sample():
-    """Yield the name of the study, the words, and the values over tasks of each cell."""
+    """Yield the study, the words, and the values over tasks of each cell."""
     for study in ("dial", "dose", "fourteen", "horizon", "memory"):
         for words, values in samples_of_claims(study):
             yield study, words, values
@@ -226,7 +226,7 @@ def skewness(values):
 
 
 def t_of(means, variances):
-    """Return t statistics: 0 where the mean is 0, and infinite where only the variance is 0."""
+    """Return t: 0 where the mean is 0, infinite where only the variance is 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(np.abs(means) < 1e-9, 0.0, means / np.sqrt(variances))
 
@@ -255,7 +255,7 @@ def p_by_test(samples, counts):
 
 
 def cell(values, rng):
-    """Return the row of a cell: the share of rejected samples for each test and level.
+    """Return the share of rejected samples of a cell, by test and level.
 
     ``values`` is the population of the cell.
     """
@@ -297,10 +297,10 @@ def coverage():
 
 
 def widths(tasks=40):
-    """Return the mean width of the interval over tasks, divided by that of the true 95 % interval.
+    """Return the mean width of the interval, divided by the true width.
 
-    The frame has a row for each number of runs on a task, and each ratio of SDs. Each sample has
-    ``tasks`` tasks.
+    The interval is the 95 % interval over tasks. The frame has a row for each number of runs on a
+    task, and each ratio of SDs. Each sample has ``tasks`` tasks.
     """
     rows, rng = [], np.random.default_rng(SEED)
     for runs, ratio in itertools.product((3, 5, 20), (0.5, 1.0, 2.0, 4.0)):

@@ -184,7 +184,7 @@ def p_by_test(samples, members, exact, drawn):
 
 
 def cell(name, sizes):
-    """Return the row of a cell: the share of rejected pairs of samples for each test and level.
+    """Return the share of rejected pairs of samples of a cell, by test and level.
 
     ``name`` is the name of the populations, and ``sizes`` are the sizes of the two samples.
     """

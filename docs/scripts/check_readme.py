@@ -23,7 +23,7 @@ NOISE = "motor_noise=0.01"
 
 
 def rows_of(text: str) -> dict[str, tuple[str, ...]]:
-    """Read the table of README, and return a dict that maps the name of each row to its numbers.
+    """Return a dict that maps each row of README's table to its numbers.
 
     The numbers are strings in per cent: the gap without noise, the gap with motor noise, and the
     share of the possible gain.
@@ -59,7 +59,7 @@ def differences(text: str, ranking: pd.DataFrame) -> tuple[int, list[str]]:
 
 
 def ranking_of(study: Study) -> pd.DataFrame:
-    """Return the ranking in the paper's world, with the gap of each method in the world with noise.
+    """Return the ranking in the paper's world, with gaps in the noisy world.
 
     The frame is indexed by the titles of methods. The columns ``noisy_gap``, ``noisy_gap_low`` and
     ``noisy_gap_high`` are replaced by the gap in the world with noise.

@@ -118,7 +118,7 @@ def differences(rows: pd.DataFrame) -> Iterator[str]:
 
 
 def short_run(name: str, task: str) -> tuple[str, int, str, int]:
-    """Perform the short run of a method on a task, and return its entry in :data:`SHORT_RUNS`."""
+    """Perform the short run of a method, and return its entry in :data:`SHORT_RUNS`."""
     info = built_in()[name]
     trials = {"trials": 2000} if "trials" in info.defaults else {}
     parameters = info.configure(trials | info.load().quick)
@@ -129,7 +129,7 @@ def short_run(name: str, task: str) -> tuple[str, int, str, int]:
 
 
 def family_hash(name: str) -> str:
-    """Return a hash (16 hex digits) of a family's definition and of one task of each split."""
+    """Return a hash (16 hex digits) of a family and a task of each split."""
     family = json.dumps(shipped_families()[name].model_dump(mode="json"), sort_keys=True)
     drawn = [task_text(instance(f"{name}/{number}")) for number in ("i017", "d003", "2027-041")]
     return hashlib.sha256("".join([family, *drawn]).encode()).hexdigest()[:16]
@@ -152,7 +152,7 @@ def missing_entries(runs: pd.DataFrame) -> Iterator[str]:
 
 
 def result_of(run: Row) -> str:
-    """Return a string with the reward, the hands and the ticks of each part of a run.
+    """Return the reward, the hands and the ticks of a run's parts as a string.
 
     The ticks are those of each movement.
     """

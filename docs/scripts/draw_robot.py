@@ -1,4 +1,4 @@
-"""Draw the robot with the names of its joints, and postures in the null space of its hand.
+"""Draw the robot with the names of its joints, and its null space.
 
     python docs/scripts/draw_robot.py
 
@@ -24,7 +24,7 @@ ANGLE = 0.55
 
 @styled
 def robot() -> Figure:
-    """Draw the robot with the names of its joints, and arcs that show how angles are measured."""
+    """Draw the robot with the names of its joints, and arcs of its angles."""
     task = load_task("two-armed-2")
     drawing, (axes,) = panels((1, 1), (TWO, 0.42 * TWO))
     draw_robot(axes, task, Q, weight=1.6)

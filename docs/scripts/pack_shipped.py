@@ -32,9 +32,10 @@ from coartic.runs.store import RUNS_FILE, Store, open_store, open_store_for_writ
 
 
 def changed_runs(folder: Path) -> Iterator[str]:
-    """Yield a sentence for each shipped run that a folder lacks, or that has another result there.
+    """Yield a sentence for each shipped run that a folder lacks or changes.
 
-    Raises CoarticError if the folder has a method whose version is not the one installed here.
+    A folder changes a run if the run has another result there. Raises CoarticError if the
+    folder has a method whose version is not the one installed here.
     """
     with open_store(folder) as made:
         plan = made.plan()

@@ -1,4 +1,4 @@
-"""Measure the CPU time of a trial, for each public function and each experiment of the paper.
+"""Measure the CPU time of a trial, for public functions and the paper's experiments.
 
     python docs/scripts/speed.py
 
@@ -47,7 +47,7 @@ HEAD = "| µs a trial |"
 
 
 def show_functions() -> None:
-    """Print the CPU time of a trial for each public function, and write the table of the page."""
+    """Print the time of a trial by each public function, and write the page's table."""
     columns = {name: functions(load_task(name)) for name in ("ascending", "two-armed-1")}
     rounds: dict[str, list[dict[str, float]]] = {name: [] for name in columns}
     for _ in range(ROUNDS):  # in turn, so that other work of the machine slows all functions
@@ -67,7 +67,7 @@ def show_functions() -> None:
 
 
 def functions(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
-    """Return a dict that maps names to pairs: a number of trials, and a function that makes them.
+    """Return, by name, a number of trials and a function that makes them.
 
     The targets are near the solution of CMA-ES, so that few goals are missed. The actions of
     environments are near the postures of the corrective process instead.
@@ -107,7 +107,10 @@ def functions(task: Task) -> dict[str, tuple[int, Callable[[], object]]]:
 
 
 def _us(trials: int, make: Callable[[], object]) -> float:
-    """Call a function that makes ``trials`` trials, and return the CPU time of a trial, in µs."""
+    """Return the CPU time of a trial, in µs, of a function that makes trials.
+
+    The function ``make`` makes ``trials`` trials.
+    """
     started = time.process_time()  # CPU time of all threads
     make()
     return (time.process_time() - started) / trials * 1e6

@@ -71,7 +71,7 @@ def planned():
 
 
 def ticks_of(key):
-    """Make the run with this key (:data:`KEYS`), and return the value of its answer, in ticks."""
+    """Make the run of a key (:data:`KEYS`), and return its value in ticks."""
     run, name, spread, setting, family, instance, noise = key
     method = built_in_methods()[name]
     grid = GRIDS[name, spread]
@@ -92,7 +92,10 @@ def ticks_of(key):
 
 
 def make_runs(file):
-    """Make the runs that a CSV file lacks, and append a row for each run as soon as it is made."""
+    """Make the runs that a CSV file lacks, and append their rows.
+
+    Each row is appended as soon as its run is made.
+    """
     done = set()
     if file.is_file():
         done = {*pd.read_csv(file)[KEYS].itertuples(index=False, name=None)}
@@ -108,7 +111,7 @@ def make_runs(file):
 
 
 def table_of(runs):
-    """Return a frame with a row for each setting, in which the best setting of a method is first.
+    """Return a frame with a row for each setting, a method's best setting first.
 
     A row has the mean logarithm of ticks, and the geometric means of ticks over all runs, over the
     runs in each world, and over the runs in each family.

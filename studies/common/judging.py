@@ -1,4 +1,4 @@
-"""Judge the claims of a study by tests whose p-values are adjusted over all its claims.
+"""Judge the claims of a study, with p-values adjusted over all claims.
 
 A claim says that a mean over tasks lies beyond a bound (:func:`mean_beyond`), or that each of
 several means does (:func:`all_of`). :func:`judge` adjusts the p-values of all claims of a study
@@ -43,10 +43,10 @@ Side = Literal["greater", "less"]
 
 
 def level_of(values: ArrayLike) -> float:
-    """Return the level of significance for a test of a mean over tasks: 5 %, or 1 % if skewed.
+    """Return the level of significance for a test of a mean over tasks.
 
-    A bootstrap test of a mean rejects a true null hypothesis too often if the values are very
-    skewed (``docs/statistics.md``).
+    The level is 5 %, or 1 % for skewed values. A bootstrap test of a mean rejects a true null
+    hypothesis too often if the values are very skewed (``docs/statistics.md``).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Write the tables and the page of a study, and a suite of its missing control runs."""
+"""Write a study's tables and page, and a suite of its missing control runs."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def fill_page(template: str | Path, **values: Any) -> str:
 
 
 def expect(holds: bool, what: str) -> str:
-    """Stop the making of a page if a sentence of the page is no longer true.
+    """Stop making a page if one of its sentences is no longer true.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def expect(holds: bool, what: str) -> str:
 
 
 def control_suite(study: Study, *, runs: int = 20) -> str:
-    """Return a suite of runs of random search that signatures of a study need as their control.
+    """Return a suite of random search that a study needs as control of signatures.
 
     For each method that can select its solution from trials, and each task, the suite has a block
     for each hand sequence that at least a tenth of the method's solved runs have. In this block,
