@@ -51,8 +51,8 @@ def bibliography(
         Maps the id of each method to its declaration. A method from a file is cited as its author
         declares. If the author declares no citation, a comment line says so.
     analysis : bool
-        True to add the works on which the statistics are based, and the theories of motor control
-        that the pages compare with the methods.
+        True to add the works on which statistics and signatures are based, and the theories of
+        motor control that the pages compare with the methods.
     environment : mapping, optional
         Environment of a results folder (:attr:`.Study.made_with`). Its version and commit of
         coartic are cited. By default the version of this program is cited.
