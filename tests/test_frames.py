@@ -1,6 +1,7 @@
 """Plain frames of results and claims of a study: against slow and obvious counts."""
 
 import doctest
+import importlib
 import itertools
 
 import numpy as np
@@ -9,20 +10,24 @@ import pytest
 
 import coartic
 from coartic import CoarticError
-from coartic.analysis import ecdf, frames, running_times, signatures, statistics
+from coartic.analysis import ecdf, frames
 from coartic.analysis.signatures import SIGNATURES
 from coartic.analysis.words import p_value
-from coartic.learner import learning
-from common import judging
 from common.judging import judge, mean_beyond
 from tests.support.made_up import row, study_of
 
 
 @pytest.mark.parametrize(
-    "module", [signatures, frames, statistics, running_times, judging, learning]
+    "module",
+    [
+        *("analysis.figures.plot", "analysis.figures.style", "analysis.frames", "analysis.methods"),
+        *("analysis.recordings", "analysis.running_times", "analysis.signatures"),
+        *("analysis.statistics", "analysis.words", "learner.learning", "common.judging"),
+    ],
 )
 def test_examples(module):
-    failed, attempted = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    code = importlib.import_module(module if module.startswith("common") else f"coartic.{module}")
+    failed, attempted = doctest.testmod(code, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert failed == 0 < attempted
 
 
